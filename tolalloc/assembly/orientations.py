@@ -14,7 +14,7 @@ from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.trajectory import foreseen, random_numbers
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import ANGULAR
+from tolalloc.drawings.sources import ANGULAR, is_angular
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Evaluation, Observer
 from tolalloc.reading.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
@@ -161,7 +161,7 @@ class OrientationResponse:
             raise InputError.at(place, "columns that its parts move", [], "at least one column of the reducer's model")
         for name in moved:
             if name in self.model.columns:
-                if source_name(name).rpartition(".")[2] not in ANGULAR:
+                if not is_angular(source_name(name)):
                     raise InputError.at(place, "column", name, f"an angle, whose source ends in {' or '.join(ANGULAR)}")
                 continue
             if LAWS[law] != LINEAR and name.rpartition(".")[0] in _disc_tilts(reducer.disc_count):

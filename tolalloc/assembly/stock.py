@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 from tolalloc.assembly.places import PartTurn, Place, mounted, own_name, owned_columns, places_of, unmounted
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import ANGULAR
+from tolalloc.drawings.sources import is_angular
 from tolalloc.drawings.table_file import plain_number, read_text_table
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import ARCSECOND, MICROMETRE
@@ -235,7 +235,7 @@ def own_errors(reducer: Reducer) -> dict[str, tuple[str, ...]]:
 
 def _deviation(place: str, error: str, cell: str, unit: str) -> float:
     """Return the value of one row [m, angles rad]."""
-    angle = source_name(error).rsplit(".", 1)[-1] in ANGULAR
+    angle = is_angular(source_name(error))
     allowed = ("arcsec",) if angle else ("µm", "um")
     if unit not in allowed:
         raise InputError.at(place, f"unit of {error}", unit, " or ".join(allowed))

@@ -17,6 +17,8 @@ from scipy.sparse.csgraph import connected_components
 from tolalloc.bench.posterior import CurveProblem, LogDensity
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.exceptions import SolveError
+from tolalloc.reducers.equivalent.interfaces import SOURCES
+from tolalloc.reducers.equivalent.sources import ErrorSource
 from tolalloc.reducers.reducer.design import Reducer
 
 _OTHER = {"1": "2", "2": "1"}
@@ -37,15 +39,18 @@ def exchanged(name: str) -> str:
 
 def _image(name: str, reducer: Reducer) -> str:
     """Return the column that a column becomes; of a wave, the one with the same function."""
-    number = re.search(r"\.(\d+)(\.[xy])?$", name)
-    if number is None:
+    kind = SOURCES.of_column(name)
+    if not kind.each:
         return exchanged(name)
-    stage = reducer.cycloid_stage
-    single_pin = name.startswith("each_pin.")
-    count = stage.pin_count if single_pin else stage.disc_teeth
-    past = 0 if single_pin else _PAST[name.split(".")[0]]
-    place = (int(number[1]) - 1 + (count + past) // 2) % count + 1
-    return exchanged(name[: number.start(1)] + str(place) + name[number.end(1) :])
+    number = kind.member(name)
+    count, past = kind.count(reducer), _past(kind, name)
+    place = (int(name[number]) - 1 + (count + past) // 2) % count + 1
+    return exchanged(name[: number.start] + str(place) + name[number.stop :])
+
+
+def _past(kind: ErrorSource, name: str) -> int:
+    """Return by how many half teeth half a turn carries what the name counts past, or short of, the other's [-]."""
+    return _PAST.get(name.split(".")[0], 0) if kind.teeth else 0
 
 
 def has_half_turn(reducer: Reducer, columns: Sequence[str]) -> bool:
@@ -72,10 +77,10 @@ def half_turn(columns: Sequence[str], reducer: Reducer) -> Float[np.ndarray, "co
         to = where[_image(name, reducer)]
         wave = re.search(r"\.(cos|sin)(\d+)$", name)
         if wave is None:
-            kept = ".tilt." in name or name.startswith("each_pin.")
-            matrix[to, at] = -1.0 if name.endswith((".x", ".y")) and not kept else 1.0
+            kind = SOURCES.of_column(name)
+            matrix[to, at] = -1.0 if kind.shape == "vector" and kind.mirror == "reversed" else 1.0
             continue
-        past = _PAST.get(name.split(".")[0], 0) / reducer.cycloid_stage.disc_teeth
+        past = _past(SOURCES.of_column(name), name) / reducer.cycloid_stage.disc_teeth
         lag = int(wave[2]) * np.pi * (1.0 + past)
         other = where[exchanged(name[: wave.start()] + (".sin" if wave[1] == "cos" else ".cos") + wave[2])]
         matrix[to, at] = np.cos(lag)

@@ -27,7 +27,9 @@ from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import ARCSECOND, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.equivalent.columns import source_name
+from tolalloc.reducers.equivalent.interfaces import SOURCES
 from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.sources import ErrorSource
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import IdentifiedStiffnessRecord, ReducerRecord, load_reducer
 from tolalloc.reducers.reducer.unit_file import UnitRecord
@@ -130,9 +132,6 @@ class Likeness:
         return f"# Made by tolalloc new, like {self.preset}. Change what you know, and what `assumptions` says.\n{text}"
 
 
-_FIRST_STAGE = re.compile(r"sun\.|planet\d|mesh\d")
-_FINE = re.compile(r".*(\.phase|\.rotation|\.tilt|each_pin\..*|\.each_tooth\..*|\.clearance)$")
-"""Sources that a first study neglects: they stand in the table with a zone of 0 and locked."""
 _NUMBERED = re.compile(r"(disc|crank|bore|journal|planet|mesh)\d+")
 _KNOWN_DIAMETER = 104.0
 """Diameter of the pin circle of the RV-20E, whose zones are the shipped ones [mm]."""
@@ -146,13 +145,14 @@ def sources_of(reducer: Reducer) -> tuple[Source, ...]:
     """
     known = {source.name: source for source in load_tolerance_table("rv20e_all_sources")}
     scale = size_factor(2 * reducer.cycloid_stage.pin_circle_radius / MILLIMETRE)
-    names = dict.fromkeys(map(source_name, EquivalentModel(reducer).columns))
+    kinds = {name: SOURCES.of(name) for name in map(source_name, EquivalentModel(reducer).columns)}
     found = []
-    for name in names:
+    for name, kind in kinds.items():
         like = known.get(name) or known.get(_NUMBERED.sub(r"\g<1>1", name))
-        if like is not None:
-            found.append(_scaled(replace(like, name=name, part=name.partition(".")[0]), reducer, scale))
-    return tuple(sorted(found, key=lambda own: bool(_FINE.match(own.name)) + 2 * bool(_FIRST_STAGE.match(own.name))))
+        if like is not None and kind is not None:
+            own = replace(like, name=name, part=name.partition(".")[0])
+            found.append((kind.fine + 2 * kind.first_stage, _scaled(own, kind, reducer, scale)))
+    return tuple(own for _, own in sorted(found, key=lambda ranked: ranked[0]))
 
 
 def size_factor(diameter: float) -> float:
@@ -168,17 +168,15 @@ def size_factor(diameter: float) -> float:
     return unit(diameter) / unit(_KNOWN_DIAMETER)
 
 
-def _scaled(source: Source, reducer: Reducer, scale: float) -> Source:
+def _scaled(source: Source, kind: ErrorSource, reducer: Reducer, scale: float) -> Source:
     """Return a source at this size, its number of like features that of the reducer."""
-    stage = reducer.cycloid_stage
-    each = source.each if source.each == 1 else stage.pin_count if "each_pin" in source.name else stage.disc_teeth
-    nominal = {"pin.diameter": 2 * stage.pin_radius, "housing.groove.radius": stage.pin_radius}.get(source.name, 0.0)
+    nominal = kind.nominal.of(reducer) if kind.nominal and not kind.each else 0.0
     zone, least, most = (_rounded(scale * own) for own in (source.zone, source.minimum, source.maximum))
     note = "zone, range and cost assumed: those of the RV-20E, scaled by ISO 286's tolerance unit"
-    own = replace(source, zone=zone, minimum=least, maximum=most, each=each, nominal=nominal, note=note)
-    if _FINE.match(source.name):
+    own = replace(source, zone=zone, minimum=least, maximum=most, each=kind.count(reducer), nominal=nominal, note=note)
+    if kind.fine:
         return replace(own, zone=0.0, minimum=0.0, maximum=0.0, cost=0.0, locked=True, note="neglected: give it a zone")
-    if _FIRST_STAGE.match(source.name):
+    if kind.first_stage:
         return replace(own, locked=True, note=f"{note}; locked: the first stage is divided by the ratio")
     return own
 

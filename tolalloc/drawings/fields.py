@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from tolalloc.drawings.distributions import Distribution, batches_text, parsed_batches, require_shape
 from tolalloc.drawings.measured_parts import MeasuredParts, load_measured_parts
-from tolalloc.drawings.sources import ANGULAR, Source
+from tolalloc.drawings.sources import Source, is_angular
 from tolalloc.drawings.table_file import usual_signs
 from tolalloc.drawings.zones import Feature, parsed_spectrum, spectrum_text
 from tolalloc.reading.files import Record
@@ -304,7 +304,7 @@ class ToleranceRow(Record):
             raise ValueError(
                 f"the cost must be {SMALLEST_COST:g} or more for a zone that allocation may change; or lock it"
             )
-        angular = self.name.rsplit(".", 1)[-1] in ANGULAR
+        angular = is_angular(self.name)
         if angular != (self.over is not None):
             raise ValueError(
                 f"{self.name} {'is an angle and needs' if angular else 'is a length and has no'} over, the length "

@@ -29,6 +29,16 @@ from tolalloc.reading.units import MICROMETRE, MILLIMETRE
 ANGULAR = ("tilt", "phase", "rotation")
 """Last part of the name of a source whose columns are angles."""
 
+
+def is_angular(source: str) -> bool:
+    """Return whether the columns of a source are angles, by the last part of its name.
+
+    >>> is_angular("disc1.tilt"), is_angular("disc1.runout")
+    (True, False)
+    """
+    return source.rpartition(".")[2] in ANGULAR
+
+
 _ROUNDING = 1e-9
 """Mean of a deviation over its zone, up to which it is rounding [-]."""
 

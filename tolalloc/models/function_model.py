@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.sources import ANGULAR
+from tolalloc.drawings.sources import is_angular
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.model import Evaluation, Model, Observer, SettingDerivatives, unobserved
 from tolalloc.models.settings import Setting, require_settings
@@ -306,9 +306,7 @@ class BoundFunction(Model):
     @cached_property
     def _per_input(self) -> Float[np.ndarray, " input"]:
         """Input per metre, or per radian for an angle: lengths reach the function in millimetres."""
-        return np.array(
-            [1.0 if name.rsplit(".", 1)[-1] in ANGULAR else 1.0 / MILLIMETRE for name in self.source.inputs]
-        )
+        return np.array([1.0 if is_angular(name) else 1.0 / MILLIMETRE for name in self.source.inputs])
 
     def _called(
         self, function: Callable[..., Any], x: Float[np.ndarray, "sample column"], count: int

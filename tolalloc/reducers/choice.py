@@ -16,6 +16,7 @@ from tolalloc.reading.named_fields import is_number
 from tolalloc.reading.units import MICROMETRE, MILLIMETRE
 from tolalloc.reducers import TORQUE
 from tolalloc.reducers.equivalent.columns import source_name
+from tolalloc.reducers.equivalent.interfaces import SOURCES
 from tolalloc.reducers.equivalent.model import EquivalentModel, remembered_model
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
 from tolalloc.reducers.equivalent.springs import HARMONICS
@@ -30,17 +31,7 @@ if TYPE_CHECKING:
     from tolalloc.reducers.model import ReducerModel
 
 
-NEGLECTED = (
-    "sun.pitch",
-    "planet*.pitch",
-    "mesh*",
-    "*.phase",
-    "*.rotation",
-    "*.tilt",
-    "*.clearance",
-    "each_pin.*",
-    "*.each_tooth.*",
-)
+NEGLECTED = SOURCES.neglected
 """Sources that a tolerance table need not list; they are then taken as exact, and the report says so."""
 
 _LARGEST_ZONE = 200.0 * MICROMETRE
@@ -118,9 +109,8 @@ def _require_each(errors: ErrorModel, own: Mapping[str, Sequence[str]], reducer:
     """
     wrong: dict[int, list[str]] = {}
     for source in errors.sources:
-        plain = {column.removesuffix(".x").removesuffix(".y") for column in own[source.name]}
-        numbered = [column for column in plain if column.removeprefix(f"{source.name}.").isdecimal()]
-        if own[source.name] and source.each != (len(numbered) or 1):
+        kind = SOURCES.of(source.name)
+        if own[source.name] and kind and source.each != kind.count(reducer):
             wrong.setdefault(source.each, []).append(source.name)
     if not wrong:
         return
@@ -138,19 +128,13 @@ _LARGEST_MISMATCH = 0.01
 
 def _other_sizes(errors: ErrorModel, reducer: Reducer) -> tuple[str, ...]:
     """Return which nominal sizes of a table are not those of the reducer, in sentences; a size of 0 is not stated."""
-    radius, own = reducer.cycloid_stage.pin_radius, reducer.modification
-    meant = {
-        "pin.diameter": ("twice its pin radius", 2 * radius),
-        "housing.groove.radius": ("its pin radius", radius),
-        "each_pin.diameter": ("twice its pin radius", 2 * radius),
-        "each_pin.groove": ("its pin radius", radius),
-        "modification.equidistant": ("its equidistant amount", own.equidistant),
-        "modification.shift": ("its shift amount", own.shift),
-    }
     sentences = []
     for source in errors.sources:
-        what, size = meant.get(source.name, ("", 0.0))
-        if what and source.nominal and abs(source.nominal - size) > _LARGEST_MISMATCH * abs(size):
+        kind = SOURCES.of(source.name)
+        if kind is None or kind.nominal is None or not source.nominal:
+            continue
+        what, size = kind.nominal.said, kind.nominal.of(reducer)
+        if abs(source.nominal - size) > _LARGEST_MISMATCH * abs(size):
             sentences.append(
                 f"The table and the reducer differ: nominal of {source.name} is {source.nominal / MILLIMETRE:g} mm in "
                 f"{errors.table or 'the table'}, and {what} is {size / MILLIMETRE:g} mm in reducer {reducer.name}; the "

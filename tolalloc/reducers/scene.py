@@ -6,7 +6,6 @@ it leaves open; what the model's equilibria say of pins and displaced parts.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -25,22 +24,12 @@ from tolalloc.reducers.equivalent.condensation import (
     retained_coordinates,
     rotation_scale,
 )
+from tolalloc.reducers.equivalent.interfaces import SOURCES
 from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel, Status
 from tolalloc.reducers.equivalent.outputs import Forces, forces
 from tolalloc.reducers.equivalent.springs import Positions, SpringGroup
 from tolalloc.reducers.reducer.bearings import RollingBearing
 from tolalloc.reducers.reducer.design import Reducer
-
-_RULES = (
-    (r"each_pin\.diameter|pin\..+", "pins"),
-    (r"each_pin\.groove|housing\.groove\..+", "housing.grooves"),
-    (r"each_pin\.position|housing\.(?:pitch|runout)", "housing.pins"),
-    (r"(sun|planet\d+|disc\d+)\.(?:each_tooth\..+|pitch|runout)", r"\1.teeth"),
-    (r"(sun|planet\d+|carrier|crank\d+|disc\d+)\.(?:assembly|eccentricity|tilt|clearance)", r"\1"),
-    (r"(mesh\d+)\..+", r"\1"),
-    (r"(disc\d+\.bore\d+|crank\d+\.journal\d+|carrier\.bore\d+|disc\d+\.bores)\..+", r"\1"),
-)
-"""Name of a source → the place that it sits at."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,16 +55,17 @@ def place_of(source: str) -> str:
     >>> place_of("disc2.each_tooth.pitch"), place_of("crank1.journal2.phase"), place_of("carrier.tilt")
     ('disc2.teeth', 'crank1.journal2', 'carrier')
     """
-    for pattern, place in _RULES:
-        match = re.fullmatch(pattern, source)
-        if match:
-            return match.expand(place)
-    raise UnknownNameError.among("places of a reducer", "source", source, [pattern for pattern, _ in _RULES])
+    kind = SOURCES.of(source)
+    if kind is None or not kind.place:
+        names = [own.name for own in SOURCES.kinds if own.place]
+        raise UnknownNameError.among("places of a reducer", "source", source, names)
+    return kind.place_of(source)
 
 
 def is_placed(source: str) -> bool:
-    """Return whether the picture has a place for a source, as it has for all of this package."""
-    return any(re.fullmatch(pattern, source) for pattern, _ in _RULES)
+    """Return whether the picture has a place for a source."""
+    kind = SOURCES.of(source)
+    return kind is not None and bool(kind.place)
 
 
 def places_of(reducer: Reducer, sources: Iterable[str] = ()) -> tuple[Place, ...]:

@@ -6,33 +6,16 @@ eliminated once per angle and reducer; what is left for each sample is a small c
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.reducers.equivalent.columns import Columns, columns_of
-from tolalloc.reducers.equivalent.interfaces import (
-    PinContact,
-    carrier_support,
-    crank_carrier,
-    crank_disc,
-    dense_rows,
-    gear_mesh,
-    pin_contact,
-    sun_support,
-)
+from tolalloc.reducers.equivalent.interfaces import INTERFACES, PinContact, dense_rows, pin_contact
 from tolalloc.reducers.equivalent.springs import HARMONICS, Coordinates, Positions, SpringGroup, harmonic_waves
 from tolalloc.reducers.reducer.design import Reducer
 
-GROUPS: tuple[Callable[[Positions], SpringGroup], ...] = (
-    sun_support,
-    gear_mesh,
-    crank_disc,
-    crank_carrier,
-    carrier_support,
-)
 _ANGLES_AT_ONCE = 64
 
 
@@ -69,7 +52,7 @@ class CondensedAngles(NamedTuple):
 
 def bilateral_groups(at: Positions) -> list[SpringGroup]:
     """Return all spring groups but the pin contact."""
-    return [group(at) for group in GROUPS]
+    return [interface.rows(at) for interface in INTERFACES]
 
 
 def spring_groups(

@@ -5,13 +5,16 @@ Contact of disc teeth and housing pins: unilateral springs and the errors of tee
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.reducers.cycloid.loaded_contact import contact_stiffness
 from tolalloc.reducers.cycloid.tooth_profile import normals
+from tolalloc.reducers.equivalent.sources import ErrorSource, ErrorSources, Nominal
 from tolalloc.reducers.equivalent.springs import (
     Positions,
     SpringGroup,
@@ -22,6 +25,21 @@ from tolalloc.reducers.equivalent.springs import (
     with_play,
 )
 from tolalloc.reducers.reducer.design import Reducer
+
+
+@dataclass(frozen=True, kw_only=True)
+class Interface:
+    """A spring group with what it declares: the sources whose columns move its rows first, or its clearances."""
+
+    rows: Callable[[Positions], SpringGroup]
+    sources: tuple[ErrorSource, ...]
+
+
+def _clearance(element: str, *, neglected: str = "*.clearance", first_stage: bool = False) -> ErrorSource:
+    """Return the deviations of the clearances of an interface's elements."""
+    return ErrorSource(
+        name=f"{element}.clearance", place=element, neglected=neglected, fine=True, first_stage=first_stage
+    )
 
 
 def sun_support(at: Positions) -> SpringGroup:
@@ -40,6 +58,11 @@ def sun_support(at: Positions) -> SpringGroup:
         columns=vector_columns("sun.assembly"),
         stiffness=np.full((angles, 2), at.reducer.stiffness.sun_support),
     )
+
+
+SUN_SUPPORT = Interface(
+    rows=sun_support, sources=(ErrorSource(name="sun.assembly", shape="vector", place="sun", first_stage=True),)
+)
 
 
 def _along_line_of_action(
@@ -96,6 +119,21 @@ def gear_mesh(at: Positions) -> SpringGroup:
         stiffness=np.full((angles, cranks), reducer.stiffness.gear_mesh),
     )
     return with_play(group, reducer.clearances.gear_mesh, tuple(f"mesh{crank + 1}" for crank in range(cranks)))
+
+
+GEAR_MESH = Interface(
+    rows=gear_mesh,
+    sources=(
+        ErrorSource(name="sun.eccentricity", shape="vector", place="sun", first_stage=True),
+        ErrorSource(name="sun.pitch", shape="waves", place="sun.teeth", neglected="sun.pitch", first_stage=True),
+        ErrorSource(name="planet{i}.eccentricity", shape="vector", place="planet{i}", first_stage=True),
+        ErrorSource(
+            name="planet{i}.pitch", shape="waves", place="planet{i}.teeth", neglected="planet*.pitch", first_stage=True
+        ),
+        ErrorSource(name="mesh{i}.deviation", place="mesh{i}", neglected="mesh*", first_stage=True),
+        _clearance("mesh{i}", neglected="mesh*", first_stage=True),
+    ),
+)
 
 
 def _lever(radius: float, direction: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle 2"]:
@@ -157,6 +195,30 @@ def crank_disc(at: Positions) -> SpringGroup:
     return with_play(group, reducer.clearances.crank_disc_bearing, journals)
 
 
+CRANK_DISC = Interface(
+    rows=crank_disc,
+    sources=(
+        ErrorSource(name="crank{i}.journal{j}.eccentricity", shape="vector", place="crank{i}.journal{j}"),
+        ErrorSource(name="disc{j}.bore{i}.position", shape="vector", place="disc{j}.bore{i}"),
+        ErrorSource(name="crank{i}.journal{j}.phase", place="crank{i}.journal{j}", neglected="*.phase", fine=True),
+        ErrorSource(name="disc{j}.bores.rotation", place="disc{j}.bores", neglected="*.rotation", fine=True),
+        ErrorSource(
+            name="crank{i}.tilt", shape="vector", mirror="kept", place="crank{i}", neglected="*.tilt", fine=True
+        ),
+        ErrorSource(
+            name="disc{j}.bore{i}.tilt",
+            shape="vector",
+            mirror="kept",
+            place="disc{j}.bore{i}",
+            neglected="*.tilt",
+            fine=True,
+        ),
+        ErrorSource(name="carrier.tilt", shape="vector", mirror="kept", place="carrier", neglected="*.tilt", fine=True),
+        _clearance("crank{i}.journal{j}"),
+    ),
+)
+
+
 def crank_carrier(at: Positions) -> SpringGroup:
     """Return two springs per crankshaft bearing in the carrier, theory page equations (10) and (11).
 
@@ -187,6 +249,15 @@ def crank_carrier(at: Positions) -> SpringGroup:
     return with_play(group, reducer.clearances.crank_carrier_bearing, bores)
 
 
+CRANK_CARRIER = Interface(
+    rows=crank_carrier,
+    sources=(
+        ErrorSource(name="carrier.bore{i}.position", shape="vector", place="carrier.bore{i}"),
+        _clearance("carrier.bore{i}"),
+    ),
+)
+
+
 def carrier_support(at: Positions) -> SpringGroup:
     """Return the two springs of the carrier's bearing in the housing, theory page equation (12).
 
@@ -204,6 +275,15 @@ def carrier_support(at: Positions) -> SpringGroup:
         stiffness=np.full((angles, 2), at.reducer.stiffness.carrier_bearing),
     )
     return with_play(group, at.reducer.clearances.carrier_bearing, ("carrier",))
+
+
+CARRIER_SUPPORT = Interface(
+    rows=carrier_support,
+    sources=(ErrorSource(name="carrier.assembly", shape="vector", place="carrier"), _clearance("carrier")),
+)
+
+INTERFACES: tuple[Interface, ...] = (SUN_SUPPORT, GEAR_MESH, CRANK_DISC, CRANK_CARRIER, CARRIER_SUPPORT)
+"""All interfaces but the pins; a further one is its function, its record, and its name here."""
 
 
 Terms = dict[str, list[tuple[int, float]]]
@@ -311,6 +391,75 @@ def tooth_terms(reducer: Reducer, disc: int) -> Terms:
 def tilt_terms(disc: int) -> Terms:
     """Return the tilt of a disc, ``disc{j}.tilt``, which turns with it [rad]."""
     return {name: [(entry, 1.0)] for entry, name in enumerate(vector_columns(f"disc{disc + 1}.tilt"))}
+
+
+def _pin_radius(reducer: Reducer) -> float:
+    return reducer.cycloid_stage.pin_radius
+
+
+def _pin_diameter(reducer: Reducer) -> float:
+    return 2 * reducer.cycloid_stage.pin_radius
+
+
+def _of_tooth(kind: Literal["pitch", "runout"]) -> tuple[ErrorSource, ...]:
+    """Return the deviations of a disc's teeth along the arc or outward: its waves, and single teeth."""
+    single = f"disc{{j}}.each_tooth.{kind}"
+    return (
+        ErrorSource(name=f"disc{{j}}.{kind}", shape="waves", teeth=True, place="disc{j}.teeth"),
+        ErrorSource(
+            name=single, each="tooth", teeth=True, place="disc{j}.teeth", neglected="*.each_tooth.*", fine=True
+        ),
+    )
+
+
+PIN_SOURCES = (
+    ErrorSource(name="pin.diameter", place="pins", nominal=Nominal(said="twice its pin radius", of=_pin_diameter)),
+    ErrorSource(
+        name="housing.groove.radius", place="housing.grooves", nominal=Nominal(said="its pin radius", of=_pin_radius)
+    ),
+    ErrorSource(
+        name="modification.equidistant",
+        nominal=Nominal(said="its equidistant amount", of=lambda reducer: reducer.modification.equidistant),
+    ),
+    ErrorSource(
+        name="modification.shift",
+        nominal=Nominal(said="its shift amount", of=lambda reducer: reducer.modification.shift),
+    ),
+    ErrorSource(name="housing.runout", shape="waves", place="housing.pins"),
+    ErrorSource(name="housing.pitch", shape="waves", place="housing.pins"),
+    ErrorSource(
+        name="each_pin.diameter",
+        each="pin",
+        place="pins",
+        neglected="each_pin.*",
+        fine=True,
+        nominal=Nominal(said="twice its pin radius", of=_pin_diameter),
+    ),
+    ErrorSource(
+        name="each_pin.groove",
+        each="pin",
+        place="housing.grooves",
+        neglected="each_pin.*",
+        fine=True,
+        nominal=Nominal(said="its pin radius", of=_pin_radius),
+    ),
+    ErrorSource(
+        name="each_pin.position",
+        shape="vector",
+        mirror="kept",
+        each="pin",
+        place="housing.pins",
+        neglected="each_pin.*",
+        fine=True,
+    ),
+    *_of_tooth("pitch"),
+    *_of_tooth("runout"),
+    ErrorSource(name="disc{j}.tilt", shape="vector", mirror="kept", place="disc{j}", neglected="*.tilt", fine=True),
+)
+"""What the contact of pins and teeth declares."""
+
+SOURCES = ErrorSources((*(kind for interface in INTERFACES for kind in interface.sources), *PIN_SOURCES))
+"""All kinds of sources of a reducer."""
 
 
 def dense_rows(at: Positions) -> SpringGroup:

@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Float
 from pydantic import Field
 
-from tolalloc.drawings.sources import ANGULAR, neglected_columns
+from tolalloc.drawings.sources import is_angular, neglected_columns
 from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.files import Record, no_formula, read_toml, shipped_or_path, validated, write_new
@@ -163,7 +163,7 @@ def unit_names(table: TextTable) -> tuple[str, ...]:
 
 
 def _is_angle(column: str) -> bool:
-    return column.removesuffix(".x").removesuffix(".y").rsplit(".", 1)[-1] in ANGULAR
+    return is_angular(column.removesuffix(".x").removesuffix(".y"))
 
 
 def _column(path: Path, header: str) -> tuple[str, float, float]:

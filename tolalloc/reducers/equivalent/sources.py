@@ -1,0 +1,153 @@
+"""What a source of error is, said once by the spring group whose rows it moves; nothing else reads it off its name.
+
+A source has one column or more: a number, a vector in the plane, or the waves of a deviation along a ring, each once or
+once for every pin or tooth.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Literal
+
+from tolalloc.drawings.sources import is_angular
+from tolalloc.exceptions import UnknownNameError
+from tolalloc.reducers.reducer.design import Reducer
+
+_COMPONENTS = {"number": "", "vector": r"\.(?P<axis>[xy])", "waves": r"\.(?P<wave>cos|sin)(?P<order>\d+)"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Nominal:
+    """The nominal size that a tolerance table may state for a source."""
+
+    said: str  # What it is of the reducer, in words
+    of: Callable[[Reducer], float]  # The size itself [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ErrorSource:
+    """A kind of source, one for each part that has it: ``crank{i}.journal{j}.eccentricity``.
+
+    Parameters
+    ----------
+    name
+        Name of the sources, ``{i}`` and ``{j}`` for the numbers of parts and features; an angle's ends as
+        `tolalloc.drawings.sources.ANGULAR` says, by which a tolerance table knows it.
+    shape
+        What one deviation is: a number, a vector in the plane, or waves along a ring.
+    each
+        Whether every ``pin`` or every ``tooth`` has a deviation of its own.
+    place
+        Where the picture shows it, as `tolalloc.reducers.scene.Place.id` says; nowhere if empty.
+    mirror
+        What a vector becomes where half a turn carries the reducer into itself: its direction is ``reversed``, or
+        ``kept`` where it counts along the part's own radius or acts by its height between the discs.
+    teeth
+        Whether its angles count from the teeth of a disc, which half a turn does not carry into those of the other one.
+    neglected
+        Pattern by which a table may leave it out; empty where it may not.
+    fine
+        Whether a first study leaves it out: it is in the new table with a zone of 0.
+    first_stage
+        Whether the first stage has it, whose errors the ratio divides.
+    nominal
+        Nominal size, if there is one.
+    """
+
+    name: str
+    shape: Literal["number", "vector", "waves"] = "number"
+    each: Literal["", "pin", "tooth"] = ""
+    place: str = ""
+    mirror: Literal["reversed", "kept"] = "reversed"
+    teeth: bool = False
+    neglected: str = ""
+    fine: bool = False
+    first_stage: bool = False
+    nominal: Nominal | None = None
+
+    @property
+    def angular(self) -> bool:
+        """Whether its columns are angles [rad], and not lengths [m]."""
+        return is_angular(self.name)
+
+    @property
+    def unit(self) -> str:
+        """What its columns are in."""
+        return "rad" if self.angular else "m"
+
+    @property
+    def part(self) -> str:
+        """The part that carries it."""
+        return self.name.partition(".")[0]
+
+    def count(self, reducer: Reducer) -> int:
+        """Return how many like features each have a deviation of their own [-]."""
+        stage = reducer.cycloid_stage
+        return {"": 1, "pin": stage.pin_count, "tooth": stage.disc_teeth}[self.each]
+
+    @cached_property
+    def pattern(self) -> re.Pattern[str]:
+        """What the names of its sources match, with the numbers in them."""
+        return re.compile(_numbered(self.name))
+
+    @cached_property
+    def column_pattern(self) -> re.Pattern[str]:
+        """What the names of its columns match: source, number of the pin or tooth, axis or wave and order."""
+        member = r"\.(?P<member>\d+)" if self.each else ""
+        return re.compile(f"(?P<source>{_numbered(self.name)}){member}{_COMPONENTS[self.shape]}")
+
+    def member(self, column: str) -> slice:
+        """Return where in a column's name the number of its pin or tooth stands."""
+        found = self.column_pattern.fullmatch(column)
+        return slice(*found.span("member")) if found and self.each else slice(0, 0)
+
+    def place_of(self, source: str) -> str:
+        """Return the id of the place at which the picture shows a source of its kind."""
+        numbers = self.pattern.fullmatch(source)
+        return self.place.format(**numbers.groupdict()) if numbers else ""
+
+
+def _numbered(name: str) -> str:
+    return re.sub(r"\\{(\w)\\}", r"(?P<\1>\\d+)", re.escape(name))
+
+
+class ErrorSources:
+    """All kinds of sources of a model, to be asked by the name of a source or of a column.
+
+    Parameters
+    ----------
+    kinds
+        The kinds, each name once.
+    """
+
+    def __init__(self, kinds: Iterable[ErrorSource]) -> None:
+        self.kinds = tuple(kinds)
+        self._of = lru_cache(maxsize=None)(self._found)
+
+    def _found(self, name: str) -> ErrorSource | None:
+        return next((kind for kind in self.kinds if kind.pattern.fullmatch(name)), None)
+
+    def of(self, source: str) -> ErrorSource | None:
+        """Return the kind of a source, none if nothing declares it."""
+        return self._of(source)
+
+    def of_column(self, column: str) -> ErrorSource:
+        """Return the kind of the source that a column belongs to.
+
+        Raises
+        ------
+        UnknownNameError
+            A column that nothing declares.
+        """
+        for kind in self.kinds:
+            if kind.column_pattern.fullmatch(column):
+                return kind
+        raise UnknownNameError.among("the reducer's model", "column", column, [kind.name for kind in self.kinds])
+
+    @property
+    def neglected(self) -> tuple[str, ...]:
+        """Patterns of all sources that a table may leave out, in the order of their declaration."""
+        return tuple(dict.fromkeys(kind.neglected for kind in self.kinds if kind.neglected))
