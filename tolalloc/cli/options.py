@@ -29,12 +29,6 @@ TestTorqueOption = Annotated[
         "given."
     ),
 ]
-RatedTorqueOption = Annotated[
-    float | None,
-    typer.Option(
-        help="Torque on the carrier [N·m], negative where it resists the rotation; minus the rated one unless given."
-    ),
-]
 StiffnessOption = Annotated[str, typer.Option(help="Identified stiffness: shipped name or TOML file.")]
 
 

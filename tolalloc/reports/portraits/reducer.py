@@ -15,12 +15,12 @@ from tolalloc.exceptions import InputError
 from tolalloc.models.model import Units
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE
 from tolalloc.reducers import PRELOAD
+from tolalloc.reducers.contact import contact_of
 from tolalloc.reducers.cycloid.clearance import linear_model_warnings
-from tolalloc.reducers.cycloid.loaded_contact import assess
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop
 from tolalloc.reducers.equivalent.model import OUTCOMES, Equilibria
-from tolalloc.reducers.equivalent.outputs import order_spectrum, peak_line_load, unit_pressure
-from tolalloc.reducers.equivalent.perfect import against_catalogue, perfect_reducer
+from tolalloc.reducers.equivalent.outputs import order_spectrum
+from tolalloc.reducers.equivalent.perfect import against_catalogue
 from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.scene import PER_CRANK_TURN, Scene, is_placed, scene_of
@@ -324,16 +324,10 @@ def _carried(reducer: Reducer) -> dict[str, float]:
     """Return how the parts without errors carry the rated torque; not a number where they interfere before any load."""
     values, torque = [np.nan] * len(_CARRIED), -reducer.load.rated_torque
     with suppress(InputError):
-        found = assess(reducer, torque, law=reducer.stiffness.pin_contact_law)
-        if reducer.modification.rotation == 0.0 and not found.clearance.exact:
-            solved = perfect_reducer(found.reducer, torque)
-            pins, pressed = solved.forces.pins[0], peak_line_load(solved.equilibria, solved.forces)
-            values = [
-                found.clearance.backlash / ARCMINUTE,
-                int((pins > 0).sum(axis=2).min()),
-                float(pins.max()),
-                float((unit_pressure(solved.equilibria) * np.sqrt(pressed)).max()) / MEGAPASCAL,
-            ]
+        found = contact_of(reducer, torque, law=reducer.stiffness.pin_contact_law)
+        if own := found.yielding:
+            backlash = found.assessment.clearance.backlash / ARCMINUTE
+            values = [backlash, own.pins_in_contact[0], own.largest_force, own.pressure / MEGAPASCAL]
     return dict(zip(_CARRIED, values, strict=True))
 
 
