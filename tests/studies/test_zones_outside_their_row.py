@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import tolalloc as ta
-from tolalloc.cli.whatif import _zone
+from tolalloc.cli.studies import _zone
 from tolalloc.exceptions import InputError
 
 ZONE = {"plus": 0.1, "minus": -0.1, "unit": "mm", "min": 0.02, "max": 0.5, "cost": 1.0}
