@@ -11,6 +11,7 @@ from SALib.analyze import sobol as salib
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Evaluation
+from tolalloc.reports.tellers.ranking import converged
 from tolalloc.sensitivity.ranking import (
     SourceRanking,
     before,
@@ -245,12 +246,12 @@ def test_blocks_double_until_the_order_is_stable_or_the_limit_is_reached():
     assert [step.blocks for step in found.history] == [64 << at for at in range(len(found.history))]
     assert found.history[-1].first == (1, 2, 0)
     assert found.history[-1].probability >= 0.9 > found.history[-2].probability
-    assert found.status.startswith("The order of the first 3 over the outputs with a limit, ")
-    assert "is stable: " in found.status
+    assert converged(found).startswith("The order of the first 3 over the outputs with a limit, ")
+    assert "is stable: " in converged(found)
     stopped = until_converged(gaps, "abcd", 3, start=64, limit=200)
     assert (stopped.stable, [step.blocks for step in stopped.history]) == (False, [64, 128])
-    assert "not stable at the largest number of blocks allowed" in stopped.status
-    assert "resamples of 128 blocks" in stopped.status
+    assert "not stable at the largest number of blocks allowed" in converged(stopped)
+    assert "resamples of 128 blocks" in converged(stopped)
     with pytest.raises(InputError, match="first number of blocks"):
         until_converged(gaps, "abcd", 3, start=64, limit=32)
 

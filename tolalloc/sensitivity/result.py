@@ -19,7 +19,7 @@ from tolalloc.sensitivity.inverse import InverseSensitivity
 from tolalloc.sensitivity.ranking import Replication
 from tolalloc.sensitivity.screening import ElementaryEffects, MomentIndependent
 from tolalloc.sensitivity.shapley import ShapleyEffects
-from tolalloc.sensitivity.sobol import OrderContribution, SobolAnalysis, SobolIndices
+from tolalloc.sensitivity.sobol import OrderContribution, SalibArrays, SobolAnalysis, SobolIndices
 from tolalloc.sensitivity.surrogate.validation import Choice
 from tolalloc.sensitivity.target import TargetSensitivity
 from tolalloc.sensitivity.uncertain import UncertainEffect
@@ -87,6 +87,11 @@ class RankingResult:
     def one_sided(self) -> OneSided:
         """The leading output against its limits."""
         return OneSided(response=self.model.reading((self.leading,)), limits=self.limits[self.leading])
+
+    def to_salib(self) -> SalibArrays:
+        """Return problem, samples and leading output of the Sobol indices for SALib's own analysis and plots."""
+        assert self.sobol.solved is not None
+        return self.sobol.solved.to_salib()
 
     @cached_property
     def capabilities(self) -> tuple[OutputCapability, ...]:

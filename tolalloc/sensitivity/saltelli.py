@@ -1,21 +1,26 @@
-"""First-order, total and second-order indices of many outputs from one pass over a Saltelli design.
+"""First-order, total and second-order indices of many outputs by SALib, and bootstrap resamples of their blocks.
+
+SALib draws the points and estimates the indices. What it has not is done here: blocks in chunks, because it holds a
+design whole and exchanges columns number by number; failed samples, because one NaN makes all its indices 0 or NaN; and
+resamples, because it draws them anew for every output and keeps a multiple of their standard deviation, while the order
+of sources over several outputs, percentiles and waves need the same blocks, and the variance, of all outputs.
 
 A resample of the blocks is a row of counts, so the sums of all resamples are one matrix product of the counts with
 what every block adds to each sum. The indices follow from the sums: mean and variance enter them non-linearly, which is
-why the product carries moments and not indices. The estimate itself is the resample that holds every block once. The
-design comes in chunks of whole blocks, bit for bit the samples of SALib.
+why the product carries moments and not indices.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import warnings
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.stats import qmc
 
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
@@ -37,13 +42,22 @@ class SaltelliDesign:
     References
     ----------
     Saltelli 2002 and Saltelli et al. 2010; Sobol' points scrambled by a random matrix and a digital shift (Matoušek
-    1998), as `scipy.stats.qmc.Sobol` draws them for `SALib.sample.sobol`.
+    1998), drawn by `SALib.sample.sobol`.
+
+    Examples
+    --------
+    A block of two inputs is A, AB₁, AB₂ and B.
+
+    >>> block = next(SaltelliDesign(factor_groups=("a", "b"), seed=1).chunks(0, 1))
+    >>> block.shape, bool((block[1] == [block[3, 0], block[0, 1]]).all())
+    ((4, 2), True)
     """
 
     # Name of the factor group of each column; the columns of a factor group are exchanged together
     factor_groups: tuple[str, ...]
     seed: int  # Seed of the scrambling, positive: 0 would be no seed at all for other libraries [-]
     second_order: bool = False  # Whether the design has the BA samples
+    columns: tuple[str, ...] = ()  # Name of each column, x1, x2 … unless given
 
     def __post_init__(self) -> None:
         if self.seed < 1:
@@ -69,14 +83,30 @@ class SaltelliDesign:
 
         If players are named, of every block only the samples AB of these, in this order.
         """
-        sequence = qmc.Sobol(d=2 * len(self.factor_groups), scramble=True, seed=self.seed)
-        if start:
-            sequence.fast_forward(start)
         # A power of two, as the first draw from the sequence ought to be.
         at_once = 1 << max(0, (SAMPLES_AT_ONCE // (len(only) or self.samples_per_block)).bit_length() - 1)
         for first in range(start, stop, at_once):
-            base = sequence.random(min(at_once, stop - first))
-            yield self._exchanged(base, only) if only else self._samples(base)
+            a, b = self._points(first, min(at_once, stop - first))
+            yield self._exchanged(a, b, only) if only else self._samples(a, b)
+
+    @property
+    def problem(self) -> dict[str, Any]:
+        """SALib's specification of the problem: uniform numbers in [0, 1], in groups that are exchanged together."""
+        return _problem(self.columns or _numbered(len(self.factor_groups)), self.factor_groups)
+
+    def _points(self, start: int, count: int) -> Float[np.ndarray, "2 block 1 column"]:
+        """Return A and B of some blocks, as SALib draws them.
+
+        Two groups, of which SALib exchanges neither many times, give four samples of a block whatever the sources.
+        """
+        from SALib.sample import sobol
+
+        names = _numbered(len(self.factor_groups))
+        problem = _problem(names, ("first", *["others"] * (len(names) - 1)))
+        with warnings.catch_warnings():  # blocks are added by powers of two in the end, not with every call
+            warnings.simplefilter("ignore", UserWarning)
+            drawn = sobol.sample(problem, count, calc_second_order=False, skip_values=start, seed=self.seed)
+        return np.asarray(np.moveaxis(drawn.reshape(count, -1, len(names))[:, [0, -1]], 1, 0)[:, :, np.newaxis])
 
     @cached_property
     def _own(self) -> Bool[np.ndarray, "group column"]:
@@ -84,19 +114,29 @@ class SaltelliDesign:
         return np.asarray(np.array(self.factor_groups) == np.array(self.names)[:, np.newaxis])
 
     def _exchanged(
-        self, base: Float[np.ndarray, "block base_column"], only: tuple[str, ...]
+        self, a: Float[np.ndarray, "block 1 column"], b: Float[np.ndarray, "block 1 column"], only: tuple[str, ...]
     ) -> Float[np.ndarray, "sample column"]:
         """Return the samples AB of some players."""
-        a, b = np.split(base[:, np.newaxis], 2, axis=2)
         own = self._own[[self.names.index(name) for name in only]]
         return np.where(own, b, a).reshape(-1, len(self.factor_groups))
 
-    def _samples(self, base: Float[np.ndarray, "block base_column"]) -> Float[np.ndarray, "sample column"]:
-        """Return the samples of the blocks whose A and B stand side by side."""
-        a, b = np.split(base[:, np.newaxis], 2, axis=2)
+    def _samples(
+        self, a: Float[np.ndarray, "block 1 column"], b: Float[np.ndarray, "block 1 column"]
+    ) -> Float[np.ndarray, "sample column"]:
+        """Return the samples of blocks, in SALib's order."""
         exchanged = [(a, b), (b, a)][: 1 + self.second_order]
         between = [np.where(self._own, inner, outer) for outer, inner in exchanged]
         return np.concatenate([a, *between, b], axis=1).reshape(-1, len(self.factor_groups))
+
+
+def _problem(names: Sequence[str], groups: Sequence[str]) -> dict[str, Any]:
+    """Return SALib's specification of uniform numbers in [0, 1]."""
+    bounds = [[0.0, 1.0] for _ in names]
+    return {"num_vars": len(names), "names": list(names), "groups": list(groups), "bounds": bounds}
+
+
+def _numbered(count: int) -> tuple[str, ...]:
+    return tuple(f"x{at + 1}" for at in range(count))
 
 
 _LEAST_RANGE = 8 * np.finfo(float).eps
@@ -195,7 +235,7 @@ def saltelli_indices(
     counts = resample_counts(blocks, resamples, seeds)
     with one_blas_thread():
         found = [
-            one_pass(np.ascontiguousarray(values[:, :, at : at + 1][whole].transpose(2, 1, 0)), counts, sources)
+            _of_output(values[:, :, at][whole], counts, sources, second_order=second_order)
             for at in range(values.shape[2])  # one copy in memory at a time
         ]
     varies, variance, first, total, second = (np.concatenate(parts) for parts in zip(*found, strict=True))
@@ -214,6 +254,70 @@ def saltelli_indices(
     )
 
 
+_Rows = tuple[
+    Bool[np.ndarray, " output"],
+    Float[np.ndarray, "output row"],
+    Float[np.ndarray, "output row source"],
+    Float[np.ndarray, "output row source"],
+    Float[np.ndarray, "output row pair"],
+]
+"""Which outputs vary, and their variance, first-order, total and second-order indices; the first row is no resample."""
+
+
+def _of_output(
+    answers: Float[np.ndarray, "block sample"],
+    counts: Float[np.ndarray, "row block"],
+    sources: int,
+    *,
+    second_order: bool,
+) -> _Rows:
+    """Return the indices of one output: SALib's estimates in the first row, then those of the resamples."""
+    found = one_pass(np.ascontiguousarray(answers.T[np.newaxis]), counts, sources)
+    varies, _, *indices = found
+    if varies[0]:
+        for own, estimate in zip(indices, salib_estimates(answers.ravel(), sources, second_order), strict=True):
+            own[0, 0] = estimate
+    return found
+
+
+def salib_estimates(
+    answers: Float[np.ndarray, " sample"], sources: int, second_order: bool = False
+) -> tuple[Float[np.ndarray, " source"], Float[np.ndarray, " source"], Float[np.ndarray, " pair"]]:
+    """Return the first-order, total and second-order indices that SALib estimates from good answers [-].
+
+    Parameters
+    ----------
+    answers
+        Answers of A, AB₁ … AB_D, if asked for BA₁ … BA_D, and B, block by block [output].
+    sources
+        Groups of columns that were exchanged, D [-].
+    second_order
+        Whether the design has the BA samples.
+
+    References
+    ----------
+    Iwanaga, Usher & Herman 2022 (Toward SALib 2.0): first order mean B·(AB_j − A)/V (Saltelli et al. 2010), total
+    mean (A − AB_j)²/2V (Jansen 1999), second order mean (BA_j·AB_k − A·B)/V − S_j − S_k (Saltelli 2002).
+
+    Examples
+    --------
+    y = x₁ + 2·x₂ of uniform numbers has the total indices 1/5 and 4/5.
+
+    >>> x = next(SaltelliDesign(factor_groups=("a", "b"), seed=1).chunks(0, 1024))
+    >>> _, total, _ = salib_estimates(x @ [1.0, 2.0], 2)
+    >>> total.round(3).tolist()
+    [0.2, 0.8]
+    """
+    from SALib.analyze import sobol
+
+    problem = _problem(_numbered(sources), _numbered(sources))
+    with warnings.catch_warnings():  # of the two resamples that SALib wants, which are not read
+        warnings.simplefilter("ignore", UserWarning)
+        found = sobol.analyze(problem, answers, calc_second_order=second_order, num_resamples=2, seed=1)
+    pairs = combinations(range(sources), 2) if second_order else ()
+    return found["S1"], found["ST"], np.array([found["S2"][pair] for pair in pairs])
+
+
 def resample_counts(blocks: int, resamples: int, seeds: SeedTree) -> Float[np.ndarray, "row block"]:
     """Return how often each resample holds each block [-]; the first row is no resample and holds each once."""
     generator = seeds.generator()
@@ -225,13 +329,7 @@ def resample_counts(blocks: int, resamples: int, seeds: SeedTree) -> Float[np.nd
 
 def one_pass(
     answers: Float[np.ndarray, "output sample block"], counts: Float[np.ndarray, "row block"], sources: int
-) -> tuple[
-    Bool[np.ndarray, " output"],
-    Float[np.ndarray, "output row"],
-    Float[np.ndarray, "output row source"],
-    Float[np.ndarray, "output row source"],
-    Float[np.ndarray, "output row pair"],
-]:
+) -> _Rows:
     """Return which outputs vary, and variance [output²], first-order, total and second-order indices for every row [-].
 
     Answers are good ones in the order of the design's samples [output]; without BA samples there are no pairs.

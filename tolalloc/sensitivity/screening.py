@@ -1,15 +1,20 @@
-"""Measures of importance beside Sobol's: elementary effects on SALib's design, PAWN and delta from a given sample.
+"""Measures of importance beside Sobol's, by SALib: elementary effects, PAWN, and delta from a given sample.
 
 SALib's traps and the guards against them: one NaN makes every figure NaN, so only good samples are passed; its own
 seeding and delta's resampling set numpy's global state, so resamples are drawn here; ``conf`` is a multiple of a
-standard deviation, so intervals here are percentiles; PAWN and delta ask for one distribution at a time, so
-`tolalloc.sensitivity.screening` computes them.
+standard deviation, so intervals here are percentiles.
+
+Delta, and PAWN of the dummies, are computed here in SALib's definitions, units of all classes beside each other and
+equal but for rounding: SALib asks a library for every density anew, a second for every column of 4,096 units and every
+resample, and for a p-value of every class that is not read.
 """
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -204,20 +209,16 @@ def elementary_effects(experiment: Experiment[Response], trajectories: int) -> E
             f"is {experiment.largest_failed_share:.4g} of them, and two must be left."
         )
     members = np.array(groups)[:, np.newaxis] == names
-    effects = _effects(
-        uniform.reshape(trajectories, len(names) + 1, -1)[whole],
-        evaluation.values.reshape(trajectories, len(names) + 1, -1)[whole],
-        members,
-        _LEVELS / (2.0 * (_LEVELS - 1)),
-    )
-    counts = resample_counts(used, _RESAMPLES, seeds.child("resamples"))
-    magnitudes = counts @ np.abs(effects) / used
+    x, y = (own.reshape(trajectories, len(names) + 1, -1)[whole] for own in (uniform, evaluation.values))
+    effects = _effects(x, y, members, _LEVELS / (2.0 * (_LEVELS - 1)))
+    counts = resample_counts(used, _RESAMPLES, seeds.child("resamples"))[1:]
+    mu_star, sigma = _morris(problem, x.reshape(-1, x.shape[2]), y.reshape(-1, y.shape[2]))
     return ElementaryEffects(
         sources=names,
         effects=effects,
-        mu_star=magnitudes[:, 0],
-        mu_star_resamples=magnitudes[:, 1:],
-        sigma=np.where(members.sum(axis=0) == 1, effects.std(axis=1, ddof=1), np.nan),
+        mu_star=mu_star,
+        mu_star_resamples=counts @ np.abs(effects) / used,
+        sigma=sigma,
         trajectories=used,
         dropped=trajectories - used,
     )
@@ -270,22 +271,45 @@ def moment_independent(
     if not np.ptp(y) > 0.0:
         raise SolveError("Moment-independent indices: the output is the same for all units; no source can be ranked.")
     widest, shuffle = max(known, key=lambda own: own.shape[1]), seeds.child("dummies").generator()
+    pawns = _pawn(known, y)
     known += [shuffle.permutation(widest) for _ in range(dummies)]
-    pawns = np.array([max(pawn_index(column, y) for column in columns.T) for columns in known])
     output, generator = OutputDensity.of(y), seeds.child("resamples").generator()
     strongest = [columns[:, np.argmax([delta_index(column, output) for column in columns.T])] for columns in known]
     deltas = _reduced_deltas(np.column_stack(strongest), y, generator.integers(y.size, size=(resamples, y.size)))
     count = len(known) - dummies
     return MomentIndependent(
         sources=tuple(dict.fromkeys(errors.source_of_column)),
-        pawn=pawns[:count],
+        pawn=np.array(pawns),
         delta=deltas[:, :count].mean(axis=0),
         delta_resamples=deltas[:, :count],
-        pawn_dummy=float(pawns[count:].max()),
+        pawn_dummy=max(pawn_index(column, y) for columns in known[count:] for column in columns.T),
         delta_dummy=float(deltas[:, count:].mean(axis=0).max()),
         units=y.size,
         failed=sample.failed,
     )
+
+
+def _morris(
+    problem: dict[str, Any], x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, "sample output"]
+) -> tuple[Float[np.ndarray, "output source"], Float[np.ndarray, "output source"]]:
+    """Return mean magnitude and standard deviation of the effects by SALib, NaN for several columns [output]."""
+    from SALib.analyze import morris
+
+    found = [morris.analyze(problem, x, own, num_levels=_LEVELS, num_resamples=2, seed=1) for own in y.T.copy()]
+    mu_star, sigma = (np.array([np.asarray(own[name], float) for own in found]) for name in ("mu_star", "sigma"))
+    return mu_star, sigma
+
+
+def _pawn(known: list[Float[np.ndarray, "unit measure"]], y: Float[np.ndarray, " unit"]) -> list[float]:
+    """Return the largest index of the measures of every source by SALib [-]."""
+    from SALib.analyze import pawn
+
+    columns = np.column_stack(known)
+    problem = {"num_vars": columns.shape[1], "names": [f"x{at}" for at in range(columns.shape[1])]}
+    with warnings.catch_warnings():  # of the p-values of classes, which are not read
+        warnings.simplefilter("ignore", RuntimeWarning)
+        found = iter(pawn.analyze(problem, columns, y, S=CLASSES)["median"].tolist())
+    return [max(next(found) for _ in own.T) for own in known]
 
 
 def _effects(

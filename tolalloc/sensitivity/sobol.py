@@ -1,9 +1,8 @@
 """Sobol indices of all outputs from one Saltelli design that grows until the ranking is stable.
 
-SALib's traps and the guards against them: seed 0 means unseeded, so seeds are positive; one NaN makes every index zero
-and ``conf`` is a multiple of a standard deviation, so `tolalloc.sensitivity.saltelli` estimates, drops blocks with a
-failed sample whole, counts them, and keeps the resamples, from which intervals are percentiles; the design is held
-whole, so `tolalloc.sensitivity.saltelli` gives the same samples in chunks.
+SALib draws and estimates (`tolalloc.sensitivity.saltelli`). Its traps and the guards against them: seed 0 is no seed,
+so seeds are positive; one NaN makes every index zero, so blocks with a failed sample are dropped whole and counted;
+``conf`` is a multiple of a standard deviation, so intervals are percentiles of kept resamples.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -68,6 +68,33 @@ class SolvedDesign:
 
     design: SaltelliDesign  # Which samples they are
     answers: Evaluation  # The first output, block by block
+
+    def to_salib(self) -> SalibArrays:
+        """Return the design and its answers as SALib takes them; blocks with a failed sample are left out whole."""
+        size = self.design.samples_per_block
+        whole = np.repeat(self.answers.good.reshape(-1, size).all(axis=1), size)
+        samples = np.concatenate(list(self.design.chunks(0, whole.size // size)))
+        return SalibArrays(
+            problem=self.design.problem,
+            samples=samples[whole],
+            outputs=self.answers.values[whole, 0],
+            second_order=self.design.second_order,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SalibArrays:
+    """A problem as SALib specifies it, its samples and their answers, for SALib's own analysis and plots."""
+
+    problem: dict[str, Any]  # Columns as uniform numbers in [0, 1], sources as their groups
+    samples: Float[np.ndarray, "sample column"]  # These numbers, as `SALib.sample.sobol` draws them [-]
+    outputs: Float[np.ndarray, " sample"]  # The leading output [output]
+    second_order: bool  # Whether the design has the BA samples
+
+    @property
+    def for_sobol(self) -> dict[str, Any]:
+        """What `SALib.analyze.sobol.analyze` takes, as in ``analyze(**ranking.result.to_salib().for_sobol)``."""
+        return {"problem": self.problem, "Y": self.outputs, "calc_second_order": self.second_order}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -308,7 +335,10 @@ def sobol_indices(
     errors, outputs = experiment.errors, experiment.response.outputs
     counted, sample = ranked or outputs, experiment.seeds.child("sample").integer()
     design = SaltelliDesign(
-        factor_groups=factor_groups or errors.block_of_column, seed=sample, second_order=effort.second_order
+        factor_groups=factor_groups or errors.block_of_column,
+        seed=sample,
+        second_order=effort.second_order,
+        columns=errors.columns,
     )
     blocks = _Blocks(experiment, design, effort, counted, further or experiment.response)
     convergence = until_converged(

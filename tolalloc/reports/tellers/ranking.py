@@ -66,7 +66,7 @@ class RankingTeller(Teller[RankingResult]):
         found = self.result
         return (
             *_drivers(found.dimensions or found.indices),
-            _converged(found.sobol.convergence),
+            converged(found.sobol.convergence),
             *self._replicated(),
             *self._orders(),
             *self._uncertain(),
@@ -567,7 +567,7 @@ def _drivers(sobol: SobolIndices) -> Iterator[str]:
         )
 
 
-def _converged(found: Convergence) -> str:
+def converged(found: Convergence) -> str:
     """Return whether the order of the first places is stable."""
     last = found.history[-1]
     return _say(
