@@ -14,8 +14,8 @@ from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.unit_file import load_unit
 from tolalloc.reducers.scene import Scene, scene_of
 from tolalloc.reports.document import Document, Section
-from tolalloc.reports.picture.blocks import scene_record
-from tolalloc.reports.picture.moving import MovingPicture
+from tolalloc.reports.moving_picture import MovingPicture
+from tolalloc.reports.scene_record import scene_record
 
 PICTURES = 30
 

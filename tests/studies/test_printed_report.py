@@ -18,8 +18,7 @@ from tolalloc.reports import pdf
 from tolalloc.reports.document import Document, Section, joined
 from tolalloc.reports.feature_frame import FeatureFrame
 from tolalloc.reports.figure import Figure, HeatMap, Series
-from tolalloc.reports.html_table import html_table
-from tolalloc.reports.writer import write_document
+from tolalloc.reports.writer import html_table, write_document
 
 TITLE = "A title that is far longer than its picture is wide, as it has to say what an empty cell of it means"
 LIMITS = {ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)}

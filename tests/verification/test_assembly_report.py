@@ -23,7 +23,7 @@ from tolalloc.assembly.trajectory import random_numbers
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.outputs import ContactPattern
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reports.charts import chart
+from tolalloc.reports.figure import chart
 
 CHAIN = """
 name = "pump"

@@ -20,12 +20,11 @@ from tolalloc.reading.units import MILLIMETRE
 from tolalloc.reducers.equivalent.springs import Positions
 from tolalloc.reducers.scene import Scene, scene_of
 from tolalloc.reports.document import Document, Section
+from tolalloc.reports.moving_picture import MovingPicture
 from tolalloc.reports.page import as_json, asset
-from tolalloc.reports.picture.blocks import block, coarse_block, scene_record, values_of
-from tolalloc.reports.picture.moving import MovingPicture
-from tolalloc.reports.picture.pose import Pose
 from tolalloc.reports.plots import drawn, save_png
 from tolalloc.reports.portrait import portrait_of
+from tolalloc.reports.scene_record import Pose, block, coarse_block, scene_record, values_of
 from tolalloc.reports.writer import write_document
 
 SOURCES = tuple(source.name for source in load_tolerance_table("rv20e_all_sources"))

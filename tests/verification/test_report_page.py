@@ -6,9 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tolalloc.reports.charts import chart
 from tolalloc.reports.document import Document, Section
-from tolalloc.reports.figure import Figure, HeatMap, Series
+from tolalloc.reports.figure import Figure, HeatMap, Series, chart
 from tolalloc.reports.plots import drawn
 from tolalloc.reports.writer import write_document
 

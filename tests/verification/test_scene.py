@@ -24,8 +24,7 @@ from tolalloc.reducers.equivalent.outputs import forces
 from tolalloc.reducers.equivalent.springs import Positions
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.scene import Scene, is_placed, place_of, places_of, scene_of
-from tolalloc.reports.picture.blocks import scene_record, values_of
-from tolalloc.reports.picture.pose import Pose
+from tolalloc.reports.scene_record import Pose, scene_record, values_of
 
 CASES = range(12)
 

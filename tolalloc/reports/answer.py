@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from tolalloc.exceptions import UnknownNameError
-from tolalloc.reports.currency import in_currency
 from tolalloc.reports.document import Document, Section, tables_of
 from tolalloc.reports.header import Header
 
@@ -87,7 +86,7 @@ class Answer(ABC):
     @cached_property
     def document(self) -> Document:
         """The report on this answer alone."""
-        made = Document(
+        return Document(
             title=self.title,
             subtitle=self.subtitle,
             answer=self.sentences,
@@ -98,22 +97,21 @@ class Answer(ABC):
             seed=self.header.seed,
             manifest={"statuses": dict(self.header.statuses), "stages": dict(self.header.stages)},
         )
-        return in_currency(made, self.header.currency)
 
     @property
     def told(self) -> tuple[str, ...]:
         """The answer in a few sentences, costs in the user's currency."""
-        return in_currency(self.sentences, self.header.currency)
+        return self.sentences
 
     @property
     def warned(self) -> tuple[str, ...]:
         """What a reader must know before acting on it, costs in the user's currency."""
-        return in_currency(self.warnings, self.header.currency)
+        return self.warnings
 
     @property
     def tables(self) -> dict[str, pd.DataFrame]:
         """All tables by name, units in the headers, costs in the user's currency."""
-        return tables_of(in_currency(self.sections, self.header.currency))
+        return tables_of(self.sections)
 
     @property
     def figures(self) -> dict[str, Figure | HeatMap]:
@@ -173,8 +171,7 @@ class Answer(ABC):
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows: the first two sentences, the first table, one figure."""
-        from tolalloc.reports.html_table import html_table
-        from tolalloc.reports.writer import inline_png
+        from tolalloc.reports.writer import html_table, inline_png
 
         shown = [f"<p><b>{self.title}</b></p>", *(f"<p>{sentence}</p>" for sentence in self.told[:2])]
         shown += [str(html_table(frame.head(12))) for frame in list(self.tables.values())[:1]]

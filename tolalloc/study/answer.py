@@ -172,8 +172,7 @@ class Answer(Generic[Result]):
 
     def _repr_html_(self) -> str:
         """Return what a notebook shows: the first two sentences, the first table, one figure."""
-        from tolalloc.reports.html_table import html_table
-        from tolalloc.reports.writer import inline_png
+        from tolalloc.reports.writer import html_table, inline_png
 
         shown = [f"<p><b>{self.title}</b></p>", *(f"<p>{sentence}</p>" for sentence in self.sentences[:2])]
         shown += [str(html_table(frame.head(12))) for frame in list(self.tables.values())[:1]]

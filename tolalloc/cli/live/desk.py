@@ -97,7 +97,7 @@ class Job:
 
 def _found(answer: Any, settings: tuple[str, ...]) -> dict[str, Any]:
     """Return what the page takes over of an answer: shares of the sources, or the zones of the cheapest drawing."""
-    from tolalloc.reports.charts import chart
+    from tolalloc.reports.figure import chart
 
     first = next(iter(answer.figures.values()), None)
     drawn = {"figure": chart(first)} if first else {}

@@ -26,8 +26,7 @@ from tolalloc.models.model import Model
 from tolalloc.models.settings import Setting, require_settings
 from tolalloc.reading.named_fields import is_number
 from tolalloc.reading.units import COST_UNITS, MICROMETRE, unit_of
-from tolalloc.reports.charts import chart, numbers, shares
-from tolalloc.reports.figure import BINS, Figure, Series
+from tolalloc.reports.figure import BINS, Figure, Series, chart, numbers, shares
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.wording import short
 from tolalloc.study.prepared import Prepared

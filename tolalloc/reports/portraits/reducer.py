@@ -27,8 +27,8 @@ from tolalloc.reducers.scene import PER_CRANK_TURN, Scene, is_placed, scene_of
 from tolalloc.reducers.settings import FLANK, RADIAL
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
-from tolalloc.reports.picture.blocks import scene_record
 from tolalloc.reports.portrait import Examination, Portrait, sections_of
+from tolalloc.reports.scene_record import scene_record
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -357,7 +357,7 @@ def _moving(
     model: ReducerModel, errors: ErrorModel, x: Float[np.ndarray, " column"], shares: Mapping[str, float], unit: str
 ) -> tuple[Section, ...]:
     """Return the section with the moving picture of one unit [m, angles rad], coloured by its sources' shares [-]."""
-    from tolalloc.reports.picture.moving import MovingPicture, strongest
+    from tolalloc.reports.moving_picture import MovingPicture, strongest
 
     named = tuple(source.name for source in errors.sources)
     elsewhere = ", ".join(name for name in named if not is_placed(name))

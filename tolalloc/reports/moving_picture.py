@@ -1,12 +1,14 @@
-"""The picture of a reducer drawn by matplotlib, from the scene that the module of the page draws too."""
+"""The moving picture of a reducer in a report: a module of the page, and the same drawn still or as an animation."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Complex, Float, UInt8
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PatchCollection, PolyCollection
 from matplotlib.colors import to_rgb
@@ -14,8 +16,9 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.patches import Circle, Polygon
 from matplotlib.transforms import Affine2D
 
-from tolalloc.reports.picture.blocks import values_of
-from tolalloc.reports.picture.pose import Pose, gear
+from tolalloc.reports.figure import Figure, Series, chart
+from tolalloc.reports.plots import drawn, save_png
+from tolalloc.reports.scene_record import Pose, gear, values_of
 
 _INK, _LINE, _ACCENT, _FORCE = "#1c2733", "#5b6876", "#d9822b", "#b00020"
 _GROOVE, _HOUSING, _STEEL, _DISC, _GEAR, _PAPER = "#c8cbce", "#dadcde", "#b2b6ba", "#bed2e2", "#bbd9c7", "#ffffff"
@@ -206,3 +209,134 @@ def draw_still(
     stated = f"errors and gaps {record['magnification']:g} times larger, longest arrow {largest:,.0f} N"
     canvas.suptitle(f"{title}: {stated}" if title else stated, fontsize=10, color=_INK)
     return canvas
+
+
+_FRAMES_PER_SECOND = 12
+_EDGES = (("#1c2733", 3), ("#5b6876", 3), ("#b00020", 2))
+"""Colours of lines, and into how many steps each goes over into a face."""
+_FACES = ("#ffffff", "#dadcde", "#b2b6ba", "#bed2e2", "#bbd9c7", "#c8cbce", "#d5d7d9")
+
+
+def animate(record: Mapping[str, Any], shares: Mapping[str, float], path: Path, frames: int, title: str) -> None:
+    """Write an animated PNG of one turn of the cranks as the output sees it, after which the nominal picture closes.
+
+    Seen from the carrier a turn of the cranks moves the ring of pins by one pin and the sun by whole teeth; for an eye
+    in the housing nothing less than a whole output turn brings everything back. A frame holds what has changed since
+    the one before, the rest of it is transparent.
+    """
+    from PIL import Image
+
+    angles = 2 * np.pi / record["outline"]["pin_count"] * np.arange(frames) / frames
+    largest = max(float(Pose(record, angle).state("force")[0].max()) for angle in angles)
+    pictures = [
+        _pixels(
+            draw_still(
+                record,
+                shares,
+                angle,
+                title=f"{title}, seen from its output",
+                turned=-angle,
+                discs=(0,),
+                largest=largest or None,
+            )
+        )
+        for angle in angles.tolist()
+    ]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(_palette())
+    images = [Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+    colours = [np.asarray(image) + 1 for image in images]
+    written = []
+    for at, colour in enumerate(colours):
+        changed = colour if at == 0 else np.where(colour == colours[at - 1], 0, colour)
+        image = Image.fromarray(changed.astype(np.uint8), "P")
+        image.putpalette([0, 0, 0, *_palette()])
+        written.append(image)
+    written[0].save(
+        path,
+        format="PNG",
+        save_all=True,
+        append_images=written[1:],
+        duration=1000 / _FRAMES_PER_SECOND,
+        loop=0,
+        transparency=0,
+        blend=1,
+        disposal=0,
+        optimize=True,
+    )
+
+
+def _pixels(drawing: Canvas) -> UInt8[np.ndarray, "row column 3"]:
+    """Return a drawing as red, green and blue."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    canvas = FigureCanvasAgg(drawing)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+
+def _palette() -> list[int]:
+    """Return the colours of the picture: its faces, and lines as they go over into them [0 to 255]."""
+    colours = [mixed(face, face, 0.0) for face in _FACES]
+    for edge, steps in _EDGES:
+        colours += [mixed(face, edge, step / steps) for face in _FACES for step in range(1, steps)]
+        colours.append(mixed(edge, edge, 0.0))
+    return [round(255 * channel) for colour in colours for channel in colour]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MovingPicture(Figure):
+    """A reducer that moves in the page.
+
+    Parameters
+    ----------
+    record
+        The scene as `tolalloc.reports.scene_record.scene_record` says it.
+    shares
+        Place → how strongly it is coloured, from 0 to 1 [-].
+    pictures
+        Pictures of its PNG, one for a still one; more make one turn of the cranks as the output sees it, after which
+        it closes [-].
+    """
+
+    x_label: str = ""
+    series: tuple[Series, ...] = ()
+    record: Mapping[str, Any]
+    shares: Mapping[str, float] = field(default_factory=dict)
+    pictures: int = 1
+
+
+@chart.register
+def _(figure: MovingPicture) -> dict[str, Any]:
+    return {"title": figure.title, "scene": figure.record, "shares": figure.shares}
+
+
+@drawn.register
+def _(figure: MovingPicture) -> Canvas:
+    return draw_still(figure.record, figure.shares, title=figure.title)
+
+
+@save_png.register
+def _(figure: MovingPicture, path: Path) -> None:
+    if figure.pictures > 1:
+        animate(figure.record, figure.shares, path, figure.pictures, figure.title)
+    else:
+        drawn(figure).savefig(path, dpi=130)
+
+
+def strongest(shares: Mapping[str, float], place_by_source: Mapping[str, str]) -> dict[str, float]:
+    """Return how strongly to colour each place: the sum of its sources' shares over the largest such sum [-].
+
+    Examples
+    --------
+    >>> strongest({"disc1.pitch": 0.3, "disc1.runout": 0.1, "pin.diameter": 0.2}, {"disc1.pitch": "disc1.teeth",
+    ...     "disc1.runout": "disc1.teeth", "pin.diameter": "pins"})
+    {'disc1.teeth': 1.0, 'pins': 0.5}
+    """
+    sums: dict[str, float] = {}
+    for source, share in shares.items():
+        if source in place_by_source:
+            place = place_by_source[source]
+            sums[place] = sums.get(place, 0.0) + max(share, 0.0)
+    most = max(sums.values(), default=0.0) or 1.0
+    return {place: own / most for place, own in sums.items()}
