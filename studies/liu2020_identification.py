@@ -14,8 +14,7 @@ from published.recovery import Recovery, recovery
 from published.simulated_bench import Bench, random_units, simulated_bench
 
 import tolalloc as ta
-from tolalloc.bench.identification import IdentificationRequest, identify
-from tolalloc.bench.identification_answer import IdentificationAnswer
+from tolalloc.bench.identification import IdentificationRequest, IdentificationResult, identify
 from tolalloc.bench.information import information
 from tolalloc.bench.least_squares import IdentificationProblem
 from tolalloc.bench.measurements import Measurements
@@ -31,7 +30,10 @@ from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.unit_file import BuiltUnit
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.figure import Figure, Series
+from tolalloc.reports.header import Header
+from tolalloc.reports.tellers.identification import estimate_sentence
 from tolalloc.running.progress import Progress
+from tolalloc.study.answer import Answer
 
 TRUTH = {"crank_disc_bearing": 1.15e10, "crank_carrier_bearing": 1.5e10, "carrier_bearing": 7.6e10}
 """Stiffness of the simulated units, inside the bounds of Table 5 and away from the start [N/m]."""
@@ -59,7 +61,7 @@ CURVES_AND_LOOPS = Bench(
 """Curves in both directions at a small torque, loops up to the rated one; noises are assumed."""
 
 
-def settings_section(answer: IdentificationAnswer, methods: tuple[MethodRuns, ...], seeds: int) -> Section:
+def settings_section(answer: IdentificationResult, methods: tuple[MethodRuns, ...], seeds: int) -> Section:
     """Return how the improved swarm depends on what liu2020 does not print."""
     problem = on_polynomials(answer)
     least = min(float(item.objectives.min()) for item in methods)
@@ -180,9 +182,9 @@ def build(quick: bool) -> Document:
     with shown_progress() as progress:
         first, methods = _peak_to_peaks(given, true, errors, seeds, quick, progress)
         second, again = _curves_and_loops(given, true, errors, seeds, quick, progress)
-    document, curves = first.document, second.document
+    document, curves = told(first).document, told(second).document
     compared = methods_section(methods, first.data.measured.size)
-    printed, repeated = printed_section(), recovery_section(again, second.logarithms)
+    printed, repeated = printed_section(), recovery_section(again, tuple(item.symbol for item in second.parameters))
     truth = ", ".join(f"{SYMBOLS[name]} = {value:.4g}" for name, value in TRUTH.items())
     return replace(
         document,
@@ -190,8 +192,8 @@ def build(quick: bool) -> Document:
         subtitle=f"Printed pairs; units simulated with {truth} N/m and noise; seeds from 1.",
         answer=(
             *printed.paragraphs,
-            *(f"Peak-to-peaks of 50 units at 1 N·m: {item.sentence}" for item in first.estimates),
-            *(f"Curves and loops of 5 units: {item.sentence}" for item in second.estimates),
+            *(f"Peak-to-peaks of 50 units at 1 N·m: {estimate_sentence(item)}" for item in first.estimates),
+            *(f"Curves and loops of 5 units: {estimate_sentence(item)}" for item in second.estimates),
             *repeated.paragraphs,
         ),
         warnings=tuple(f"Peak-to-peaks: {sentence}" for sentence in document.warnings),
@@ -221,13 +223,19 @@ def build(quick: bool) -> Document:
     )
 
 
+def told(result: IdentificationResult) -> Answer[IdentificationResult]:
+    """Return an identification as it is told of."""
+    header = Header(name=result.measurements.name, model=result.reducer.name, seed=1)
+    return Answer(kind="identification", header=header, result=result)
+
+
 def _seeds(quick: bool) -> int:
     return 3 if quick else 30
 
 
 def _peak_to_peaks(
     given: Reducer, true: Reducer, errors: ErrorModel, seeds: SeedTree, quick: bool, progress: Progress
-) -> tuple[IdentificationAnswer, tuple[MethodRuns, ...]]:
+) -> tuple[IdentificationResult, tuple[MethodRuns, ...]]:
     """Identify from peak-to-peaks of 50 units within the bounds of Table 5, all methods compared."""
     nothing = np.empty(0)
     bench = Bench(peak_to_peak_torque=-1.0, peak_to_peak_noise=ARCSECOND, curve_angles=nothing, loop_torques=nothing)
@@ -253,7 +261,7 @@ def _every_kind(true: Reducer, errors: ErrorModel, seeds: SeedTree) -> Measureme
 
 def _curves_and_loops(
     given: Reducer, true: Reducer, errors: ErrorModel, seeds: SeedTree, quick: bool, progress: Progress
-) -> tuple[IdentificationAnswer, Recovery]:
+) -> tuple[IdentificationResult, Recovery]:
     """Identify from curves in both directions and torque loops of five units, then again with fresh noise."""
     exact = simulated_bench(true, _five_units(errors, seeds), CURVES_AND_LOOPS)
     parameters = tuple(parameter(name, given) for name in LIU2020)

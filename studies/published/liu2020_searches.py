@@ -15,12 +15,11 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 
-from tolalloc.bench.identification import STARTS
-from tolalloc.bench.identification_answer import IdentificationAnswer
+from tolalloc.bench.identification import STARTS, IdentificationResult
 from tolalloc.bench.least_squares import NAME as GAUSS_NEWTON
 from tolalloc.bench.least_squares import Batch, IdentificationProblem, Identified, gauss_newton, starts
 from tolalloc.bench.parameters import BIAS
-from tolalloc.bench.prediction import KernelPredictor, StandIn
+from tolalloc.bench.prediction import KernelPredictor, Surrogate
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.reports.document import Section
@@ -63,7 +62,7 @@ def search(
     Parameters
     ----------
     problem
-        What is minimised; a stand-in should predict, as thousands of points are asked for.
+        What is minimised; a surrogate should predict, as thousands of points are asked for.
     algorithm
         One of `ALGORITHMS`.
     seed
@@ -91,7 +90,7 @@ class MethodRuns:
     Parameters
     ----------
     runs
-        One for each seed, on the stand-in.
+        One for each seed, on the surrogate.
     on_model
         Objective of the best run's answer on the model itself [-].
     """
@@ -133,18 +132,18 @@ class MethodRuns:
         }
 
 
-def on_polynomials(answer: IdentificationAnswer) -> IdentificationProblem:
+def on_polynomials(answer: IdentificationResult) -> IdentificationProblem:
     """Return the problem of an identification, predicted by its polynomials."""
     fitted = tuple(item for item in answer.parameters if item.name != BIAS)
     return IdentificationProblem(
         parameters=answer.parameters,
         data=answer.data,
-        predictor=StandIn(answer.parameters, fitted, answer.polynomial, answer.data),
+        predictor=Surrogate(answer.parameters, fitted, answer.polynomial, answer.data),
         weight=np.ones(len(answer.measurements.units)),
     )
 
 
-def compare(answer: IdentificationAnswer, seeds: int, progress: Progress) -> tuple[MethodRuns, ...]:
+def compare(answer: IdentificationResult, seeds: int, progress: Progress) -> tuple[MethodRuns, ...]:
     """Return every method's runs from many seeds on the same polynomials; the best of each is put to the model.
 
     Parameters

@@ -15,7 +15,6 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "tolalloc"
 REMAINING = (
     "tolalloc.assembly",
-    "tolalloc.bench",
     "tolalloc.reducers",
     "tolalloc.sensitivity",
 )

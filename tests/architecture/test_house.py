@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from tolalloc.bench.parameters import SYMBOLS
-from tolalloc.cli.identify import NAMES
 from tolalloc.drawings.fields import COLUMNS, HEADERS, ToleranceRow
 from tolalloc.reducers.equivalent.columns import source_name
+from tolalloc.study.inquiries.identify import NAMES
 
 ROOT = Path(__file__).parents[2]
 FILES = sorted((ROOT / "tolalloc").rglob("*.py"))

@@ -24,9 +24,9 @@ from tolalloc.bench.prediction import (
     KernelPredictor,
     Prediction,
     ReadingBlock,
-    StandIn,
+    Surrogate,
     data_of,
-    fit_stand_in,
+    fit_surrogate,
 )
 from tolalloc.bench.profile import as_stiffness, bootstrap, estimates, judged, profile, simplest
 from tolalloc.drawings.seeds import SeedTree
@@ -37,6 +37,7 @@ from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.springs import HARMONICS
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
+from tolalloc.reports.tellers.identification import estimate_sentence
 from tolalloc.sensitivity.surrogate.regression import fit_box_polynomial, total_degrees
 
 NONE = np.empty(0)
@@ -224,7 +225,8 @@ def written_of(problem: IdentificationProblem) -> tuple[np.ndarray, IdentifiedSt
     profiles = [profile(problem, found, place, own) for place in range(2)]
     both = gauss_newton(replace(problem, evenly=True), found[np.newaxis]).coordinates
     spread = information(problem, problem.predictor(both), both)
-    stiffness = as_stiffness(estimates(problem.parameters, own, spread, profiles), spread, "test", ())
+    found_of = estimates(problem.parameters, own, spread, profiles)
+    stiffness = as_stiffness(found_of, spread, "test", [estimate_sentence(item) for item in found_of])
     assert stiffness
     return found, stiffness
 
@@ -273,12 +275,12 @@ def test_directions_leave_a_bias_out_and_do_not_depend_on_its_unit():
     np.testing.assert_allclose(rows[0], rows[1], rtol=1e-9)
 
 
-def test_a_stand_in_is_moved_onto_the_model():
+def test_a_surrogate_is_moved_onto_the_model():
     problem = straight_problem(10)
-    stand_in = fitted_straight(problem)
+    surrogate = fitted_straight(problem)
     at = np.array([0.2, 0.3])
-    model = Prediction(values=stand_in.values(at[np.newaxis])[0] + 7.0, by_coordinate=np.zeros((10, 2)))
-    moved = stand_in.anchored(at, model)
+    model = Prediction(values=surrogate.values(at[np.newaxis])[0] + 7.0, by_coordinate=np.zeros((10, 2)))
+    moved = surrogate.anchored(at, model)
     np.testing.assert_allclose(moved(at).values, model.values)
     np.testing.assert_allclose(moved.values(at[np.newaxis])[0], model.values)
 
@@ -293,10 +295,10 @@ def test_bootstrap_spreads_as_least_squares_says():
     np.testing.assert_allclose(drawn.std(axis=0), own.standard_errors, rtol=0.4)
 
 
-def fitted_straight(problem: IdentificationProblem) -> StandIn:
+def fitted_straight(problem: IdentificationProblem) -> Surrogate:
     polynomial = fit_box_polynomial(problem.predictor.values, problem.lower, problem.upper, 2, SeedTree(1))
     assert polynomial.largest_error < 1e-9
-    return StandIn(problem.parameters, problem.parameters, polynomial, problem.data)
+    return Surrogate(problem.parameters, problem.parameters, polynomial, problem.data)
 
 
 def test_leaving_units_out_has_the_closed_form_of_the_hat_matrix():
@@ -325,12 +327,12 @@ def test_a_bias_alone_left_out_is_the_formula_of_the_baseline():
 
 def test_the_simplest_choice_is_taken_when_more_explains_no_more():
     problem = straight_problem(30)
-    stand_in = fitted_straight(problem)
-    choices = [judged(problem, stand_in, chosen) for chosen in ((), problem.parameters[:1], problem.parameters)]
+    surrogate = fitted_straight(problem)
+    choices = [judged(problem, surrogate, chosen) for chosen in ((), problem.parameters[:1], problem.parameters)]
     assert simplest(choices).parameters == problem.parameters  # both have an effect of several standard errors
     blind = replace(problem, predictor=Straight(problem.predictor.slopes * [1.0, 0.0]))
-    stand_in = fitted_straight(blind)
-    choices = [judged(blind, stand_in, chosen) for chosen in (blind.parameters[1:], blind.parameters)]
+    surrogate = fitted_straight(blind)
+    choices = [judged(blind, surrogate, chosen) for chosen in (blind.parameters[1:], blind.parameters)]
     assert simplest(choices).parameters == blind.parameters[1:]
 
 
@@ -400,11 +402,11 @@ def test_peak_to_peaks_at_one_newton_metre_leave_two_stiffnesses_open():
     data = data_of(measured, "test")
     parameters = tuple(parameter(name, RV20E, limits[name]) for name in LIU2020)
     kernel = KernelPredictor(RV20E, parameters, measured, data)
-    stand_in = fit_stand_in(kernel, SeedTree(6))
-    assert stand_in.polynomial.rms_error < 0.02 * ARCSECOND
-    problem = IdentificationProblem(parameters=parameters, data=data, predictor=stand_in, weight=np.ones(20))
+    surrogate = fit_surrogate(kernel, SeedTree(6))
+    assert surrogate.polynomial.rms_error < 0.02 * ARCSECOND
+    problem = IdentificationProblem(parameters=parameters, data=data, predictor=surrogate, weight=np.ones(20))
     found = gauss_newton(problem, starts(problem, 3, SeedTree(7)))
-    own = information(problem, stand_in(found.coordinates), found.coordinates)
+    own = information(problem, surrogate(found.coordinates), found.coordinates)
     for place in (1, 2):
         assert not profile(problem, found.coordinates, place, own).is_identified
 

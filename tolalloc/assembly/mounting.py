@@ -17,18 +17,16 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.optimize import linear_sum_assignment
 
-from tolalloc.assembly.mounting_answer import MountingAnswer, MountingResult, RandomMountings
 from tolalloc.assembly.stock import Mountings, PartStock, load_parts
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawings.seeds import SeedTree, require_seed
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Response
-from tolalloc.reducers.equivalent.model import OUTCOMES, EquivalentModel
+from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.design import at_torque
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.response.kernel import KernelResponse
-from tolalloc.reports.header import Header
-from tolalloc.running.progress import Progress, RunRecord
+from tolalloc.running.progress import RunRecord
 
 _Answer = TypeVar("_Answer")
 
@@ -40,6 +38,62 @@ Trial = tuple[Mountings, Peaks]
 Asking = Generator[Mountings, Peaks, _Answer]
 """A search that asks for the peak-to-peaks of units, so that those of all starts are computed at once."""
 MountingStep = Callable[[PartStock, Mountings, Peaks], Asking[Trial]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FoundMounting:
+    """The mounting that was found."""
+
+    stock: PartStock  # The parts
+    mountings: Mountings  # Part and turn at every place of every unit
+    # Peak-to-peak of every unit with its parts as they come, infinite where it failed, and as found [arcsec]
+    before: Float[np.ndarray, " unit"]
+    after: Float[np.ndarray, " unit"]
+    # Mean over the units after each step that improved it, from the start that led to the answer [arcsec]
+    history: tuple[float, ...]
+    # Units evaluated, and those of them without an answer [-]
+    evaluations: int
+    failures: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class RandomMountings:
+    """What the same parts do when nobody chooses."""
+
+    # Peak-to-peak of every unit of every mounting, infinite where it failed [arcsec]
+    peak_to_peaks: Float[np.ndarray, "mounting unit"]
+    failures: int  # Units without an answer [-]
+    every: bool  # Whether these are all mountings there are, each once
+
+    @property
+    def means(self) -> Float[np.ndarray, " mounting"]:
+        """Mean over the units of each mounting without failures [arcsec]."""
+        means = self.peak_to_peaks.mean(axis=1)
+        return np.asarray(means[np.isfinite(means)])
+
+    @property
+    def mean(self) -> float:
+        """Mean over the mountings [arcsec]."""
+        return float(self.means.mean())
+
+    @property
+    def best(self) -> float:
+        """Smallest mean over the units that was met [arcsec]."""
+        return float(self.means.min())
+
+    @property
+    def worst(self) -> float:
+        """Largest mean over the units that was met [arcsec]."""
+        return float(self.means.max())
+
+
+@dataclass(frozen=True, kw_only=True)
+class MountingResult:
+    """Mounted parts."""
+
+    torque: float  # Torque on the carrier [N·m]
+    found: FoundMounting  # The mounting
+    chance: RandomMountings  # What the same parts do when nobody chooses
 
 
 def units_from(stock: PartStock, parts: Sequence[int], turns: Sequence[Sequence[int]] | None = None) -> Mountings:
@@ -165,7 +219,7 @@ def best_mounting(
     seeds: SeedTree,
     starts: int = 4,
     largest_failed_share: float = LARGEST_FAILED_SHARE,
-) -> MountingResult:
+) -> FoundMounting:
     """Return the mounting with the least mean peak-to-peak that was found; of equals, the one with the least largest.
 
     Parameters
@@ -201,7 +255,7 @@ def best_mounting(
     memory.require_few_failures(largest_failed_share)
     if not np.isfinite(after).all():
         raise SolveError("Mounting: a unit has no equilibrium that can be trusted in any mounting met.")
-    return MountingResult(
+    return FoundMounting(
         stock=stock,
         mountings=mountings,
         before=before,
@@ -312,7 +366,7 @@ def prepare_mounting(
     )
 
 
-def mount(request: MountingRequest, progress: Progress) -> MountingAnswer:
+def mount(request: MountingRequest, record: RunRecord) -> MountingResult:
     """Return who goes where, how it is turned there, and what that is worth beside chance.
 
     Raises
@@ -320,23 +374,10 @@ def mount(request: MountingRequest, progress: Progress) -> MountingAnswer:
     SolveError
         Too many units have no answer.
     """
-    record, seeds = RunRecord(progress, OUTCOMES), SeedTree(request.seed).child("mounting")
+    seeds = SeedTree(request.seed).child("mounting")
     kernel, stock = replace(request.kernel, observe=record.observe), request.stock
     with record.stage("search"):
         found = best_mounting(stock, kernel, seeds.child("search"), request.starts)
     with record.stage("chance"):
         chance = random_mounting(stock, kernel, max(found.evaluations // stock.units, 1), seeds.child("chance"))
-    return MountingAnswer(
-        header=Header(
-            name=request.name,
-            model=stock.reducer.name,
-            seed=request.seed,
-            conditions={"torque on the carrier [N·m]": kernel.torque},
-            assumptions=stock.reducer.assumptions,
-            statuses=record.counts,
-            stages=record.stages,
-        ),
-        torque=kernel.torque,
-        found=found,
-        chance=chance,
-    )
+    return MountingResult(torque=kernel.torque, found=found, chance=chance)

@@ -10,7 +10,6 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from scipy.stats import chi2
 
-from tolalloc.bench.diagnosis_answer import DiagnosisAnswer
 from tolalloc.bench.measurements import MeasuredCurve
 from tolalloc.bench.posterior import CurveProblem, DiagnosisEffort, Noise, explain, posterior, thinned
 from tolalloc.bench.readings import ANGLE, TRANSMISSION_ERROR, clean_curve, load_readings
@@ -31,12 +30,10 @@ from tolalloc.drawings.sources import limited_measure
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import ARCSECOND, DEGREE
 from tolalloc.reducers.choice import bind
-from tolalloc.reducers.equivalent.model import OUTCOMES
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.response.kernel import KernelResponse
-from tolalloc.reports.header import Header
 from tolalloc.running.blas import one_blas_thread
-from tolalloc.running.progress import Progress, RunRecord
+from tolalloc.running.progress import RunRecord
 
 IMPLAUSIBLE = 0.001
 """Probability of residuals as large, were the model true, below which a curve is not explained [-]."""
@@ -236,8 +233,23 @@ class DiagnosisRequest:
         require_seed(PLACE, self.seed)
 
 
-def diagnose_unit(request: DiagnosisRequest, progress: Progress) -> DiagnosisAnswer:
-    """Return what the curve of a unit tells of its parts, and tell how far the work has come.
+@dataclass(frozen=True, kw_only=True)
+class DiagnosisResult:
+    """A diagnosed unit."""
+
+    # Its nominal design, and the torque on the carrier at which it was measured [N·m]
+    reducer: Reducer
+    torque: float
+    errors: ErrorModel  # What the drawings say of its parts
+    assumed: tuple[str, ...]  # What binding the drawings to the reducer assumes
+    curve: MeasuredCurve  # Its cleaned curve
+    noise: Noise  # What separates a reading from the model
+    level: float  # Probability that the named sources must have of containing the dominant one [-]
+    diagnosis: Diagnosis  # What was found
+
+
+def diagnose_unit(request: DiagnosisRequest, record: RunRecord) -> DiagnosisResult:
+    """Return what the curve of a unit tells of its parts, and keep account of the curves that are solved.
 
     Raises
     ------
@@ -246,7 +258,6 @@ def diagnose_unit(request: DiagnosisRequest, progress: Progress) -> DiagnosisAns
     SolveError
         Too many curves failed.
     """
-    record = RunRecord(progress, OUTCOMES)
     kernel, assumed = bind(request.reducer, request.errors, request.torque_nm, PLACE)
     cleaned = clean_curve(load_readings(request.curve, ANGLE, TRANSMISSION_ERROR), request.angle_offset_deg * DEGREE)
     kernel, errors = replace(kernel, observe=record.observe), request.errors
@@ -264,18 +275,11 @@ def diagnose_unit(request: DiagnosisRequest, progress: Progress) -> DiagnosisAns
     with one_blas_thread(), record.stage("diagnosis"):
         seeds = SeedTree(request.seed).child("diagnosis")
         found = diagnose(curve, kernel, errors, errors.zones, noise, seeds, request.effort, request.level)
-    return DiagnosisAnswer(
-        header=Header(
-            name=request.curve.stem,
-            model=request.reducer.name,
-            seed=request.seed,
-            assumptions=assumed,
-            statuses=record.counts,
-            stages=record.stages,
-        ),
+    return DiagnosisResult(
         reducer=request.reducer,
         torque=kernel.torque,
         errors=errors,
+        assumed=assumed,
         curve=curve,
         noise=noise,
         level=request.level,

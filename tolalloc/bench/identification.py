@@ -6,20 +6,41 @@ from dataclasses import dataclass, replace
 from math import isfinite
 
 import numpy as np
+from jaxtyping import Float
 
-from tolalloc.bench.identification_answer import IdentificationAnswer
-from tolalloc.bench.information import information
+from tolalloc.bench.information import Information, information
 from tolalloc.bench.least_squares import IdentificationProblem, Identified, gauss_newton, require_enough, starts
 from tolalloc.bench.measurements import Measurements
 from tolalloc.bench.parameters import BIAS, TORQUE, Parameter, parameter
-from tolalloc.bench.prediction import LARGE_DRIFT, LOOP, AllReadings, KernelPredictor, StandIn, data_of, fit_stand_in
-from tolalloc.bench.profile import FEWEST_UNITS, ParameterChoice, bootstrap, estimates, judged, profile, simplest
+from tolalloc.bench.prediction import (
+    LARGE_DRIFT,
+    LOOP,
+    AllReadings,
+    KernelPredictor,
+    Prediction,
+    Surrogate,
+    data_of,
+    fit_surrogate,
+)
+from tolalloc.bench.profile import (
+    FEWEST_UNITS,
+    ParameterChoice,
+    ParameterEstimate,
+    ParameterProfile,
+    as_stiffness,
+    bootstrap,
+    estimates,
+    judged,
+    profile,
+    simplest,
+)
 from tolalloc.drawings.seeds import SeedTree, require_seed
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.reducer.design import Reducer
-from tolalloc.reports.header import Header
+from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.running.progress import Progress
+from tolalloc.sensitivity.surrogate.regression import BoxPolynomial
 
 _ANY_BIAS = (-3600.0, 3600.0)
 STARTS = 8
@@ -53,9 +74,56 @@ class IdentificationRequest:
         require_seed(place, self.seed)
 
 
+@dataclass(frozen=True, kw_only=True)
+class IdentificationResult:
+    """Stiffnesses from measured units, their uncertainty, and how simpler explanations compare."""
+
+    # What was measured, and the reducer as it was given
+    measurements: Measurements
+    reducer: Reducer
+    data: AllReadings  # All readings in one row
+    parameters: tuple[Parameter, ...]  # The unknowns
+    found: Identified  # The least objective, on the model itself
+    # What the model says should have been read, before and after
+    at_start: Prediction
+    at_found: Prediction
+    at_written: Prediction  # The same for what the stiffness file states
+    # What the data fix around the least objective, and around what the stiffness file states
+    information: Information
+    written: Information
+    # How far the least objective of the polynomials is from that of the model, over the standard deviation [-]
+    drift: float
+    profiles: tuple[ParameterProfile, ...]  # The same without a parabola
+    estimates: tuple[ParameterEstimate, ...]  # Every parameter with its uncertainty
+    bootstrap: Float[np.ndarray, "resample parameter"] | None  # Coordinates for units drawn anew; none for a few [-]
+    choices: tuple[ParameterChoice, ...]  # Simpler and richer choices of parameters; none for a few units
+    chosen: ParameterChoice | None  # The simplest that is as good as the best
+    polynomial: BoxPolynomial  # What profiles, bootstrap and choices asked instead of the model
+
+    @property
+    def stiffness(self) -> IdentifiedStiffness | None:
+        """What a stiffness file states; none if no stiffness was asked for."""
+        units = int(self.data.units.size)
+        notes = (
+            f"identified by {self.found.method} from {'1 unit' if units == 1 else f'{units} units'} of "
+            f"{self.reducer.name}; residuals {np.sqrt(self.information.reduced_chi_square):.3g} times the noise",
+        )
+        return as_stiffness(self.estimates, self.written, self.measurements.source, notes)
+
+    def rms(self, prediction: Prediction, kind: str) -> float:
+        """Return the root-mean-square of predicted less measured for one kind of reading [rad]."""
+        rows = self.data.rows(kind)
+        left = prediction.values[rows] - self.data.measured[rows]
+        return float(np.sqrt((left**2).mean()))
+
+    def choice(self, *names: str) -> ParameterChoice | None:
+        """Return the choice of just these parameters, if it was judged."""
+        return next((item for item in self.choices if {one.name for one in item.parameters} == set(names)), None)
+
+
 def identify(
     request: IdentificationRequest, measurements: Measurements, reducer: Reducer, progress: Progress
-) -> IdentificationAnswer:
+) -> IdentificationResult:
     """Return the stiffnesses, their uncertainty, and how simpler explanations compare.
 
     The stiffness of the reducer is where every search begins.
@@ -79,9 +147,9 @@ def identify(
     )
     require_enough(problem)
     progress.begin("polynomials of the model")
-    stand_in = fit_stand_in(kernel, seeds.child("stand-in"))
-    _require_close(request, data, stand_in)
-    quick = problem.of(request.parameters, stand_in)
+    surrogate = fit_surrogate(kernel, seeds.child("stand-in"))
+    _require_close(request, data, surrogate)
+    quick = problem.of(request.parameters, surrogate)
     progress.begin("Gauss–Newton")
     found = _found(problem, quick, request.seed, seeds)
     prediction = kernel(found.coordinates)
@@ -90,7 +158,7 @@ def identify(
     written = gauss_newton(replace(widened, evenly=True), found.coordinates[np.newaxis]).coordinates
     at_written = kernel(written)
     progress.begin("what the data fix")
-    here = widened.of(request.parameters, stand_in.anchored(found.coordinates, prediction))
+    here = widened.of(request.parameters, surrogate.anchored(found.coordinates, prediction))
     near = gauss_newton(here, found.coordinates[np.newaxis]).coordinates
     profiles = tuple(profile(here, near, at, own) for at in range(len(request.parameters)))
     drift = float((np.abs(near - found.coordinates) / np.sqrt(np.diag(own.covariance))).max())
@@ -98,10 +166,9 @@ def identify(
         profiles = tuple(item.widened(own.interval[:, at]) for at, item in enumerate(profiles))
     several = data.units.size >= FEWEST_UNITS
     progress.begin("other choices")
-    choices = judged_choices(quick, stand_in, reducer) if several else ()
+    choices = judged_choices(quick, surrogate, reducer) if several else ()
     spread = information(widened, at_written, written)
-    return IdentificationAnswer(
-        header=Header(name=measurements.name, model=reducer.name, seed=request.seed),
+    return IdentificationResult(
         measurements=measurements,
         reducer=reducer,
         data=data,
@@ -118,7 +185,7 @@ def identify(
         bootstrap=bootstrap(here, near, seeds.child("bootstrap")) if several else None,
         choices=choices,
         chosen=simplest(choices) if choices else None,
-        polynomial=stand_in.polynomial,
+        polynomial=surrogate.polynomial,
     )
 
 
@@ -137,9 +204,9 @@ def _require_visible(request: IdentificationRequest, data: AllReadings) -> None:
         )
 
 
-def _require_close(request: IdentificationRequest, data: AllReadings, stand_in: StandIn) -> None:
-    """Refuse bounds within which polynomials are no stand-in for the model."""
-    off = stand_in.polynomial.rms_error
+def _require_close(request: IdentificationRequest, data: AllReadings, surrogate: Surrogate) -> None:
+    """Refuse bounds within which polynomials are no surrogate for the model."""
+    off = surrogate.polynomial.rms_error
     if not off <= data.noise.min():
         bounds = ", ".join(f"{item.name}={item.low:g}:{item.high:g}" for item in request.parameters)
         error = (
@@ -162,10 +229,10 @@ def _found(problem: IdentificationProblem, quick: IdentificationProblem, seed: i
     return gauss_newton(problem, np.stack([near.coordinates, problem.start]), seed).after(near)
 
 
-def judged_choices(quick: IdentificationProblem, stand_in: StandIn, reducer: Reducer) -> tuple[ParameterChoice, ...]:
+def judged_choices(quick: IdentificationProblem, surrogate: Surrogate, reducer: Reducer) -> tuple[ParameterChoice, ...]:
     """Return nothing, a bias, each parameter alone, all, and all with a bias, each judged by units not seen.
 
-    The problem is that of the stand-in, which holds polynomials of all parameters.
+    The problem is that of the surrogate, which holds polynomials of all parameters.
     """
     asked = tuple(item for item in quick.parameters if item.name != BIAS)
     choices: list[tuple[Parameter, ...]] = [(), *((item,) for item in asked)]
@@ -176,4 +243,4 @@ def judged_choices(quick: IdentificationProblem, stand_in: StandIn, reducer: Red
         choices[1:1] = [(bias,)]
         choices.append((*asked, bias))
     most = quick.data.units.size - 2 if quick.data.only_peak_to_peak else quick.readings
-    return tuple(judged(quick, stand_in, choice) for choice in choices if len(choice) <= most)
+    return tuple(judged(quick, surrogate, choice) for choice in choices if len(choice) <= most)

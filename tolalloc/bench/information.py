@@ -23,7 +23,6 @@ _FINEST = 1e-6  # least variance factor of noise that nobody stated: a thousandt
 _TINY = np.finfo(float).tiny
 _RARE = 1e-3  # probability below which the stated noise is doubted [-]
 _NOTHING = 1e-12  # eigenvalue over the largest, or squared loading, that is rounding [-]
-_SMALL = 0.05  # loadings below this share of the largest are not written [-]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,24 +38,6 @@ class Direction:
     def is_fixed(self) -> bool:
         """Whether the 95 % interval is no longer than half of what the bounds allow."""
         return 1.96 * self.deviation < 0.5 * self.half_width
-
-    def sentence(self, symbols: tuple[str, ...]) -> str:
-        """Return the direction in words."""
-        largest = np.abs(self.loading).max()
-        parts = [
-            f"{share:+.2f}·{symbol}"
-            for share, symbol in zip(self.loading, symbols, strict=True)
-            if abs(share) >= _SMALL * largest
-        ]
-        combination = " ".join(parts).removeprefix("+").replace("-", "−")
-        if self.is_fixed:
-            return f"these data fix {combination} (relative changes) to ±{self.deviation:.2%} as standard error"
-        left = (
-            f"±{self.deviation:.2%} as standard error, where the bounds alone leave ±{self.half_width:.2%}"
-            if self.deviation < self.half_width
-            else f"they leave no less than the bounds alone, ±{self.half_width:.2%}"
-        )
-        return f"these data leave {combination} (relative changes) open: {left}"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -60,10 +60,6 @@ class Parameter:
         """Unit of measurement of bounds and value."""
         return {BIAS: "arcsec", TORQUE: "-"}.get(self.name, "N/m")
 
-    def written(self, value: str) -> str:
-        """Return a value with its unit of measurement, if it has one."""
-        return value if self.unit == "-" else f"{value} {self.unit}"
-
     @property
     def is_stiffness(self) -> bool:
         """Whether it is a stiffness."""

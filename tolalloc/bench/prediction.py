@@ -282,7 +282,7 @@ _DEGREES = {1: 8, 2: 6, 3: 4, 4: 3, 5: 3}
 
 
 @dataclass(frozen=True)
-class StandIn:
+class Surrogate:
     """The readings as polynomials of the coordinates inside the bounds; the bias is added exactly."""
 
     # The unknowns, in the order of the coordinates; those that the polynomial has and this lacks stay at their start
@@ -293,8 +293,8 @@ class StandIn:
     # Added to every reading, so that they are the model's at one point; 0 unless `anchored` [rad]
     offset: float | Float[np.ndarray, " datum"] = 0.0
 
-    def anchored(self, coordinates: Float[np.ndarray, " parameter"], model: Prediction) -> StandIn:
-        """Return the stand-in moved onto what the model predicts at one point."""
+    def anchored(self, coordinates: Float[np.ndarray, " parameter"], model: Prediction) -> Surrogate:
+        """Return the surrogate moved onto what the model predicts at one point."""
         return replace(self, offset=model.values - self.values(coordinates[np.newaxis])[0])
 
     def __call__(self, coordinates: Float[np.ndarray, " parameter"]) -> Prediction:
@@ -330,10 +330,10 @@ class StandIn:
         return found
 
 
-def fit_stand_in(kernel: KernelPredictor, seeds: SeedTree) -> StandIn:
+def fit_surrogate(kernel: KernelPredictor, seeds: SeedTree) -> Surrogate:
     """Return polynomials of all readings inside the bounds, their error measured on runs that the fit did not see."""
     fitted = tuple(item for item in kernel.parameters if item.name != BIAS)
     polynomial = fit_box_polynomial(
         replace(kernel, parameters=fitted).values, *box(fitted), _DEGREES.get(len(fitted), 2), seeds
     )
-    return StandIn(kernel.parameters, fitted, polynomial, kernel.data)
+    return Surrogate(kernel.parameters, fitted, polynomial, kernel.data)

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from tolalloc.bench.information import Information
 from tolalloc.bench.least_squares import IdentificationProblem, gauss_newton
 from tolalloc.bench.parameters import Parameter
-from tolalloc.bench.prediction import AllReadings, Prediction, Predictor, StandIn
+from tolalloc.bench.prediction import AllReadings, Prediction, Predictor, Surrogate
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 
@@ -93,7 +93,7 @@ def profile(
 ) -> ParameterProfile:
     """Return the profile of one parameter, the others fitted anew at each of its values.
 
-    The noise of the problem is widened by the variance factor, and a stand-in should predict. What was found to first
+    The noise of the problem is widened by the variance factor, and a surrogate should predict. What was found to first
     order says where to look, and the threshold.
 
     Notes
@@ -143,18 +143,6 @@ class ParameterEstimate:
     identified: bool  # Whether the interval keeps away from at least one bound
     on_bound: bool  # Whether the least objective stands on a bound
 
-    @property
-    def sentence(self) -> str:
-        """What to make of it."""
-        item = self.parameter
-        low, high = (f"{value:.4g}" for value in self.interval)
-        if not self.identified:
-            spanned = item.written(f"{low}…{high}")
-            return f"{item.symbol} is not identified by these data: its 95 % interval spans the bounds, {spanned}."
-        bound = "; the least objective is on a bound" if self.on_bound else ""
-        value, interval = item.written(f"{self.value:.4g}"), item.written(f"{low}…{high}")
-        return f"{item.symbol} = {value}, 95 % interval {interval}{bound}."
-
 
 def estimates(
     parameters: Sequence[Parameter],
@@ -201,7 +189,7 @@ def as_stiffness(
         values={item.parameter.name: item.value for item in chosen},
         standard_uncertainty={item.parameter.name: item.value * item.uncertainty for item in chosen},
         correlation=correlation[np.ix_(places, places)],
-        notes=(*notes, *(item.sentence for item in estimated if not item.identified or item.on_bound)),
+        notes=tuple(notes),
     )
 
 
@@ -234,11 +222,6 @@ class ParameterChoice:
     unit: Int[np.ndarray, " datum"]  # Unit of every reading [-]
 
     @property
-    def name(self) -> str:
-        """What is fitted, in symbols."""
-        return " + ".join(item.symbol for item in self.parameters) or "nothing (the reducer as given)"
-
-    @property
     def by_unit(self) -> Float[np.ndarray, " unit"]:
         """Mean squared unseen residual over noise of each unit [-]."""
         square = (self.unseen / self.noise) ** 2
@@ -255,13 +238,13 @@ class ParameterChoice:
         return float(np.sqrt((values**2).mean()))
 
 
-def judged(problem: IdentificationProblem, stand_in: StandIn, parameters: Sequence[Parameter]) -> ParameterChoice:
+def judged(problem: IdentificationProblem, surrogate: Surrogate, parameters: Sequence[Parameter]) -> ParameterChoice:
     """Return how well a choice of parameters predicts units that it has not seen; the rest keeps the reducer's value.
 
-    The stand-in holds polynomials of at least these parameters.
+    The surrogate holds polynomials of at least these parameters.
     """
     own = tuple(parameters)
-    asked, data = problem.of(own, replace(stand_in, parameters=own)), problem.data
+    asked, data = problem.of(own, replace(surrogate, parameters=own)), problem.data
     everywhere = _left(asked, _fit(asked))
     unseen = np.empty(data.measured.size)
     for unit in data.units:

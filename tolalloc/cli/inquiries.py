@@ -23,10 +23,11 @@ def inquiry_command(name: str) -> Callable[..., None]:
         from tolalloc.reports.folder import require_usable
 
         asked = inquiry(**given).with_reducer(out, argument="--reducer")
+        asked.apart_from(out)
         require_usable(out)
         prepared = asked.prepare()
-        if inquiry.kernel:
-            announce_compilation(inquiry.kernel)
+        if room := asked.room(prepared):
+            announce_compilation(room)
         with shown_progress(inquiry.counted) as progress:
             answer = asked.solve(prepared, progress)
         write_report(answer, out)

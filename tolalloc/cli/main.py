@@ -11,12 +11,9 @@ import typer
 
 from tolalloc.cli.assemble import assemble
 from tolalloc.cli.console import note
-from tolalloc.cli.diagnose import diagnose
 from tolalloc.cli.doctor import doctor
 from tolalloc.cli.examples import EXAMPLES
-from tolalloc.cli.identify import identify
 from tolalloc.cli.inquiries import inquiry_command
-from tolalloc.cli.mount import mount
 from tolalloc.cli.new import new, schema
 from tolalloc.cli.open import open_page
 from tolalloc.cli.options import SayingNumbers, saying_options
@@ -57,10 +54,10 @@ _COMMANDS = (
     inquiry_command("te"),
     inquiry_command("contact"),
     inquiry_command("modify"),
-    identify,
-    diagnose,
+    inquiry_command("identify"),
+    inquiry_command("diagnose"),
     assemble,
-    mount,
+    inquiry_command("mount"),
     inquiry_command("simulate"),
     schema,
     doctor,

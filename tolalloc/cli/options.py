@@ -57,7 +57,9 @@ def _option(command: Callable[..., None], argument: str) -> str:
         if argument == name or argument.startswith(f"{name}_"):
             for own in getattr(kind, "__metadata__", ()):
                 if isinstance(own, OptionInfo):
-                    return (own.param_decls or (f"--{name.replace('_', '-')}",))[0]
+                    # typer takes the first name of an option in an annotation for its default.
+                    stated = [each for each in (own.default, *(own.param_decls or ())) if str(each).startswith("--")]
+                    return str([*stated, f"--{name.replace('_', '-')}"][0])
     return ""
 
 

@@ -123,6 +123,19 @@ class Inquiry(NamedFields, ABC, Generic[Prepared]):
             One sentence on what is wrong.
         """
 
+    def room(self, prepared: Prepared) -> str:  # noqa: ARG002
+        """Return the compiled room that it solves with, empty for none."""
+        return self.kernel
+
+    def apart_from(self, report: Path | None) -> None:
+        """Refuse files that must not stand in the folder of a report; nothing unless an inquiry says otherwise.
+
+        Raises
+        ------
+        InputError
+            A file that would stand in the folder.
+        """
+
     @abstractmethod
     def solve(self, prepared: Prepared, progress: Progress) -> Answer[Any]:
         """Return the answer."""
@@ -178,6 +191,7 @@ def _taken(place: str, name: str, kinds: tuple[Any, ...], value: Any) -> Any:
         (float, is_number(value), float, "a number"),
         (Path, isinstance(value, str | os.PathLike), Path, "a path"),
         (str, isinstance(value, str), str, "a text"),
+        (list[str], isinstance(value, list | tuple), list, "a list of texts"),
     ):
         if kind in kinds:
             if not takes:

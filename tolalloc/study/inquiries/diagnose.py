@@ -1,0 +1,79 @@
+"""From the curve of a bad unit back to the errors of its parts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+
+from tolalloc.reports.header import Header
+from tolalloc.running.progress import Progress, RunRecord
+from tolalloc.study.answer import Answer
+from tolalloc.study.inquiry import Inquiry, ReducerName, StiffnessName, TestTorque, Word
+
+if TYPE_CHECKING:
+    from tolalloc.bench.diagnosis import DiagnosisRequest, DiagnosisResult
+
+
+@dataclass(frozen=True, kw_only=True)
+class Diagnose(Inquiry["DiagnosisRequest"]):
+    """Which part error the measured curve of a bad unit points to, and which ones it cannot tell apart."""
+
+    word: ClassVar[str] = "diagnose"
+    by_position: ClassVar[int] = 1
+    counted: ClassVar[str] = "curves"
+    kernel: ClassVar[Literal["", "equivalent", "cycloid"]] = "equivalent"
+
+    curve: Annotated[Path, Word("CSV: columns 'angle [deg]', 'transmission error [arcsec]'.")]
+    reducer: ReducerName = None
+    tolerances: Annotated[str, Word("Tolerance table: shipped name, CSV or XLSX.")] = "rv20e_baseline"
+    sheet: Annotated[str, Word("Sheet of a workbook that holds the table; the first unless given.")] = ""
+    torque: TestTorque = None
+    noise: Annotated[float, Word("Standard deviation of one reading [arcsec].")] = 0.5
+    discrepancy: Annotated[float, Word("Standard deviation of what the model leaves out [arcsec].")] = 0.5
+    angle_offset: Annotated[float, Word("Added to every angle of the bench [deg].")] = 0.0
+    stiffness: StiffnessName = ""
+    correlations: Annotated[str, Word("Correlations between sources: CSV or XLSX.")] = ""
+    level: Annotated[float, Word("Probability that the named sources hold the dominant one.")] = 0.97
+    seed: Annotated[int, Word("Seed of every random number.")] = 1
+
+    def prepare(self) -> DiagnosisRequest:
+        """Return which unit is to be diagnosed, against which drawings."""
+        from tolalloc.bench.diagnosis import DiagnosisRequest
+        from tolalloc.drawings.drawing import load_drawing
+        from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
+
+        design = load_reducer(str(self.reducer))
+        if self.stiffness:
+            design = with_stiffness(design, load_identified_stiffness(self.stiffness))
+        return DiagnosisRequest(
+            curve=self.curve,
+            reducer=design,
+            errors=load_drawing(self.tolerances, correlations=self.correlations, sheet=self.sheet).errors,
+            torque_nm=self.torque,
+            noise_arcsec=self.noise,
+            discrepancy_arcsec=self.discrepancy,
+            angle_offset_deg=self.angle_offset,
+            level=self.level,
+            seed=self.seed,
+        )
+
+    def solve(self, prepared: DiagnosisRequest, progress: Progress) -> Answer[DiagnosisResult]:
+        """Return what the curve of the unit tells of its parts."""
+        from tolalloc.bench.diagnosis import diagnose_unit
+        from tolalloc.reducers.equivalent.model import OUTCOMES
+
+        record = RunRecord(progress, OUTCOMES)
+        result = diagnose_unit(prepared, record)
+        header = Header(
+            name=prepared.curve.stem,
+            model=prepared.reducer.name,
+            seed=prepared.seed,
+            assumptions=result.assumed,
+            statuses=record.counts,
+            stages=record.stages,
+        )
+        return Answer(kind="diagnosis", header=header, result=result)
+
+
+INQUIRY = Diagnose
