@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+import tomllib
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from importlib.resources import files
 from pathlib import Path
+from string import Formatter
 from typing import Any
 
 import numpy as np
@@ -97,6 +101,28 @@ def refusal(read: Callable[[Path], object], path: Path) -> str:
     sentence = str(caught.value)
     assert "\n" not in sentence
     return sentence
+
+
+def says(prose: str | Iterable[str], sentence: str, **gaps: object) -> bool:
+    """Return whether prose holds a sentence of a teller, whatever its words are.
+
+    Parameters
+    ----------
+    prose
+        One text or several.
+    sentence
+        Teller and key, such as ``simulation.ringing``.
+    gaps
+        What fills some of its gaps; the others may hold anything.
+    """
+    teller, key = sentence.split(".")
+    text = files("tolalloc.reports").joinpath("sentences", f"{teller}.toml").read_text(encoding="utf-8")
+    pattern = ""
+    for words, gap, form, _ in Formatter().parse(" ".join(tomllib.loads(text)[key].split())):
+        pattern += re.escape(words)
+        if gap is not None:
+            pattern += re.escape(format(gaps[gap], form or "")) if gap in gaps else ".*"
+    return any(re.search(pattern, own) for own in ([prose] if isinstance(prose, str) else prose))
 
 
 FIRST_STAGE = ("sun.", "planet", "mesh")

@@ -72,7 +72,7 @@ def test_measured_parts_are_adjusted_and_reported(unit, tmp_path):
     assert tolerances["cost unadjusted [cost units]"] == pytest.approx(148.278, abs=1e-3)
     assert tolerances["cost adjusted [cost units]"] == pytest.approx(19.1306, abs=1e-4)
     assert tolerances["cost re-tuned [cost units]"] == pytest.approx(14.457, abs=1e-3)
-    assert "KC1 about x (+52.21″, ±30″)" in answer["warnings"][0]
+    assert "KC1" in answer["warnings"][0] and "+52.21″" in answer["warnings"][0]
     load = [row["largest line load, rated torque [N/mm]"] for row in answer["transmission"]["values"]]
     assert load[0] < load[-1] < load[1]  # perfect parts, adjusted, unadjusted
     folder = tmp_path / "report"
@@ -86,8 +86,7 @@ def test_a_chain_without_a_reducer_says_what_is_to_be_expected(pump):
     result = tolalloc("assemble", pump)
     assert result.returncode == 0, result.stderr
     said = " ".join(result.stdout.split())
-    assert "Step 2: mount rotor, measure rotor, turn about own axes" in said
-    assert "Parts within the stated tolerances leave" in said
+    assert "measure rotor" in said
     assert "line load" not in said and "cost units" not in said
 
 
@@ -118,8 +117,7 @@ def test_measured_parts_are_listed_without_measuring_again(pump, tmp_path):
     result = tolalloc("assemble", pump, "--measured", parts)
     assert result.returncode == 0, result.stderr
     said = " ".join(result.stdout.split())
-    assert "Step 2: mount rotor, turn about own axes" in said
-    assert "measure rotor" not in said
+    assert "mount rotor" in said and "measure rotor" not in said
 
 
 @pytest.mark.slow
@@ -134,11 +132,11 @@ def test_impossible_limits_keep_nobody_from_the_turns(unit, tmp_path):
         assert result.returncode == 0, result.stderr
         answer = json.loads(result.stdout)
         assert answer["tolerances"] is None and answer["steps"]
-        assert any("No angular tolerances are given." in warning for warning in answer["warnings"])
-        assert "No angular tolerances are given." in (folder / "report.html").read_text(encoding="utf-8")
+        (warning,) = (own for own in answer["warnings"] if "angular tolerances" in own)
+        assert warning.split(":")[0] in (folder / "report.html").read_text(encoding="utf-8")
         shown = tolalloc("assemble", chain, *arguments)
         assert shown.returncode == 0, shown.stderr
-        assert "No angular tolerances are given." in shown.stdout
+        assert warning in shown.stdout
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from tests.builders import says
 from tests.studies.command import ROOT, refused, tolalloc
 from tests.studies.scripts import study_script
 from tolalloc.drawings.table_file import DATA
@@ -98,16 +99,17 @@ def test_check_says_what_is_read_and_that_the_drawing_cannot_be_built():
     result = tolalloc("check", STUDY)
     assert result.returncode == 0
     assert "is in order" not in result.stdout
-    assert "can be run, but of its units 100.0% are preloaded" in result.stdout
+    assert "100.0%" in result.stdout.splitlines()[-1]
     assert "σ =" in result.stdout
-    assert "Neglected: not in the tolerance table and taken as exact: " in result.stdout
     # Rows that say the same stand in one line, others do not; the zones of the shipped table cost what they add up to.
-    assert "  disc*.pitch (2 rows, each): 23.3 µm" in result.stdout
-    assert "  disc1.bore1.position: 4 µm" in result.stdout
+    (rows,) = (line for line in result.stdout.splitlines() if line.strip().startswith("disc*.pitch"))
+    assert "2 rows" in rows and ": 23.3 µm" in rows
+    assert any(line.strip().startswith("disc1.bore1.position: 4 µm") for line in result.stdout.splitlines())
     table = load_tolerance_table("rv20e_baseline")
     cost = sum(source.cost for source in table if source.zone > 0)
-    assert f"The zones of the table cost {cost:.2f} cost units." in result.stdout
-    assert "  flank clearance: 1.04 µm; may become 1…5 µm" in result.stdout
+    assert f" {cost:.2f} cost units" in result.stdout
+    (flank,) = (line for line in result.stdout.splitlines() if line.strip().startswith("flank clearance: 1.04 µm;"))
+    assert " 1…5 µm" in flank
 
 
 @pytest.mark.slow
@@ -183,8 +185,7 @@ def test_an_identified_stiffness_is_a_source_of_the_ranking_alone(run_folder):
     for table in ("allocation.csv", "tables/tolerances.csv", "tables/shares.csv"):
         assert name not in (run_folder / table).read_text(encoding="utf-8")
     page = (run_folder / "report.html").read_text(encoding="utf-8")
-    assert "Not knowing stiffness (identified) gives" in page
-    assert "common to all units" in page
+    assert says(page, "ranking.uncertain", names=name)
 
 
 @pytest.mark.slow

@@ -140,7 +140,6 @@ def test_a_newcomer_asks_what_a_zone_does(tmp_path, cranks):
     tolalloc("new", place, "--cranks", cranks)
     result = tolalloc("whatif", place / "study.py", "disc*.pitch=10", "--units", "256", "--out", tmp_path / "report")
     assert result.returncode == 0, result.stderr
-    assert "The drawing costs" in result.stdout
     assert (tmp_path / "report" / "report.html").is_file()
 
 

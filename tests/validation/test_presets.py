@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.builders import says
 from tests.studies.command import refused, tolalloc
 from tests.validation_manual import shown
 from tolalloc.exceptions import InputError
@@ -39,7 +40,7 @@ def test_the_rigidity_is_the_catalogues_within_a_fifth(size):
     assert 0.1 < loop.lost_motion[0] / ARCMINUTE < reducer.catalogue.lost_motion / ARCMINUTE
     shown(f"V{1 + SIZES.index(size)}", loop.torsional_stiffness[0] * ARCMINUTE)
     sentence, warnings = against_catalogue(reducer, loop)
-    assert "where the catalogue states" in sentence
+    assert f"{reducer.catalogue.torsional_rigidity * ARCMINUTE:.3g} (" in sentence
     assert not warnings
 
 
@@ -66,7 +67,7 @@ def test_the_printed_stiffness_is_said_to_be_far_from_any_catalogue():
     assert loop.torsional_stiffness[0] * ARCMINUTE == pytest.approx(1577, rel=1e-3)
     sentence, warnings = against_catalogue(printed, loop)
     assert "1.58e+03 N·m/arcmin" in sentence
-    assert warnings[0].startswith("The model is 32.2 times as stiff as the catalogue states")
+    assert "32.2 times" in warnings[0]
     assert printed.catalogue.torsional_rigidity * FACTOR < loop.torsional_stiffness[0]
 
 
@@ -75,7 +76,7 @@ def test_without_a_catalogue_the_twist_under_rated_torque_is_judged():
         reducer = replace(load_reducer(size), catalogue=None)
         sentence, warnings = against_catalogue(reducer, exact_loop(reducer))
         assert sentence == ""
-        assert any("sizes in catalogues twist by 3 to 4′" in warning for warning in warnings) is off
+        assert any("twist" in warning for warning in warnings) is off
 
 
 def test_orders_that_are_rounding_are_no_main_orders():
@@ -124,7 +125,7 @@ def test_preload_is_what_presses_at_the_torque_of_backlash():
 @pytest.mark.slow
 def test_te_says_that_the_unit_of_table_4_is_preloaded():
     answer = json.loads(tolalloc("te", "--reducer", "rv20e", "--unit", "table4", "--json").stdout)
-    assert answer["warnings"][0].startswith("This unit is preloaded: without torque its pins press with up to")
+    assert says(answer["warnings"][0], "transmission_error.preloaded", force=answer["pin_force_without_torque_n"])
     assert answer["pin_force_without_torque_n"] > 1000
     exact = json.loads(tolalloc("te", "--reducer", "rv20e", "--unit", "exact", "--json").stdout)
     assert not any("preloaded" in warning for warning in exact["warnings"])
@@ -132,7 +133,7 @@ def test_te_says_that_the_unit_of_table_4_is_preloaded():
     assert 80 < friction["efficiency_at_rated_torque_percent"] < 92
     assert friction["no_load_torque_nm"] < 1 < 10 < answer["friction"]["no_load_torque_nm"]
     assert friction["by_contact"][0]["contact"] == "pins"
-    assert any(own.startswith("coefficients of friction: pins 0.05, crank–disc") for own in exact["assumptions"])
+    assert any("coefficients of friction" in own for own in exact["assumptions"])
 
 
 def numbers(found):

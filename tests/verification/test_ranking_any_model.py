@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from tests.builders import says
 from tolalloc.capability.indices import Limits
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.drawings.error_model import ErrorModel
@@ -117,11 +118,11 @@ def answer() -> Answer[RankingResult]:
 @pytest.mark.slow
 def test_the_answer_speaks_of_the_outputs_by_name_and_unit(answer):
     text = " ".join((answer.title, answer.subtitle, *answer.sentences))
-    assert "What drives a chain: links" in text
-    assert "Beyond the limit of 1.02 mm" in text or "the worst 5 %" in text
+    assert answer.header.model in answer.title and answer.header.name in answer.title
+    assert says(text, "ranking.the_limit", limit="1.02 mm") or says(text, "ranking.worst_share")
     assert "″" not in text
     assert "[arcsec" not in " ".join(" ".join(frame.columns) for frame in answer.tables.values())
-    assert answer.sections[0].heading == "Which error drives the gap"
+    assert says(answer.sections[0].heading, "ranking.drivers_heading", output="gap")
     assert "orders" not in answer.tables
     assert {"gap", "ranking", "rejects", "requirements"} <= {*answer.figures}
     assert answer.summary["model"] == "a chain"
@@ -143,7 +144,7 @@ def test_a_lower_limit_is_an_upper_one_of_the_output_with_its_sign_turned(answer
     yields = turned.result.sample.evaluation.values[:, 0] >= 1.95
     assert turned.result.outputs == (PLAY, GAP)
     assert turned.result.beyond.interval.estimate == pytest.approx(yields.mean())
-    assert any("Beyond the lower limit of 1.95°" in sentence for sentence in turned.sentences)
+    assert says(turned.sentences, "ranking.limit_lower", limit=1.95, sign="°")
     assert turned.summary["lower limit [deg]"] == 1.95
     # Only b moves it, and its 95 % quantile is 1.945: its zone alone may close to 0.91 of itself.
     assert (np.isnan(turned.result.inverse.factor[0]), np.isinf(turned.result.inverse.factor[0])) in (
@@ -159,7 +160,7 @@ def test_two_limits_count_the_units_beyond_either():
     values = both.result.sample.evaluation.values[:, 0]
     inside = (values >= 0.98) & (values <= 1.02)
     assert both.result.beyond.interval.estimate == pytest.approx(inside.mean())
-    assert any("inside the limits" in sentence or "beyond the limits" in sentence for sentence in both.sentences)
+    assert says(both.sentences, "ranking.value_inside") or says(both.sentences, "ranking.value_beyond")
 
 
 @pytest.mark.slow
@@ -175,5 +176,5 @@ def test_what_is_not_known_of_the_model_is_a_source_of_every_ranked_output():
     assert effect["total index ST [-]"] == pytest.approx(share)
     assert found.result.effect.first_order.root_mean_square < 1e-12
     assert found.result.local.sources == ("a", "b")
-    assert any(sentence.startswith("Not knowing scale") for sentence in found.sentences)
+    assert says(found.sentences, "ranking.uncertain", names="scale")
     assert ranked({GAP: Limits(upper=1.02)}).summary.keys().isdisjoint({"not known of the model"})

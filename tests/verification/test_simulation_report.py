@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.builders import says
 from tolalloc.reading.units import ARCSECOND, RPM
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.simulation import AtRest, SimulationRequest, SimulationResult, TimeSeries
@@ -74,36 +75,34 @@ def test_numbers_of_the_steady_part():
 
 def test_the_answer_says_what_is_found_and_why():
     said = " ".join(told(results(lost=0.02, added=0.05, spike=25.0)).sentences)
-    for words in (
-        "6.4815 rpm, a ratio of 81.0000",
-        "98.000 % leave",
-        "disc 1: 4…5; disc 2: 5, a matter of how stiff a pin contact is: 2.12e+09 N/m by the constant law",
-        "1025.0 N, in the static model 1000.0 N",
-        "differ by 0.05″ rms and 0.05″ at most",
-        "4500 Hz, away from the orders that errors and pins excite",
-        "motion alone",
-        "In the last 1 whole crank turn, from",
-    ):
-        assert words in said
-    for frequency, what in ((200.0, "near 1 times the pin pass"), (8.0, "near order 78 and order 80")):
-        assert what in " ".join(told(replace(results(), natural_frequency=frequency)).sentences)
-    assert "of constant stiffness" in " ".join(told(replace(results(), natural_frequency=None)).sentences)
-    assert "not motion alone" in " ".join(told(replace(results(), asked=SimulationRequest(engine="exudyn"))).sentences)
+    assert says(said, "simulation.turns", output_speed=525 / 81, ratio=81.0, leaving=98.0)
+    assert says(said, "simulation.contacts", counts="disc 1: 4…5; disc 2: 5", moving=1025.0, resting=1000.0)
+    assert says(said, "simulation.constant", stiffness=2.12e9, law="constant")
+    assert says(said, "simulation.spans", rms=0.05, largest=0.05)
+    assert says(said, "simulation.frequency", frequency=4500.0)
+    for key in ("one_turn", "away", "motion_alone"):
+        assert says(said, f"simulation.{key}")
+    for frequency, what in ((200.0, "1 times the pin pass"), (8.0, "order 78 and order 80")):
+        found = told(replace(results(), natural_frequency=frequency))
+        assert says(found.sentences, "simulation.near", excitations=what)
+    assert says(told(replace(results(), natural_frequency=None)).sentences, "simulation.no_frequency")
+    prototype = told(replace(results(), asked=SimulationRequest(engine="exudyn")))
+    assert says(prototype.sentences, "simulation.prototype_differs")
 
 
 def test_vibrations_of_the_step_are_not_taken_for_the_reducers():
     assert told(results()).warnings == ()
     assert results(wobble=0.02).ringing == "transmission error"
-    assert "Do not use the transmission error" in told(results(wobble=0.02)).warnings[0]
+    assert says(told(results(wobble=0.02)).warnings[0], "simulation.ringing", what="transmission error")
     calm = results()
     turning = replace(calm.series, output_acceleration=(-1.0) ** np.arange(TIMES))
-    assert "Do not use the output acceleration" in told(replace(calm, series=turning)).warnings[0]
+    assert says(told(replace(calm, series=turning)).warnings[0], "simulation.ringing", what="output acceleration")
 
 
 @pytest.mark.parametrize("lost", [0.01, -0.01])
 def test_power_that_does_not_close_is_said(lost):
     assert results(lost=lost).is_unsettled
-    assert "are not steady" in told(results(lost=lost)).warnings[0]
+    assert says(told(results(lost=lost)).warnings[0], "simulation.unsettled")
 
 
 def test_a_deviation_that_decays_is_said():
