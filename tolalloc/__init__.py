@@ -50,14 +50,15 @@ if TYPE_CHECKING:
     from tolalloc.reducers import RADIAL_CLEARANCE as RADIAL_CLEARANCE
     from tolalloc.reducers import TORSIONAL_STIFFNESS as TORSIONAL_STIFFNESS
     from tolalloc.reducers.choice import reducer as reducer
-    from tolalloc.reports.answer import Answer as Answer
     from tolalloc.reports.document import Document as Document
     from tolalloc.reports.document import Section as Section
     from tolalloc.reports.figure import Figure as Figure
     from tolalloc.reports.figure import Series as Series
+    from tolalloc.reports.teller import Teller as Teller
     from tolalloc.sensitivity.effort import RankingEffort as RankingEffort
     from tolalloc.sensitivity.effort import SobolEffort as SobolEffort
     from tolalloc.study import numeric as numeric
+    from tolalloc.study.answer import Answer as Answer
     from tolalloc.study.commands import check as check
     from tolalloc.study.commands import series as series
     from tolalloc.study.commands import whatif as whatif
@@ -73,7 +74,7 @@ if TYPE_CHECKING:
 _WHERE = {
     "Allocation": "study.questions",
     "AllocationEffort": "allocation.space.effort",
-    "Answer": "reports.answer",
+    "Answer": "study.answer",
     "AtCpk": "allocation.space.requirement",
     "AtYield": "allocation.space.requirement",
     "BACKLASH": "reducers",
@@ -112,6 +113,7 @@ _WHERE = {
     "SolveError": "exceptions",
     "Study": "study.study",
     "TORSIONAL_STIFFNESS": "reducers",
+    "Teller": "reports.teller",
     "TolallocError": "exceptions",
     "UnitPrice": "allocation.cost.unit_price",
     "UnknownNameError": "exceptions",

@@ -18,7 +18,7 @@ Result = TypeVar("Result")
 
 
 class Teller(ABC, Generic[Result]):
-    """What is said and shown of a result.
+    """What is said and shown of a result; a subclass with ``kind=`` tells of all answers of that kind.
 
     Parameters
     ----------
@@ -27,6 +27,10 @@ class Teller(ABC, Generic[Result]):
     header
         What every answer says of its run.
     """
+
+    def __init_subclass__(cls, kind: str = "") -> None:
+        if kind:
+            _OWN[kind] = cls
 
     def __init__(self, result: Result, header: Header) -> None:
         self.result, self.header = result, header
@@ -96,15 +100,11 @@ class Teller(ABC, Generic[Result]):
 
 
 _OWN: dict[str, type[Teller[Any]]] = {}
-
-
-def register(kind: str, teller: type[Teller[Any]]) -> None:
-    """Let a teller tell of results of a kind that this package does not know, or instead of its own teller."""
-    _OWN[kind] = teller
+"""Kind → teller of a kind that this package does not know, or instead of its own teller."""
 
 
 def teller_of(kind: str, result: Any, header: Header) -> Teller[Any]:
-    """Return what tells of a result: the registered teller, or ``TELLER`` of the module of that kind."""
+    """Return what tells of a result: the teller of that kind, or ``TELLER`` of the module of that kind."""
     if kind in _OWN:
         return _OWN[kind](result, header)
     module = import_module(f"tolalloc.reports.tellers.{kind.replace(' ', '_')}")
