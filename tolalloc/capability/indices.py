@@ -152,6 +152,14 @@ def capability(sample: Float[np.ndarray, " unit"], limits: Limits, subgroup: int
     References
     ----------
     ISO 22514-2, indices Cp, Cpk (within) and Pp, Ppk (overall); Montgomery, Statistical Quality Control, ch. 8.
+
+    Examples
+    --------
+    Mean 10 and overall deviation 1 between the limits 7 and 13: Pp = 6/6 = 1.
+
+    >>> found = capability(np.array([9.0, 10.0, 11.0]), Limits(lower=7.0, upper=13.0))
+    >>> found.pp, found.ppk, found.outside
+    (1.0, 1.0, 0)
     """
     if sample.size < 2 or not np.isfinite(sample).all():
         raise InputError.at("capability", "sample", f"{sample.size} values", "at least 2 values, all finite")
@@ -186,6 +194,15 @@ def defects_per_million_opportunities(defects: int, units: int, opportunities: i
         Units inspected [-].
     opportunities
         Limited characteristics of one unit; with one, the figure is the empirical parts per million [-].
+
+    References
+    ----------
+    Montgomery, Statistical Quality Control.
+
+    Examples
+    --------
+    >>> defects_per_million_opportunities(3, 1000, opportunities=2)
+    1500.0
     """
     if units < 1 or opportunities < 1 or not 0 <= defects <= units * opportunities:
         raise InputError.at("DPMO", "defects", defects, f"0 to {units} units × {opportunities} opportunities")
@@ -205,6 +222,12 @@ def wilson_interval(units: int, accepted: int, confidence: float = 0.95) -> Shar
     References
     ----------
     Wilson 1927, (p + z²/2n ± z·√(p·(1 − p)/n + z²/4n²)) / (1 + z²/n).
+
+    Examples
+    --------
+    >>> found = wilson_interval(100, 95)
+    >>> round(found.low, 4), round(found.high, 4)
+    (0.8882, 0.9785)
     """
     from scipy.stats import norm
 
@@ -239,6 +262,14 @@ def quantile_interval(sample: Float[np.ndarray, " unit"], share: float, confiden
     References
     ----------
     David & Nagaraja, Order Statistics, ch. 7: P(X₍ᵣ₎ ≤ q < X₍ₛ₎) = P(r ≤ B < s) with B binomial (n, share).
+
+    Examples
+    --------
+    The median of 1 to 100 lies between the 40th and the 61st value with 95 % confidence.
+
+    >>> found = quantile_interval(np.arange(1.0, 101.0), 0.5)
+    >>> found.estimate, found.low, found.high
+    (50.5, 40.0, 61.0)
     """
     from scipy.stats import binom
 

@@ -277,6 +277,15 @@ def level(chains: Chains, inside: Bool[np.ndarray, "chain state"], bound: float)
     References
     ----------
     Au & Beck 2001, δ² = (1 − P) / (P·N) · (1 + γ), γ = 2·Σ (1 − k/L)·ρ(k).
+
+    Examples
+    --------
+    Half of 4 independent samples are inside: δ = √(0.5 / (0.5·4)) = 0.5.
+
+    >>> chains = Chains.independent(lambda u: u[:, 0], np.random.default_rng(1), 4, 1)
+    >>> found = level(chains, np.array([[True], [True], [False], [False]]), 0.0)
+    >>> found.share, found.coefficient_of_variation
+    (0.5, 0.5)
     """
     share, length = float(inside.mean()), inside.shape[1]
     correlation = 0.0

@@ -149,7 +149,13 @@ def _crossing(is_beyond: Callable[[float], bool]) -> float:
 
 
 def largest_first(values: Float[np.ndarray, " value"], count: int) -> Int[np.ndarray, " largest"]:
-    """Return where so many of the largest values stand, the largest first; without sorting all of many."""
+    """Return where so many of the largest values stand, the largest first; without sorting all of many.
+
+    Examples
+    --------
+    >>> largest_first(np.array([1.0, 3.0, 2.0, 3.0]), 3).tolist()
+    [1, 3, 2]
+    """
     if count >= values.size:
         return np.argsort(-values, kind="stable")
     found = np.sort(np.argpartition(-values, count)[:count])

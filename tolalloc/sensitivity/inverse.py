@@ -122,7 +122,13 @@ def inverse_sensitivity(
 
 
 def fewest_units(target: float) -> int:
-    """Return the fewest units that show a quantile at the target yield [-]."""
+    """Return the fewest units that show a quantile at the target yield [-].
+
+    Examples
+    --------
+    >>> fewest_units(0.9973)
+    1852
+    """
     return int(np.ceil(_LEAST_OUTSIDE / (1.0 - target)))
 
 

@@ -224,6 +224,14 @@ def saltelli_indices(
     Second order: Saltelli 2002, mean (BA_j·AB_k − A·B) / V − S_j − S_k. V is the variance of A and B together, and all
     answers of an output are centred and divided by their standard deviation first, as SALib does: the first and the
     second order depend on it.
+
+    Examples
+    --------
+    >>> x = next(SaltelliDesign(factor_groups=("a", "b"), seed=1).chunks(0, 1024))
+    >>> answers = Evaluation(values=(x @ [1.0, 2.0])[:, np.newaxis], status=np.zeros(len(x), np.uint8))
+    >>> found = saltelli_indices(answers, 2, SeedTree(1))
+    >>> found.total[0].round(3).tolist(), found.blocks
+    ([0.2, 0.8], 1024)
     """
     size = (2 * sources if second_order else sources) + 2
     if evaluation.status.size % size:
@@ -319,7 +327,18 @@ def salib_estimates(
 
 
 def resample_counts(blocks: int, resamples: int, seeds: SeedTree) -> Float[np.ndarray, "row block"]:
-    """Return how often each resample holds each block [-]; the first row is no resample and holds each once."""
+    """Return how often each resample holds each block [-]; the first row is no resample and holds each once.
+
+    References
+    ----------
+    Efron & Tibshirani 1993, ch. 6: a bootstrap resample as its counts.
+
+    Examples
+    --------
+    >>> counts = resample_counts(4, 2, SeedTree(1))
+    >>> counts[0].tolist(), counts.sum(axis=1).tolist()
+    ([1.0, 1.0, 1.0, 1.0], [4.0, 4.0, 4.0])
+    """
     generator = seeds.generator()
     counts = np.ones((resamples + 1, blocks))
     for row in counts[1:]:

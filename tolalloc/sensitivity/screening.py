@@ -45,6 +45,18 @@ def pawn_index(column: Float[np.ndarray, " unit"], y: Float[np.ndarray, " unit"]
     """Return the median over classes of equal size of the Kolmogorov–Smirnov distance to the whole sample [-].
 
     The unit with the largest value of the measure is in no class, as in SALib.
+
+    References
+    ----------
+    Pianosi & Wagener 2018, with the median over the classes. 0 for no effect, up to 1; from some 100 units.
+
+    Examples
+    --------
+    Of y = x the first and the last of ten classes lie 0.9 away, the middle ones half of that.
+
+    >>> x = np.linspace(0.0, 1.0, 1001)
+    >>> round(pawn_index(x, x), 2)
+    0.7
     """
     ends = np.quantile(column, np.arange(0, 1 + 1 / CLASSES, 1 / CLASSES))
     order = np.argsort(y)
