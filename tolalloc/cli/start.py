@@ -159,7 +159,7 @@ def size_factor(diameter: float) -> float:
     """Return how much wider zones are on a pin circle of a diameter [mm] than on that of the RV-20E [-].
 
     >>> size_factor(104.0), round(size_factor(155.0), 3)
-    (1.0, 1.154)
+    (1.0, 1.159)
     """
 
     def unit(size: float) -> float:
