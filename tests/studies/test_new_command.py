@@ -13,8 +13,7 @@ from tests.studies.command import refused, tolalloc
 from tolalloc.allocation.cost.process_costs import load_process_costs
 from tolalloc.assembly.files import load_errors, load_plan
 from tolalloc.bench.measurements import load_measurements
-from tolalloc.cli.examples import EXAMPLES
-from tolalloc.cli.main import app
+from tolalloc.cli.main import EXAMPLES, app
 from tolalloc.cli.samples import FACTOR, STIFFER
 from tolalloc.cli.start import PRESETS
 from tolalloc.drawings.drawing import load_drawing

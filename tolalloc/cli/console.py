@@ -223,9 +223,9 @@ def tell(answer: Answer[Any] | Told, as_json: bool, *tables: tuple[pd.DataFrame,
         return
     for frame, title in tables:
         print_table(frame, title)
-    for sentence in answer.told:
+    for sentence in answer.sentences:
         typer.echo(sentence)
-    for warning in answer.warned:
+    for warning in answer.warnings:
         typer.secho(warning, fg="yellow")
 
 

@@ -164,7 +164,7 @@ def _run(study: Study, kinds: tuple[str, ...], folder: Path, checkpoint: Path | 
     """Run some questions of a study, write its folder and say the answers."""
     from tolalloc.reports.pdf import require_printable, write_pdf
     from tolalloc.study.questions import questions_of
-    from tolalloc.study.study import kept_beside
+    from tolalloc.study.study import cache_beside
     from tolalloc.study.study import run as run_study
 
     questions = questions_of(kinds, tuple(study.questions), f"study {study.name}")
@@ -175,7 +175,7 @@ def _run(study: Study, kinds: tuple[str, ...], folder: Path, checkpoint: Path | 
         with solvers(way.scheduler) as solved_by, shown_progress() as progress:
             found = run_study(study, folder, questions, progress, checkpoint, fresh=way.fresh, solved_by=solved_by)
     except KeyboardInterrupt:
-        kept = kept_beside(folder).folder
+        kept = cache_beside(folder).folder
         what = f"Solved units are kept in {kept}; the same command goes on from there."
         raise StoppedError(
             f"Stopped: no report was written. {what if kept.is_dir() else 'Nothing was kept.'}"

@@ -17,7 +17,7 @@ from tolalloc.reading.units import MICROMETRE, MILLIMETRE
 from tolalloc.reducers import TORQUE
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.interfaces import SOURCES
-from tolalloc.reducers.equivalent.model import EquivalentModel, remembered_model
+from tolalloc.reducers.equivalent.model import EquivalentModel, cached_model
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
 from tolalloc.reducers.equivalent.springs import HARMONICS
 from tolalloc.reducers.reducer.design import Modification, Reducer, at_torque
@@ -60,7 +60,7 @@ def bind(
     orders = tuple(sorted({*errors.orders, *(unit.orders if unit else ())}))
     carried = reducer.torque_on_carrier(torque, place)
     # The next question of the same reducer finds the tables as they are.
-    model = remembered_model(at_torque(reducer, carried), AngleSearch(), orders or HARMONICS)
+    model = cached_model(at_torque(reducer, carried), AngleSearch(), orders or HARMONICS)
     listed = {*errors.columns, *errors.fixed}
     left_out = {pattern: neglected_columns((pattern,), model.columns) - listed for pattern in neglected}
     fixed: Mapping[str, float] = {

@@ -89,7 +89,7 @@ class Portrait(Generic[Own]):
         """Which sources show at which orders, a clause that begins a sentence; nothing unless a model knows."""
         return ""
 
-    def spoken(self, output: str) -> str:
+    def display_name(self, output: str) -> str:
         """Return what a sentence calls an output, which has no unit."""
         return output.split(" [")[0]
 

@@ -105,16 +105,6 @@ class Answer(Generic[Result]):
         """Columns of the first table that a terminal shows."""
         return self.teller.shown
 
-    @property
-    def told(self) -> tuple[str, ...]:
-        """The answer in a few sentences."""
-        return self.sentences
-
-    @property
-    def warned(self) -> tuple[str, ...]:
-        """What a reader must know before acting on it."""
-        return self.warnings
-
     def add_files(self, folder: Path) -> None:
         """Add files of its own to a written report."""
         self.teller.add_files(folder)

@@ -227,7 +227,7 @@ def run(
 ) -> Run:
     """Ask all or some of a study's questions and write one new or empty folder; on any error nothing stays behind.
 
-    Progress and checkpoint are as of `Study.ask`. Solved units are kept beside the folder, in `kept_beside`, and a
+    Progress and checkpoint are as of `Study.ask`. Solved units are kept beside the folder, in `cache_beside`, and a
     run that was stopped takes them from there, unless it is to begin afresh. All others are solved by a mapper: this
     process unless given.
 
@@ -237,7 +237,7 @@ def run(
         One sentence on what is wrong.
     """
     asked = questions or tuple(study.questions)
-    kept = replace(kept_beside(folder), solved_by=solved_by).pruned()
+    kept = replace(cache_beside(folder), solved_by=solved_by).pruned()
     prepared = Prepared(study=study, mapper=solved_by if fresh else kept)
     with claimed(folder) as beside:
         answers = {
@@ -255,7 +255,7 @@ def run(
     return Run(answers=answers, folder=folder, document=document)
 
 
-def kept_beside(folder: Path) -> ResultCache:
+def cache_beside(folder: Path) -> ResultCache:
     """Return where the units of runs into neighbouring folders are kept."""
     return ResultCache(folder=folder.absolute().parent / ".tolalloc-units")
 

@@ -84,7 +84,7 @@ class Job:
     def _run(self) -> None:
         try:
             answer = self.study.ask(self.kind, "quick", self)
-            said = {"sentences": list(answer.told), "warnings": list(answer.warned)}
+            said = {"sentences": list(answer.sentences), "warnings": list(answer.warnings)}
             self.answer = said | _found(answer, self.settings)
         except _StoppedError:
             self.error = "stopped"
@@ -192,7 +192,7 @@ def _with_range(source: Source) -> Source:
 
 
 _TABS = 64
-"""Tabs whose latest request is remembered [-]."""
+"""Tabs whose latest request is known [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -187,8 +187,8 @@ MOST = 6144
 """Most units of one design [-]."""
 _STEPS = 400
 """Steps of the slider of a setting [-]."""
-_REMEMBERED = 24
-"""Designs whose solved units are remembered [-]."""
+_MOST_CACHED = 24
+"""Designs whose solved units are cached [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -302,7 +302,7 @@ class Session:
         with self._lock:
             known = self._known.pop(design, values)
             self._known[design] = max(values, known, key=len)
-            while len(self._known) > _REMEMBERED:
+            while len(self._known) > _MOST_CACHED:
                 self._known.pop(next(iter(self._known)))
 
     def examined(self, design: LiveDesign) -> list[str]:

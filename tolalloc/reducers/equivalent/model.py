@@ -148,7 +148,7 @@ class EquivalentModel:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel to another process without tables; there, every chunk of work finds the same model again."""
-        return remembered_model, (self.reducer, self.search, self.orders)
+        return cached_model, (self.reducer, self.search, self.orders)
 
     def at_torque(self, torque: float) -> EquivalentModel:
         """Return the model with the stiffness that the reducer's parts have under a torque on the carrier [N·m]."""
@@ -399,6 +399,6 @@ def _tables_at_few(reducer: Reducer, orders: tuple[int, ...], carrier_angle: byt
 
 
 @lru_cache(maxsize=2)
-def remembered_model(reducer: Reducer, search: AngleSearch, orders: tuple[int, ...]) -> EquivalentModel:
+def cached_model(reducer: Reducer, search: AngleSearch, orders: tuple[int, ...]) -> EquivalentModel:
     """Return the model of one reducer that this process has made before, with its tables, or a new one."""
     return EquivalentModel(reducer, search, orders)

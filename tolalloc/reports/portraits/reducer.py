@@ -97,9 +97,9 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
             f"disc or carrier at multiples of {stage.pin_count}"
         )
 
-    def spoken(self, output: str) -> str:
+    def display_name(self, output: str) -> str:
         """Return what a sentence calls an output; there is one peak-to-peak."""
-        return super().spoken(output).removesuffix(" transmission error")
+        return super().display_name(output).removesuffix(" transmission error")
 
     def amounts(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, float]:
         """Return the amounts that a grinder sets, and the clearances that they leave [µm]."""

@@ -85,7 +85,7 @@ class RankingTeller(Teller[RankingResult]):
     @property
     def _output(self) -> str:
         """What a sentence calls the leading output."""
-        return self._portrait.spoken(self.result.leading)
+        return self._portrait.display_name(self.result.leading)
 
     @property
     def _unit(self) -> str:
