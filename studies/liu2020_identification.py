@@ -27,7 +27,7 @@ from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.reducer.unit_file import BuiltUnit
+from tolalloc.reducers.unit_file import BuiltUnit
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.header import Header

@@ -11,8 +11,8 @@ import tolalloc as ta
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.reducer.unit_file import load_unit
 from tolalloc.reducers.scene import Scene, scene_of
+from tolalloc.reducers.unit_file import load_unit
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.moving_picture import MovingPicture
 from tolalloc.reports.scene_record import scene_record

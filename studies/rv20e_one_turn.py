@@ -15,7 +15,7 @@ from tolalloc.reducers.equivalent.hysteresis import DRAWN, LOST_MOTION, both_dir
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import attribute, forces
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reducers.unit_file import load_unit
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.figure import Figure, Series
 

@@ -15,7 +15,7 @@ from tolalloc.reducers.dynamics.motion import ASSUMPTIONS, Damping, generalised_
 from tolalloc.reducers.dynamics.speeds import Modes, OrdersAgainstSpeed, critical_speeds, modes, orders_against_speed
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reducers.unit_file import load_unit
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.figure import Figure, Series
 

@@ -9,7 +9,7 @@ from tests import builders
 from tests.compiled_first import compile_in_two_processes
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reducers.unit_file import load_unit
 from tolalloc.running.compiled import use_threads
 from tolalloc.study.prepared import Prepared
 

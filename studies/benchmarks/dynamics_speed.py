@@ -42,7 +42,7 @@ from tolalloc.reducers.equivalent.condensation import spring_groups
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.springs import Coordinates, Positions
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reducers.unit_file import load_unit
 from tolalloc.running.blas import one_blas_thread
 from tolalloc.running.compiled import use_threads
 

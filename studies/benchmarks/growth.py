@@ -37,7 +37,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reducers.unit_file import load_unit
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.plots import save_png
 

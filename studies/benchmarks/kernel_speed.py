@@ -51,7 +51,7 @@ from tests.random_cases import random_units
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reducers.unit_file import load_unit
 
 SEED = 20201121
 ALLOWED_DIFFERENCE = 1e-6  # arcsec

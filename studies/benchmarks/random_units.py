@@ -21,7 +21,7 @@ from jaxtyping import Float
 from tolalloc.reading.units import ARCSECOND, MICROMETRE
 from tolalloc.reducers.equivalent.model import EquivalentModel, count_statuses
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reducers.unit_file import load_unit
 
 CHUNK, SCALE = 1024, 3.0
 TORQUES = np.array([-167.0, -10.0, -1.0, -0.1, 1.0, 167.0])

@@ -13,7 +13,7 @@ from tolalloc.bench.measurements import Measurements
 from tolalloc.exceptions import InputError
 from tolalloc.reading.files import as_toml, require_new, write_new
 from tolalloc.reading.units import ARCSECOND, DEGREE
-from tolalloc.reducers.reducer.unit_file import write_table, write_units
+from tolalloc.reducers.unit_file import write_table, write_units
 
 
 def write_measurements(measurements: Measurements, folder: str | Path) -> Path:

@@ -12,7 +12,7 @@ from tolalloc.bench.prediction import CURVE, LOOP, PEAK_TO_PEAK, KernelPredictor
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reducers.reducer.design import Reducer
-from tolalloc.reducers.reducer.unit_file import BuiltUnit
+from tolalloc.reducers.unit_file import BuiltUnit
 
 _ANY = ("*",)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reducers.unit_file import load_unit
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "numeric.md"
 ARCSECOND = np.pi / 180 / 3600

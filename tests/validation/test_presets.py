@@ -27,7 +27,7 @@ from tolalloc.reducers.equivalent.perfect import (
 )
 from tolalloc.reducers.reducer.bearings import SLIDING_FRICTION
 from tolalloc.reducers.reducer.files import PRESETS, load_reducer
-from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reducers.unit_file import load_unit
 
 SIZES = ("rv20e", "rv40e", "rv80e", "rv110e", "rv160e")
 

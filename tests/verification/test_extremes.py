@@ -10,7 +10,7 @@ from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reducers.unit_file import load_unit
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ import pytest
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import OUTPUTS, Solved
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reducers.unit_file import load_unit
 from tolalloc.reports.tellers.transmission_error import force_figure
 
 

@@ -37,7 +37,7 @@ from tolalloc.drawings.table_file import DATA
 from tolalloc.drawings.tolerance_table import load_process_capabilities, load_tolerance_table, table_text
 from tolalloc.exceptions import TolallocError
 from tolalloc.reducers.reducer.files import PRESETS, load_identified_stiffness, load_reducer
-from tolalloc.reducers.reducer.unit_file import load_unit, load_units
+from tolalloc.reducers.unit_file import load_unit, load_units
 
 GIBIBYTE = 2**20
 """As Linux counts memory [kB]."""

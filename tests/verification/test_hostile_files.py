@@ -22,7 +22,7 @@ from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
 from tolalloc.reading.file_content import require_believable
 from tolalloc.reading.files import shipped_or_path
 from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer
-from tolalloc.reducers.reducer.unit_file import load_unit, load_units
+from tolalloc.reducers.unit_file import load_unit, load_units
 
 HEADERS, ROW = ("id", "plus", "minus", "unit", "min", "max", "cost"), ("a", 0.1, -0.1, "mm", 0.02, 0.5, 3)
 HEADER, LINE = ",".join(HEADERS), ",".join(map(str, ROW))

@@ -26,7 +26,7 @@ from tolalloc.reducers.equivalent.solvers.contact_solver import values_of
 from tolalloc.reducers.equivalent.solvers.pressing import DEEPEST, line_contact
 from tolalloc.reducers.equivalent.solvers.simd import WIDTH, aligned, load, logarithm, spread, store
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reducers.unit_file import load_unit
 from tolalloc.running.compiled import jit
 
 

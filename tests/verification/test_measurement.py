@@ -19,7 +19,7 @@ from tolalloc.bench.measurements import (
 from tolalloc.bench.readings import FULL, READINGS, RawReadings, clean_curve, clean_loop, resampled
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE
-from tolalloc.reducers.reducer.unit_file import BuiltUnit, load_units, write_units
+from tolalloc.reducers.unit_file import BuiltUnit, load_units, write_units
 
 TURN = 2 * np.pi
 ORDERS = (1, 2, 39, 78, 80)

@@ -239,7 +239,7 @@ def test_a_source_of_no_part_is_refused_by_name():
     with pytest.raises(UnknownNameError, match=r"gearbox\.pitch"):
         place_of("gearbox.pitch")
     assert is_placed("disc3.pitch")
-    assert not is_placed("flange.assembly")  # of a spring group that somebody added
+    assert not is_placed("motor.assembly")
 
 
 def read_back(scene: Scene, coarse: bool = False) -> dict:

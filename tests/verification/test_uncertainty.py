@@ -15,7 +15,7 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import load_tolerance_table, require_small_zones, table_frame, with_zones
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError
-from tolalloc.reducers.reducer.unit_file import load_unit
+from tolalloc.reducers.unit_file import load_unit
 
 SPECTRUM = ((1, 9.2), (2, 4.3), (4, 1.0))
 CASES = [

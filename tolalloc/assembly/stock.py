@@ -22,7 +22,7 @@ from tolalloc.reading.units import ARCSECOND, MICROMETRE
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.design import Reducer
-from tolalloc.reducers.reducer.unit_file import LARGEST_LENGTH
+from tolalloc.reducers.unit_file import LARGEST_LENGTH
 
 Mountings = Int[np.ndarray, "_unit _place 2"]
 """For every unit and place, the number of the part that stands there and of its turn."""

@@ -28,7 +28,7 @@ from tolalloc.drawings.table_file import read_text_table
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.files import Record, read_toml, validated
 from tolalloc.reading.units import ARCSECOND, DEGREE
-from tolalloc.reducers.reducer.unit_file import BuiltUnit, load_unit, load_units, unit_names
+from tolalloc.reducers.unit_file import BuiltUnit, load_unit, load_units, unit_names
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -58,7 +58,7 @@ def _peak_to_peak() -> float:
     from tolalloc.reading.units import ARCSECOND
     from tolalloc.reducers.equivalent.model import EquivalentModel
     from tolalloc.reducers.reducer.files import load_reducer
-    from tolalloc.reducers.reducer.unit_file import load_unit
+    from tolalloc.reducers.unit_file import load_unit
 
     reducer, unit = load_reducer("rv20e_liu2020"), load_unit("table4")
     model = EquivalentModel(reducer, orders=unit.orders)

@@ -22,8 +22,8 @@ from tolalloc.reducers.choice import bind
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import with_stiffness
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
-from tolalloc.reducers.reducer.unit_file import BuiltUnit, table_text, units_text
 from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.reducers.unit_file import BuiltUnit, table_text, units_text
 
 _WAYS = (
     ("disc?.bore?.position", "jig bored", "bored", "jig ground"),

@@ -32,7 +32,7 @@ from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.sources import ErrorSource
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import IdentifiedStiffnessRecord, ReducerRecord, load_reducer
-from tolalloc.reducers.reducer.unit_file import UnitRecord
+from tolalloc.reducers.unit_file import UnitRecord
 
 
 def _chain() -> type[BaseModel]:

@@ -23,9 +23,9 @@ from tolalloc.reducers.equivalent.springs import HARMONICS
 from tolalloc.reducers.reducer.design import Modification, Reducer, at_torque
 from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
-from tolalloc.reducers.reducer.unit_file import BuiltUnit, load_unit
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.reducers.settings import clearance_settings
+from tolalloc.reducers.unit_file import BuiltUnit, load_unit
 
 if TYPE_CHECKING:
     from tolalloc.reducers.model import ReducerModel

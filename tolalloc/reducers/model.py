@@ -20,7 +20,6 @@ from tolalloc.reducers.equivalent.hysteresis import HysteresisLoop
 from tolalloc.reducers.equivalent.perfect import exact_loop, preload, rated_pin_force
 from tolalloc.reducers.reducer.design import MODIFICATION_CONVENTION, Modification, Reducer
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
-from tolalloc.reducers.reducer.unit_file import BuiltUnit
 from tolalloc.reducers.response.kernel import (
     SEEN,
     KernelResponse,
@@ -39,6 +38,7 @@ from tolalloc.reducers.response.outputs import (
     with_orders,
 )
 from tolalloc.reducers.settings import clearance_settings, torque_condition
+from tolalloc.reducers.unit_file import BuiltUnit
 from tolalloc.running.chunks import Mapper
 
 _MULTIPLES = 4

@@ -33,7 +33,7 @@ from tolalloc.reducers.equivalent.outputs import forces
 from tolalloc.reducers.equivalent.springs import HARMONICS
 from tolalloc.reducers.reducer.design import Reducer, at_torque
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.reducer.unit_file import BuiltUnit, load_unit
+from tolalloc.reducers.unit_file import BuiltUnit, load_unit
 from tolalloc.running.progress import Progress
 
 SPECTRAL_RADIUS = 0.9

@@ -25,7 +25,7 @@ from tolalloc.reducers.equivalent.outputs import Attribution, Orders, Solved, at
 from tolalloc.reducers.equivalent.perfect import Preload, exact_unit, preload, rated_pin_force
 from tolalloc.reducers.equivalent.springs import HARMONICS
 from tolalloc.reducers.reducer.design import Reducer, at_torque
-from tolalloc.reducers.reducer.unit_file import BuiltUnit
+from tolalloc.reducers.unit_file import BuiltUnit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +94,7 @@ def transmission_error(
     Examples
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> from tolalloc.reducers.reducer.unit_file import load_unit
+    >>> from tolalloc.reducers.unit_file import load_unit
     >>> found = transmission_error(load_reducer("rv20e_liu2020"), load_unit("table4"), -1.0)
     >>> round(float(found.extremes.peak_to_peak[0]) * 206264.8, 1)  # [arcsec]
     96.6

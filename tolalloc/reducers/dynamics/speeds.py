@@ -102,7 +102,7 @@ def modes(
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> from tolalloc.reducers.dynamics.motion import inertia_of
-    >>> from tolalloc.reducers.reducer.unit_file import load_unit
+    >>> from tolalloc.reducers.unit_file import load_unit
     >>> reducer = load_reducer("rv40e_xi2015")
     >>> model = EquivalentModel(reducer)
     >>> errors = load_unit("exact").errors(model.columns, reducer.modification.deviations)[0]

@@ -62,6 +62,7 @@ class Columns:
     # Field of `tolalloc.reducers.reducer.stiffness.Stiffness` → its bilateral rows, or its elements with play behind
     # them [-]
     rows_of_stiffness: dict[str, slice]
+    stiffness: dict[str, float]  # The same → stiffness of each of its springs [N/m]
 
     @cached_property
     def matrix(self) -> Any:
@@ -109,4 +110,5 @@ def columns_of(reducer: Reducer, groups: Sequence[SpringGroup], orders: tuple[in
         count = len(group.clearance_columns) or group.stiffness.shape[1]
         rows[group.stiffness_name] = slice(row, row + count)
         row += count
-    return Columns(names=tuple(names), layout=layout, map=mapped, rows_of_stiffness=rows)
+    stiffness = {group.stiffness_name: float(group.stiffness[0, 0]) for group in groups}
+    return Columns(names=tuple(names), layout=layout, map=mapped, rows_of_stiffness=rows, stiffness=stiffness)

@@ -379,9 +379,8 @@ class EquivalentModel:
     def _derivatives(self, derivative: SolvedDerivatives) -> Derivatives:
         """Return the derivatives by columns and by named stiffnesses."""
         columns = self.error_columns
-        stiffness = self.reducer.stiffness
         by_stiffness = {
-            name: getattr(stiffness, name) * derivative.by_row[:, rows].sum(axis=1)
+            name: columns.stiffness[name] * derivative.by_row[:, rows].sum(axis=1)
             for name, rows in columns.rows_of_stiffness.items()
         }
         return Derivatives(

@@ -49,6 +49,9 @@ class ErrorSource:
         Whether its angles count from the teeth of a disc, which half a turn does not carry into those of the other one.
     neglected
         Pattern by which a table may leave it out; empty where it may not.
+    silent
+        Whether a unit that does not state it is exact there without saying so, as all that were written before the
+        source was declared.
     fine
         Whether a first study leaves it out: it is in the new table with a zone of 0.
     first_stage
@@ -64,6 +67,7 @@ class ErrorSource:
     mirror: Literal["reversed", "kept"] = "reversed"
     teeth: bool = False
     neglected: str = ""
+    silent: bool = False
     fine: bool = False
     first_stage: bool = False
     nominal: Nominal | None = None
@@ -146,6 +150,11 @@ class ErrorSources:
             if kind.column_pattern.fullmatch(column):
                 return kind
         raise UnknownNameError.among("the reducer's model", "column", column, [kind.name for kind in self.kinds])
+
+    def silent(self, columns: Iterable[str]) -> frozenset[str]:
+        """Return the columns that a unit need not state."""
+        silent = [kind.column_pattern for kind in self.kinds if kind.silent]
+        return frozenset(name for name in columns if any(own.fullmatch(name) for own in silent))
 
     @property
     def neglected(self) -> tuple[str, ...]:

@@ -12,8 +12,8 @@ from tolalloc.study.inquiry import Inquiry, ReducerName, StiffnessName, TestTorq
 
 if TYPE_CHECKING:
     from tolalloc.reducers.reducer.design import Reducer
-    from tolalloc.reducers.reducer.unit_file import BuiltUnit
     from tolalloc.reducers.transmission_error import TransmissionErrorResult
+    from tolalloc.reducers.unit_file import BuiltUnit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +32,7 @@ class TransmissionError(Inquiry["tuple[Reducer, BuiltUnit, float]"]):
     def prepare(self) -> tuple[Reducer, BuiltUnit, float]:
         """Return the design, the unit and the torque on the carrier [N·m]."""
         from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
-        from tolalloc.reducers.reducer.unit_file import load_unit
+        from tolalloc.reducers.unit_file import load_unit
 
         design = load_reducer(str(self.reducer))
         if self.stiffness:
