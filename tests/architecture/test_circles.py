@@ -13,11 +13,7 @@ from tolalloc.models.model import Model
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "tolalloc"
-REMAINING = (
-    "tolalloc.assembly",
-    "tolalloc.reducers",
-    "tolalloc.sensitivity",
-)
+REMAINING = ("tolalloc.assembly.answer",)
 """Rooms in which files still stand in a circle; to be emptied, and then to stay so."""
 MOST_NAMES, MOST_FILES_OF_ALLOCATION, MOST_MEMBERS = 16, 35, 26
 """Names in the package, files of its largest room, and public members of a model [-]."""

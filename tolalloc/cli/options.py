@@ -1,40 +1,17 @@
-"""Options that several commands share: which reducer, under which torque."""
+"""How an option is said: errors by the option's name, and a value that is no number in a sentence of ours."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
 from functools import wraps
-from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Any, get_type_hints
 
 import typer
 from typer.core import TyperGroup
 from typer.models import OptionInfo
 
 from tolalloc.exceptions import InputError
-from tolalloc.study.inquiry import DEFAULT_REDUCER
-from tolalloc.study.inquiry import named_reducer as named
-
-ReducerOption = Annotated[
-    str | None,
-    typer.Option(
-        help=f"Preset name or TOML file; {DEFAULT_REDUCER} unless given, to be given where a file is written."
-    ),
-]
-TestTorqueOption = Annotated[
-    float | None,
-    typer.Option(
-        help="Torque on the carrier [N·m], negative where it resists the rotation; the reducer's test torque unless "
-        "given."
-    ),
-]
-StiffnessOption = Annotated[str, typer.Option(help="Identified stiffness: shipped name or TOML file.")]
-
-
-def named_reducer(reducer: str | None, *written: Path | None) -> str:
-    """Return the reducer that was asked for, the default one unless given."""
-    return named(reducer, *written, argument="--reducer")
 
 
 def saying_options(command: Callable[..., None], word: str) -> Callable[..., None]:
