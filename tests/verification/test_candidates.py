@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 import tolalloc as ta
+from tests.builders import says
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.allocation.search.candidates import ALIKE, GRADES, TABLE
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
@@ -65,12 +66,12 @@ def test_free_zones_are_never_dearer_than_grades(graded):
 def test_a_table_that_costs_less_is_kept_and_said_to_be(graded):
     dearer = with_table(graded, 1.01 * graded.graded.chosen.cost)
     assert dearer.chosen is graded.graded.chosen
-    assert told(dearer).title.startswith("The cheapest verified drawing")
+    assert says(told(dearer).title, "allocation.title")
     kept = with_table(graded, 0.99 * graded.graded.chosen.cost)
     assert kept.keeps_table
     assert kept.met
-    assert told(kept).title.startswith("Keep the drawing")
-    (said,) = [sentence for sentence in told(kept).sentences if sentence.startswith("Keep the drawing: nothing")]
+    assert says(told(kept).title, "allocation.title_kept")
+    (said,) = [sentence for sentence in told(kept).sentences if says(sentence, "allocation.kept")]
     assert f"{TABLE} {kept.cost:.2f}" in said
     assert told(kept).summary["cost [cost units]"] == kept.cost
     assert sources_table(kept).frame()["cost [cost units]"].notna().all()
@@ -98,8 +99,8 @@ def test_models_that_a_verified_drawing_undercuts_bound_nothing(graded):
     undercut = with_table(graded, 0.9 * graded.bound)
     assert undercut.bound is None
     assert told(undercut).summary["lower bound [cost units]"] is None
-    assert any("so no lower bound is given" in sentence for sentence in told(undercut).sentences)
-    assert not any(sentence.startswith("Lower bound") for sentence in told(undercut).sentences)
+    assert says(told(undercut).sentences, "allocation.no_bound")
+    assert not says(told(undercut).sentences, "allocation.bound_local")
 
 
 def test_a_miss_is_titled_so(graded):
@@ -110,7 +111,7 @@ def test_a_miss_is_titled_so(graded):
     table = replace(answer.free.baseline, checks=lost.checks)
     answer = replace(answer, free=replace(answer.free, proportional_tried=(table,)))
     assert not answer.met
-    assert told(answer).title.startswith("No drawing shown to keep its limits")
+    assert says(told(answer).title, "allocation.title_missed")
 
 
 def spring(part, preload):

@@ -10,6 +10,7 @@ import pytest
 from scipy.stats import norm
 
 import tolalloc as ta
+from tests.builders import says
 from tests.studies.command import tolalloc
 from tolalloc.capability.monte_carlo import quantile_change, share_change
 from tolalloc.drawings.seeds import SeedTree
@@ -60,9 +61,9 @@ def test_two_limits_have_a_quantile_each():
     above, below = found.result.quantile_changes  # 2 % of the units beyond either
     assert above.low < narrower < above.high < 0.0
     assert 0.0 < below.low < -narrower < below.high
-    assert list(found.tables["changes"]["what"])[2:] == ["98% of gap", "2% of gap"]
-    assert "the 98% quantile of the gap by -" in found.sentences[1]
-    assert "and the 2% quantile of the gap by +" in found.sentences[1]
+    assert [own.split("%")[0] for own in found.tables["changes"]["what"]][2:] == ["98", "2"]
+    for share in ("98%", "2%"):
+        assert says(found.sentences[1], "difference.quantile", share=share, output="gap")
 
 
 def test_no_change_is_none_and_the_same_units_cancel_what_two_runs_do_not():
@@ -116,9 +117,7 @@ def test_intervals_cover():
 
 def test_few_units_beyond_a_quantile_are_warned_of():
     found = fit().ask(ta.Difference(zones={"shaft": 30.0}, units=128))
-    assert found.warnings == (
-        "Of 128 units fewer than 10 lie beyond a quantile: its interval is too narrow. Take more.",
-    )
+    assert len(found.warnings) == 1 and says(found.warnings, "difference.few", units=128, beyond=10)
 
 
 def test_a_process_prices_the_zone_that_it_holds():
