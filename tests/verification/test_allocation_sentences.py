@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
+from tests.builders import says
 from tolalloc import LOST_MOTION
 from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.cost.unit_price import YieldLadder
@@ -104,8 +105,7 @@ def test_the_certificate_says_for_which_drawings_it_holds(results):
     assert joint.bound < joint.chosen.cost
     sentence = said(results, "Lower bound by the local model around the free zones")
     assert below in sentence
-    assert "95% confidence" in sentence
-    assert "not certified for drawings that differ much" in sentence
+    assert says(sentence, "allocation.bound_local", bound=joint.bound, confidence=0.95)
     graded = said(results, "On grades")
     assert graded.endswith(f"near by: {results.graded.bound:.2f}.")
 
@@ -115,8 +115,9 @@ def test_nothing_is_certified_of_a_miss(results):
     lost = replace(results, fixed=missing(results.fixed), free=missing(results.free), graded=graded)
     sentences = answer_of(lost).sentences
     assert answer_of(lost).summary["lower bound [cost units]"] is None
-    assert not [own for own in sentences if "Lower bound" in own or "at the rate of" in own]
-    assert said(lost, "On grades").endswith(f"is {results.graded.chosen.cost:.2f}, and a limit is missed.")
+    assert not [own for own in sentences if "Lower bound" in own or says(own, "allocation.price")]
+    assert says(said(lost, "On grades"), "allocation.graded_missed")
+    assert f" {results.graded.chosen.cost:.2f}" in said(lost, "On grades")
 
 
 def test_the_certificate_table_has_bound_and_models(results):
@@ -137,26 +138,30 @@ def test_the_modification_saves_only_what_the_searches_can_tell(results):
     cost = joint.chosen.cost
     plain = replace(results, free=costing(results.free, results.free.bound), fixed=costing(results.fixed, 1e3 * cost))
     vars(plain.fixed)["lower_bound"] = replace(plain.fixed.lower_bound, cost=1e3 * cost)
-    assert "may be due to the search" not in said(plain, "The modification saves")
+    assert says(answer_of(plain).sentences, "allocation.saves")
+    assert not says(answer_of(plain).sentences, "allocation.saves_doubt")
     small = replace(results, free=joint, fixed=costing(results.fixed, 1.1 * cost))
-    sentence = said(small, f"The modification saves {0.1 * cost:.2f} cost units (9.1%)")
-    assert sentence.endswith("less than what the lower bounds leave open, so it may be due to the search.")
+    assert says(answer_of(small).sentences, "allocation.saves", saved=0.1 * cost, share=1 - 1 / 1.1)
+    assert says(answer_of(small).sentences, "allocation.saves_doubt")
     for factor in (1.0, 0.9):
         same = replace(results, free=joint, fixed=costing(results.fixed, factor * cost))
-        assert "Nothing cheaper was found with the modification free" in " ".join(answer_of(same).sentences)
-        assert "modification saves" not in " ".join(answer_of(same).sentences)
+        assert says(answer_of(same).sentences, "allocation.nothing_cheaper")
+        assert not says(answer_of(same).sentences, "allocation.saves")
 
 
 def test_a_search_that_missed_says_what(results):
-    alone = said(replace(results, fixed=missing(results.fixed)), "Tolerances alone were not verified")
-    assert "limit 50 arcsec: it keeps 53 arcsec (shown for 95.00% of units), 3 arcsec beyond; the" in alone
+    alone = answer_of(replace(results, fixed=missing(results.fixed))).sentences
+    assert says(alone, "allocation.alone_missed")
+    assert says(alone, "allocation.missed", limit=50.0, value=53.0, unit="arcsec", excess=3.0)
     joint = replace(results, free=missing(results.free, 7.0))
-    assert "57 arcsec" in said(joint, "With tolerances and modification free no design was verified")
-    assert "modification saves" not in " ".join(answer_of(joint).sentences)
+    (sentence,) = (own for own in answer_of(joint).sentences if says(own, "allocation.none_free"))
+    assert says(sentence, "allocation.missed", value=57.0)
+    assert not says(answer_of(joint).sentences, "allocation.saves")
     both = replace(joint, fixed=missing(results.fixed))
-    assert "53 arcsec" in said(both, "Nor with tolerances alone")
+    (sentence,) = (own for own in answer_of(both).sentences if says(own, "allocation.none_alone"))
+    assert says(sentence, "allocation.missed", value=53.0)
     unknown = replace(results, fixed=missing(results.fixed, np.inf))
-    assert "too many units have no answer" in said(unknown, "Tolerances alone")
+    assert says(answer_of(unknown).sentences, "allocation.missed_unanswered")
 
 
 def test_uniform_scaling_is_granted_the_limit_to_its_last_arcsecond(results):
@@ -165,8 +170,8 @@ def test_uniform_scaling_is_granted_the_limit_to_its_last_arcsecond(results):
     least = hand.cost * min(1.0, hand.quantile_bound / joint.limit)
     assert results.least_saving == pytest.approx(1 - chosen.cost / least)
     sentence = said(results, "Cost ")
-    assert f"with the modification as it is ({hand.cost:.2f})" in sentence
-    assert f"used the limit to its last arcsecond ({least:.2f})" in sentence
+    assert says(sentence, "allocation.cost", cost=chosen.cost, alike=hand.cost)
+    assert says(sentence, "allocation.cost_used", least=least)
     assert answer_of(results).summary["saving at least [-]"] == pytest.approx(1 - chosen.cost / least)
 
 
@@ -187,13 +192,13 @@ def ladder(prices) -> YieldLadder:
 )
 def test_the_cheapest_good_unit_at_the_end_of_the_ladder_is_no_optimum(results, prices, words):
     sentence = said(replace(results, prices=ladder(prices)), words)
-    assert "by the local models, not verified; units beyond the peak-to-peak limit alone" in sentence
+    assert says(sentence, "allocation.good", output="peak-to-peak")
 
 
 def test_where_no_yield_has_a_price_one_sentence_says_so(results):
     nothing = replace(results, prices=ladder([np.nan] * 3))
-    assert said(nothing, "No good unit has a price: no yield")
-    assert not [own for own in answer_of(nothing).sections if own.heading == "What a good unit costs"]
+    assert says(answer_of(nothing).sentences, "allocation.good_none")
+    assert not says((own.heading for own in answer_of(nothing).sections), "allocation.heading_good_unit")
     assert "nan" not in " ".join(answer_of(nothing).sentences)
     assert not [own for own in answer_of(replace(results, prices=None)).sentences if "good unit" in own]
 
@@ -204,7 +209,7 @@ def test_a_yield_that_the_units_cannot_show_has_no_price(results):
 
 
 def test_costs_are_changed_to_corners(results):
-    assert "In 3 random corners of ±20 % on every cost the free zones are at most" in said(results, "In 3 random")
+    assert says(answer_of(results).sentences, "allocation.corners", count=3, change=20)
     assert len(results.robustness.costs) == 3
     assert "free zones cost more by [%]" in tables.variants_frame(results.robustness, "cost units").columns
 
@@ -221,9 +226,8 @@ def test_the_quantile_of_the_units_is_what_the_target_share_keeps(results):
     assert np.count_nonzero(radial >= table[at][2]) / radial.size >= target > np.mean(radial > table[at][2])
     assert np.isnan(table[at][1])  # a Cpk
     first = section(results, "Requirements").paragraphs[0]
-    assert (
-        f"95.00% of these units keep at most {value:.4g} arcsec; {results.chosen.quantile_bound:.4g} arcsec is" in first
-    )
+    shown = results.chosen.quantile_bound
+    assert says(first, "allocation.quantile_upper", target=0.95, kept=value, unit="arcsec", value=shown)
 
 
 def test_prices_are_marginal_and_per_what_the_limit_is_large_of(results):
@@ -232,7 +236,7 @@ def test_prices_are_marginal_and_per_what_the_limit_is_large_of(results):
     assert limit_price(replace(side, limit=0.5), 0.9) == (0.09, "0.1 arcsec")
     price = results.free.prices[side.stack.name]
     sentence = said(results, "peak-to-peak transmission error: at its limit of 50 arcsec")
-    assert f"at the rate of {price:.3g} cost units per arcsec" in sentence
+    assert says(sentence, "allocation.price", price=price, cost_unit="cost units", per="arcsec")
 
 
 def test_prices_below_the_noise_of_the_solver_are_nothing(results):
@@ -251,7 +255,7 @@ def test_prices_below_the_noise_of_the_solver_are_nothing(results):
 def test_failed_units_are_counted_by_a_yield_alone(results):
     statuses = {"equilibrium found": 9, "no equilibrium": 2}
     (sentence,) = [own for own in answer_of(results, statuses=statuses).warnings if "no answer" in own]
-    assert sentence == "2 units have no answer; a yield counts them as outside the limits, a Cpk leaves them out."
+    assert says(sentence, "allocation.failed_many", count=2)
 
 
 def test_a_stiffness_that_breaks_the_free_zones_is_said_of_them(results):
@@ -269,7 +273,7 @@ def test_a_trade_without_any_cost_is_said_in_words(results):
     trade = replace(results.trade, cost=np.full_like(results.trade.cost, np.nan), error=np.nan)
     nothing = replace(results, trade=trade)
     told = section(nothing, "Modification against tolerances")
-    assert told.paragraphs == ("With no choice that was tried were zones found that keep all requirements.",)
+    assert len(told.paragraphs) == 1 and says(told.paragraphs, "allocation.trade_none")
     assert told.figures == ()
     assert len(section(results, "Modification against tolerances").figures) == 2
     for own in answer_of(nothing).sections:
@@ -278,7 +282,7 @@ def test_a_trade_without_any_cost_is_said_in_words(results):
 
 def test_the_front_says_how_sure_it_is_and_marks_its_knee(results):
     front = figures.front_figure(results, results.fronts, "cost units")
-    assert "the search keeps the other requirements by their local models" in front.title
+    assert says(front.title, "allocation.figure_front_others")
     (knee,) = [series for series in front.series if series.label.startswith("knee")]
     searched = results.fronts.searched
     assert (knee.x, knee.y) == ([searched.quantile[searched.knee]], [searched.cost[searched.knee]])
