@@ -330,7 +330,7 @@ def test_the_files_read_back_have_the_verified_yield_and_cost(drawn, tmp_path):
 
 @pytest.mark.slow
 def test_the_table_reads_back_with_the_prices_of_the_drawing(priced, tmp_path):
-    write_drawing(priced, tmp_path)
+    write_drawing(priced, Header(name=priced.name, model=priced.model.name), tmp_path)
     read = load_tolerance_table(tmp_path / "allocation.csv")
     assert sum(own.cost for own in read) == pytest.approx(priced.chosen.cost, rel=1e-9)
     again = load_process_costs("rv20e", read)
