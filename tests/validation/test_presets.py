@@ -17,17 +17,11 @@ from tolalloc.reading.units import ARCMINUTE
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import forces, order_spectrum
-from tolalloc.reducers.equivalent.perfect import (
-    FACTOR,
-    against_catalogue,
-    exact_loop,
-    preload,
-    rated_pin_force,
-    twist_shares,
-)
+from tolalloc.reducers.equivalent.perfect import exact_loop, preload, rated_pin_force
 from tolalloc.reducers.reducer.bearings import SLIDING_FRICTION
 from tolalloc.reducers.reducer.files import PRESETS, load_reducer
 from tolalloc.reducers.unit_file import load_unit
+from tolalloc.reports.portraits.reducer import FACTOR, against_catalogue, twist_table
 
 SIZES = ("rv20e", "rv40e", "rv80e", "rv110e", "rv160e")
 
@@ -87,7 +81,7 @@ def test_orders_that_are_rounding_are_no_main_orders():
 
 @pytest.mark.parametrize("size", ["rv20e", "rv80e", "rv20e_liu2020"])
 def test_the_shares_of_the_twist_are_the_whole(size):
-    shares = twist_shares(load_reducer(size)).set_index("part")["share of the twist [%]"]
+    shares = twist_table(load_reducer(size)).set_index("part")["share of the twist [%]"]
     assert shares.sum() == pytest.approx(100.0, abs=0.06)  # eleven rounded numbers
     assert (shares > -0.5).all()
     if size == "rv20e":

@@ -11,9 +11,10 @@ from tests.studies.command import refused, tolalloc
 from tolalloc.bench.catalogue import BEARINGS, identify_from_catalogue, with_bearings
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCMINUTE
-from tolalloc.reducers.equivalent.perfect import exact_loop, twist_shares
+from tolalloc.reducers.equivalent.perfect import exact_loop
 from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.reports.header import Header
+from tolalloc.reports.portraits.reducer import twist_table
 from tolalloc.study.answer import Answer
 
 
@@ -31,7 +32,7 @@ def test_the_factor_gives_the_rigidity_of_the_catalogue(found):
 
 def test_its_slope_is_that_of_the_bearings_share_of_the_twist(found):
     """By virtual work a spring's share of the twist is how much the rigidity feels it; shares are taken secant-wise."""
-    shares = twist_shares(found.after)
+    shares = twist_table(found.after)
     bearings = shares[shares["part"].str.contains("bearing")]["share of the twist [%]"].sum() / 100
     assert found.slope == pytest.approx(bearings, abs=0.05)
 

@@ -34,20 +34,23 @@ def is_large(stage: CycloidStage, modification: Modification) -> bool:
     return max(abs(amount) for amount in amounts) > LARGE
 
 
-def linear_model_warnings(stage: CycloidStage, modification: Modification) -> tuple[str, ...]:
-    """Return what a reader of a model with linear gaps must know of a modification, if anything."""
-    if not is_large(stage, modification):
-        return ()
-    return (
-        f"The modification is above {LARGE / MICROMETRE:g} µm, where the linear gaps of the equivalent model are no "
-        "longer good to 0.3 µm; tolalloc contact takes exact distances.",
-    )
-
-
 def linear_clearance(
     stage: CycloidStage, modification: Modification, pin_angle: Angles
 ) -> Float[np.ndarray, "*angles"]:
-    """Return the material removed along the normal, Δr_rp − Δr_p·cos κ + δ·r_d·|S|, theory page equation (35) [m]."""
+    """Return the material removed along the normal, Δr_rp − Δr_p·cos κ + δ·r_d·|S|, theory page equation (35) [m].
+
+    First order in the amounts: good to 0.3 µm up to `LARGE`.
+
+    Examples
+    --------
+    At root and tip, where cos κ is 1, equidistant less shift amount.
+
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> stage = load_reducer("rv20e").cycloid_stage
+    >>> amounts = Modification(equidistant=20e-6, shift=12e-6)
+    >>> (1e6 * linear_clearance(stage, amounts, np.array([0.0, np.pi]))).round(6).tolist()
+    [8.0, 8.0]
+    """
     into = normals(stage.shortening, pin_angle)
     turned = modification.rotation * stage.disc_pitch_radius * np.abs(into.lever)
     return np.asarray(modification.equidistant - modification.shift * into.along_radius + turned)

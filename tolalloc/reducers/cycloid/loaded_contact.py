@@ -445,7 +445,11 @@ class Assessment:
 
 
 def disc_share(discs: int) -> float:
-    """Return the share of the torque on the most loaded disc: Li Lixing's 0.55 of a pair, others in proportion [-]."""
+    """Return the share of the torque on the most loaded disc: Li Lixing's 0.55 of a pair, others in proportion [-].
+
+    >>> disc_share(2), round(disc_share(3), 4)
+    (0.55, 0.3667)
+    """
     return 1.0 if discs == 1 else 2 * PAIR_SHARE / discs
 
 
@@ -454,6 +458,14 @@ def pin_moment(reducer: Reducer, torque: float) -> float:
 
     The housing holds what the sun does not, T·(1 − 1/i). All pin forces pass through the pole, e·zp from the housing's
     centre and e·zc from the disc's, so of that moment zc/zp is left about the disc.
+
+    Examples
+    --------
+    The RV-20E, i = 105, zc = 39, zp = 40, at its rated 167 N·m: 167·104/105·39/40 N·m.
+
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> round(pin_moment(load_reducer("rv20e"), 167.0), 3)
+    161.274
     """
     stage = reducer.cycloid_stage
     return torque * (1.0 - 1.0 / reducer.ratio) * stage.disc_teeth / stage.pin_count

@@ -10,20 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import pi
-from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from tolalloc.reading.units import ARCMINUTE
 from tolalloc.reducers.equivalent.hysteresis import BACKLASH, TURN_ANGLES, HysteresisLoop, hysteresis_loop, sliding_ways
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import Solved, forces
 from tolalloc.reducers.reducer.design import Reducer, at_torque, compliances
-
-if TYPE_CHECKING:
-    import pandas as pd
-
 
 PHASES = 72
 """Phases of one pin pitch at which a reducer without errors is solved, for forces over the turn [-]."""
@@ -89,13 +83,6 @@ def preload(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) 
     )
 
 
-FACTOR = 1.5
-"""Model over catalogue, or catalogue over model, from which on a difference is a warning [-]."""
-
-USUAL_TWIST = 3.6
-"""Rated torque over torsional rigidity of RV reducers in catalogues, 2.9 to 4.0 over all sizes [arcmin]."""
-
-_PER_MICROMETRE = 1e-6  # N/µm per N/m
 _INTERFACES = ("sun_support", "gear_mesh", "crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing")
 
 
@@ -104,14 +91,21 @@ def rated_pin_force(reducer: Reducer) -> float:
     return float(perfect_reducer(reducer, -reducer.load.rated_torque).forces.pins.max())
 
 
-def twist_shares(reducer: Reducer) -> pd.DataFrame:
-    """Return which part yields how much of the twist of the perfect reducer at rated torque.
+@dataclass(frozen=True)
+class TwistShare:
+    """What one part yields of the twist."""
+
+    part: str
+    share: float  # Of the twist [-]
+    stiffness: float  # Under its force; NaN of pins and teeth, whose stiffness changes with the angle [N/m]
+
+
+def twist_shares(reducer: Reducer) -> tuple[TwistShare, ...]:
+    """Return which part yields how much of the twist of the perfect reducer at rated torque, the largest share first.
 
     By virtual work T·θ is the sum of force times way over all springs, each interface divided among its parts by their
     compliances; what is left is that of pins and teeth, their clearance included. Mean over a pin pitch.
     """
-    import pandas as pd
-
     perfect = perfect_reducer(reducer, -reducer.load.rated_torque)
     solved, found = perfect.equilibria, perfect.forces
     own, torque = solved.reducer, solved.torque
@@ -123,41 +117,6 @@ def twist_shares(reducer: Reducer) -> pd.DataFrame:
         left -= share
         plain = {interface.replace("_", " ").replace("crank ", "crank–"): 1.0 / stiffness}
         for name, compliance in parts.get(interface, plain).items():
-            part = 100.0 * share * compliance * stiffness
-            rows.append((name, round(part, 2), round(_PER_MICROMETRE / compliance, 1)))
-    rows.append(("pins and teeth, with their clearance", round(100.0 * left, 2), np.nan))
-    frame = pd.DataFrame(rows, columns=["part", "share of the twist [%]", "stiffness under its force [N/µm]"])
-    return frame.sort_values("share of the twist [%]", ascending=False, ignore_index=True)
-
-
-def against_catalogue(reducer: Reducer, loop: HysteresisLoop, sample: int = -1) -> tuple[str, tuple[str, ...]]:
-    """Return a sentence on rigidity and lost motion beside the catalogue's, and warnings where they are far apart.
-
-    The sample of the loop is the perfect reducer's. Without a catalogue the sentence is empty, and the warning is about
-    what all sizes of catalogues have in common.
-    """
-    stated = reducer.catalogue
-    rigidity, lost = loop.torsional_stiffness[sample] * ARCMINUTE, loop.lost_motion[sample] / ARCMINUTE
-    if stated is None:
-        twist = reducer.load.rated_torque / rigidity
-        if USUAL_TWIST / FACTOR**2 <= twist <= USUAL_TWIST * FACTOR**2:
-            return "", ()
-        return "", (
-            f"The perfect reducer twists by {twist:.2g}′ under its rated torque; sizes in catalogues twist by 3 to 4′. "
-            "Do not trust what depends on the load: state bearings by their dimensions, or a [catalogue] to compare "
-            "with.",
-        )
-    wanted, largest = stated.torsional_rigidity * ARCMINUTE, stated.lost_motion / ARCMINUTE
-    sentence = (
-        f"Without part errors the torsional rigidity is {rigidity:.3g} N·m/arcmin where the catalogue states "
-        f"{wanted:.3g} ({100 * (rigidity / wanted - 1):+.0f} %), the lost motion {lost:.2g}′ where it allows "
-        f"{largest:.2g}′."
-    )
-    warnings = []
-    if not 1 / FACTOR <= rigidity / wanted <= FACTOR:
-        off = rigidity / wanted
-        times = f"{off:.3g} times as stiff as" if off > 1 else f"{1 / off:.3g} times softer than"
-        warnings.append(f"The model is {times} the catalogue states: do not trust what depends on the load.")
-    if lost > largest:
-        warnings.append(f"The perfect reducer's lost motion of {lost:.2g}′ is above the catalogue's {largest:.2g}′.")
-    return sentence, tuple(warnings)
+            rows.append(TwistShare(name, share * compliance * stiffness, 1.0 / compliance))
+    rows.append(TwistShare("pins and teeth, with their clearance", left, np.nan))
+    return tuple(sorted(rows, key=lambda own: -round(100.0 * own.share, 2)))

@@ -16,13 +16,13 @@ from tolalloc.models.model import Units
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE
 from tolalloc.reducers import PRELOAD
 from tolalloc.reducers.contact import contact_of
-from tolalloc.reducers.cycloid.clearance import linear_model_warnings
-from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop
+from tolalloc.reducers.cycloid.clearance import LARGE, is_large
+from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
 from tolalloc.reducers.equivalent.model import OUTCOMES, Equilibria
 from tolalloc.reducers.equivalent.outputs import order_spectrum
-from tolalloc.reducers.equivalent.perfect import against_catalogue
+from tolalloc.reducers.equivalent.perfect import twist_shares
 from tolalloc.reducers.model import ReducerModel
-from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.design import CycloidStage, Modification, Reducer
 from tolalloc.reducers.scene import PER_CRANK_TURN, Scene, is_placed, scene_of
 from tolalloc.reducers.settings import FLANK, RADIAL
 from tolalloc.reports.document import Section
@@ -46,6 +46,12 @@ _COUNTED = (
     "least radial clearance [µm]",
 )
 """What a summary says of the random units of a check."""
+
+FACTOR = 1.5
+"""Model over catalogue, or catalogue over model, from which on a difference is a warning [-]."""
+
+USUAL_TWIST = 3.6
+"""Rated torque over torsional rigidity of RV reducers in catalogues, 2.9 to 4.0 over all sizes [arcmin]."""
 
 
 class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
@@ -145,6 +151,62 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
     ) -> tuple[Section, ...]:
         """Return the moving picture of a unit, coloured by its sources' shares."""
         return sections_of("The reducer", lambda: _moving(self.model, errors, x, shares, unit))
+
+
+# What every report says
+
+
+def against_catalogue(reducer: Reducer, loop: HysteresisLoop, sample: int = -1) -> tuple[str, tuple[str, ...]]:
+    """Return a sentence on rigidity and lost motion beside the catalogue's, and warnings where they are far apart.
+
+    The sample of the loop is the perfect reducer's. Without a catalogue the sentence is empty, and the warning is about
+    what all sizes of catalogues have in common.
+    """
+    stated = reducer.catalogue
+    rigidity, lost = loop.torsional_stiffness[sample] * ARCMINUTE, loop.lost_motion[sample] / ARCMINUTE
+    if stated is None:
+        twist = reducer.load.rated_torque / rigidity
+        if USUAL_TWIST / FACTOR**2 <= twist <= USUAL_TWIST * FACTOR**2:
+            return "", ()
+        return "", (
+            f"The perfect reducer twists by {twist:.2g}′ under its rated torque; sizes in catalogues twist by 3 to 4′. "
+            "Do not trust what depends on the load: state bearings by their dimensions, or a [catalogue] to compare "
+            "with.",
+        )
+    wanted, largest = stated.torsional_rigidity * ARCMINUTE, stated.lost_motion / ARCMINUTE
+    sentence = (
+        f"Without part errors the torsional rigidity is {rigidity:.3g} N·m/arcmin where the catalogue states "
+        f"{wanted:.3g} ({100 * (rigidity / wanted - 1):+.0f} %), the lost motion {lost:.2g}′ where it allows "
+        f"{largest:.2g}′."
+    )
+    warnings = []
+    if not 1 / FACTOR <= rigidity / wanted <= FACTOR:
+        off = rigidity / wanted
+        times = f"{off:.3g} times as stiff as" if off > 1 else f"{1 / off:.3g} times softer than"
+        warnings.append(f"The model is {times} the catalogue states: do not trust what depends on the load.")
+    if lost > largest:
+        warnings.append(f"The perfect reducer's lost motion of {lost:.2g}′ is above the catalogue's {largest:.2g}′.")
+    return sentence, tuple(warnings)
+
+
+def linear_model_warnings(stage: CycloidStage, modification: Modification) -> tuple[str, ...]:
+    """Return what a reader of a model with linear gaps must know of a modification, if anything."""
+    if not is_large(stage, modification):
+        return ()
+    return (
+        f"The modification is above {LARGE / MICROMETRE:g} µm, where the linear gaps of the equivalent model are no "
+        "longer good to 0.3 µm; tolalloc contact takes exact distances.",
+    )
+
+
+def twist_table(reducer: Reducer) -> pd.DataFrame:
+    """Return which part yields how much of the twist at rated torque."""
+    import pandas as pd
+
+    rows = [
+        (own.part, round(100.0 * own.share, 2), round(own.stiffness * MICROMETRE, 1)) for own in twist_shares(reducer)
+    ]
+    return pd.DataFrame(rows, columns=["part", "share of the twist [%]", "stiffness under its force [N/µm]"])
 
 
 # What a check says

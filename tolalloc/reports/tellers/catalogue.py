@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from tolalloc.bench.catalogue import RIGIDITY_UNCERTAINTY, CatalogueResult
 from tolalloc.reading.units import ARCMINUTE
-from tolalloc.reducers.equivalent.perfect import twist_shares
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.reports.document import Section
+from tolalloc.reports.portraits.reducer import twist_table
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.templates import Sentences
 
@@ -37,7 +37,7 @@ class CatalogueTeller(Teller[CatalogueResult]):
     @cached_property
     def shares(self) -> pd.DataFrame:
         """Which part yields how much of the twist with the factor."""
-        return twist_shares(self.result.after)
+        return twist_table(self.result.after)
 
     @property
     def sentences(self) -> tuple[str, ...]:

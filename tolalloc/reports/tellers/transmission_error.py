@@ -10,16 +10,16 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE
-from tolalloc.reducers.cycloid.clearance import linear_model_warnings
 from tolalloc.reducers.equivalent.hysteresis import LOOP_ASSUMPTION, FrictionLoop, HysteresisLoop
 from tolalloc.reducers.equivalent.model import Equilibria
 from tolalloc.reducers.equivalent.outputs import OUTPUTS, Attribution, forces
-from tolalloc.reducers.equivalent.perfect import PRELOAD_ASSUMPTION, against_catalogue, twist_shares
+from tolalloc.reducers.equivalent.perfect import PRELOAD_ASSUMPTION
 from tolalloc.reducers.reducer.bearings import CONTACTS, friction_assumptions
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.transmission_error import TransmissionErrorResult
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
+from tolalloc.reports.portraits.reducer import against_catalogue, linear_model_warnings, twist_table
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.templates import Sentences
 
@@ -105,7 +105,7 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
             tables=(("one turn", self.turn_table),),
             unfolded=True,
         )
-        twist = (("twist", twist_shares(reducer)),)
+        twist = (("twist", twist_table(reducer)),)
         found = [turn, Section(heading=_say("twist_heading"), paragraphs=(_say("twist"),), tables=twist)]
         if friction:
             found.append(
