@@ -131,8 +131,8 @@ def _moved(
     """Return units a part of the way to the extremes of the zones along the gradients."""
     moved, errors = np.empty_like(units), experiment.errors
     for source, own in zip(errors.active, errors.columns_of_source, strict=True):
-        extremes = extreme_in_zone(source, units[:, own], gradients[:, own])
-        moved[:, own] = moved_towards(source, units[:, own], extremes, part)
+        extremes = _extreme_in_zone(source, units[:, own], gradients[:, own])
+        moved[:, own] = _moved_towards(source, units[:, own], extremes, part)
     return moved
 
 
@@ -149,7 +149,7 @@ def _result(experiment: Experiment[ResponseWithDerivatives], sense: int, worst: 
     )
 
 
-def extreme_in_zone(
+def _extreme_in_zone(
     source: Source, units: Float[np.ndarray, "unit column"], gradients: Float[np.ndarray, "unit column"]
 ) -> Float[np.ndarray, "unit column"]:
     """Return, for every unit, the part inside the zone that goes furthest along a gradient.
@@ -190,7 +190,7 @@ def extreme_in_zone(
     return _filled(source, phases)
 
 
-def moved_towards(
+def _moved_towards(
     source: Source,
     units: Float[np.ndarray, "unit column"],
     targets: Float[np.ndarray, "unit column"],

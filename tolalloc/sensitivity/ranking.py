@@ -124,7 +124,7 @@ class SourceRanking:
 
     def among_first(self, count: int) -> Float[np.ndarray, " source"]:
         """Return the share of resamples in which each source is among the first ``count`` [-]."""
-        require_places(count, len(self.sources))
+        _require_places(count, len(self.sources))
         return np.asarray((ranks(self.total_resamples) <= count).mean(axis=0))
 
     def replicated_by(self, other: SourceRanking) -> Replication:
@@ -210,17 +210,17 @@ def _more_blocks(difference: float, deviation: float, blocks: int) -> int | None
 
 def _tails(confidence: float) -> tuple[float, float]:
     """Return the shares below the ends of a two-sided interval [-]."""
-    require_confidence(confidence)
+    _require_confidence(confidence)
     return (1 - confidence) / 2, (1 + confidence) / 2
 
 
-def require_confidence(value: float) -> None:
+def _require_confidence(value: float) -> None:
     """Raise unless a confidence lies between 0 and 1."""
     if not 0 < value < 1:
         raise InputError.at("ranking", "confidence", value, "a number between 0 and 1")
 
 
-def require_places(count: int, sources: int) -> None:
+def _require_places(count: int, sources: int) -> None:
     """Raise unless so many sources exist."""
     if not 1 <= count <= sources:
         raise InputError.at("ranking", "number of first sources", count, f"1 to {sources}")
@@ -292,14 +292,14 @@ def until_converged(
     >>> until_converged(lambda blocks: same, ["a", "b"], 2, start=64, limit=64).stable
     False
     """
-    require_confidence(probability)
+    _require_confidence(probability)
     if not 2 <= start <= limit:
         raise InputError.at("ranking", "first number of blocks", start, f"2 to the limit {limit}")
     history, names = list[Step](), np.array(list(groups))
     blocks = start
     while blocks <= limit:
         indices, resamples = resampled(blocks)
-        require_places(count, indices.size)
+        _require_places(count, indices.size)
         first = np.argsort(-indices, kind="stable")[:count]
         same = (names[np.argsort(-resamples, axis=1, kind="stable")[:, :count]] == names[first]).all(axis=1)
         history.append(Step(blocks=blocks, first=tuple(first.tolist()), probability=float(same.mean())))

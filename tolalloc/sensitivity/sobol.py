@@ -128,7 +128,7 @@ class SobolAnalysis:
     @cached_property
     def overall(self) -> SourceRanking:
         """The ranking over all outputs."""
-        return overall_ranking(self.sources, self.outputs, self.ranked, self.indices)
+        return _overall_ranking(self.sources, self.outputs, self.ranked, self.indices)
 
     def position(self, output: str | int) -> int:
         """Return the position of an output [-].
@@ -156,10 +156,10 @@ class SobolAnalysis:
         """
         at, counts = self.position(output), self.outputs[self.position(output)] in self.ranked
         blocks = self.blocks if counts else self.blocks_of_others
-        return indices_of(self.indices, at, self.outputs[at], self.sources, blocks, self.samples)
+        return _indices_of(self.indices, at, self.outputs[at], self.sources, blocks, self.samples)
 
 
-def indices_of(
+def _indices_of(
     found: SaltelliIndices, at: int, output: str, sources: tuple[str, ...], blocks: int, samples: int
 ) -> SobolIndices:
     """Return the indices at one place, of an output from so many blocks of an analysis with so many samples [-].
@@ -186,7 +186,7 @@ def indices_of(
     )
 
 
-def overall_ranking(
+def _overall_ranking(
     sources: tuple[str, ...], outputs: tuple[str, ...], ranked: tuple[str, ...], indices: SaltelliIndices
 ) -> SourceRanking:
     """Return the ranking over those outputs that count and vary: the total index of a source is its largest one.
@@ -390,7 +390,7 @@ class _Blocks:
             self.answers = replace(first, values=first.values[:, self.kept])
             self.steps.append(self._indices(first))
         outputs = self.experiment.response.outputs if len(self.steps) == 1 else self.further.outputs
-        ranking = overall_ranking(self.design.names, outputs, self.counted, self.steps[-1])
+        ranking = _overall_ranking(self.design.names, outputs, self.counted, self.steps[-1])
         return ranking.total, ranking.total_resamples
 
     @property
@@ -476,4 +476,4 @@ def regrouped(
         largest_failed_share=experiment.largest_failed_share,
         resamples=analysis.indices.total_resamples.shape[1],
     )
-    return indices_of(found, 0, analysis.outputs[0], design.names, found.blocks, together.status.size)
+    return _indices_of(found, 0, analysis.outputs[0], design.names, found.blocks, together.status.size)

@@ -228,7 +228,7 @@ class Spline:
 
         zones, costs = np.array(self.points.zones), np.array(self.points.costs)
         monotone = PchipInterpolator(zones, costs)(zones, 1)
-        return CubicHermiteSpline(zones, costs, convex_slopes(np.diff(costs) / np.diff(zones), monotone))
+        return CubicHermiteSpline(zones, costs, _convex_slopes(np.diff(costs) / np.diff(zones), monotone))
 
     def value(self, zone: Float[np.ndarray, "*zones"]) -> Float[np.ndarray, "*zones"]:
         """Return the cost [cost units]."""
@@ -273,7 +273,7 @@ class Spline:
         return Spline(self.points.rescaled(unit))
 
 
-def convex_slopes(
+def _convex_slopes(
     secants: Float[np.ndarray, " piece"], slopes: Float[np.ndarray, " point"]
 ) -> Float[np.ndarray, " point"]:
     """Return slopes that make the spline convex, or the given ones where none do.
@@ -293,7 +293,7 @@ def convex_slopes(
 
     Examples
     --------
-    >>> convex_slopes(np.array([-3.0, -1.0]), np.array([-3.5, -1.5, -0.2]))
+    >>> _convex_slopes(np.array([-3.0, -1.0]), np.array([-3.5, -1.5, -0.2]))
     array([-3.5, -2. , -0.2])
     """
     falls = -secants

@@ -202,7 +202,7 @@ class LagrangeDual:
 
     def planes(self, zones: Float[np.ndarray, " feature"]) -> Float[np.ndarray, "stack feature"]:
         """Return the directions whose planes touch the norms at the given zones."""
-        return unit_rows(self._root_sum_square * zones)
+        return _unit_rows(self._root_sum_square * zones)
 
     def price(self, prices: Float[np.ndarray, " stack"], planes: Float[np.ndarray, "stack feature"]) -> PricedProcesses:
         """Return the least priced cost of every process, for prices of 0 or above and planes of unit length."""
@@ -254,7 +254,7 @@ class LagrangeDual:
         return float(least.sum()) + priced.constant
 
 
-def unit_rows(rows: Float[np.ndarray, "row column"]) -> Float[np.ndarray, "row column"]:
+def _unit_rows(rows: Float[np.ndarray, "row column"]) -> Float[np.ndarray, "row column"]:
     """Return rows of length one; a row of zeros stays one."""
     length = np.linalg.norm(rows, axis=1, keepdims=True)
     return rows / np.where(length > 0, length, 1.0)
@@ -298,7 +298,7 @@ def ascend(
     def falling(free: Float[np.ndarray, " free"]) -> tuple[float, Float[np.ndarray, " free"]]:
         prices, rows = np.exp(free[:stacks]), free[stacks:].reshape(-1, start.planes.shape[1])
         planes = start.planes.copy()
-        planes[moving] = unit_rows(rows)
+        planes[moving] = _unit_rows(rows)
         priced = dual.price(prices, planes)
         tried.append(priced)
         bound = dual.bound(priced, allowed)

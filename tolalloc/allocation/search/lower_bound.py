@@ -57,7 +57,7 @@ def lower_bound(design: VerifiedDesign) -> LowerBound:
     return LowerBound(
         cost=least_cost(design, cheapest) + space.locked_cost,
         confidence=CONFIDENCE,
-        certified=is_certified(design),
+        certified=_is_certified(design),
     )
 
 
@@ -84,7 +84,7 @@ def least_cost(design: VerifiedDesign, cheapest: Cheapest) -> float:
     return min(free, again[0] if again else free)
 
 
-def is_certified(design: VerifiedDesign) -> bool:
+def _is_certified(design: VerifiedDesign) -> bool:
     """Return whether the bound holds for all allowed designs rather than near this one."""
     shared = design.space.shared
     if np.any(shared.upper > shared.lower):

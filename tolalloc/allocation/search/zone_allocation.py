@@ -315,8 +315,8 @@ class ZoneAllocation:
             self,
             chosen=chosen,
             tried=every,
-            optimum=cheapest_by_models(chosen.space, chosen, every, margin=0.0),
-            inside=cheapest_by_models(chosen.space, chosen, every, margin=1.0),
+            optimum=_cheapest_by_models(chosen.space, chosen, every, margin=0.0),
+            inside=_cheapest_by_models(chosen.space, chosen, every, margin=1.0),
         )
 
     @cached_property
@@ -369,7 +369,7 @@ def require_groups(space: DesignSpace, place: str) -> None:
         raise InputError(f"{place}, tolerance table: every zone is locked or zero, so there is nothing to allocate.")
 
 
-def cheapest_by_models(
+def _cheapest_by_models(
     space: DesignSpace, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margin: float
 ) -> Solution:
     """Return the cheapest design that the models of a verified one let keep the limits.
@@ -430,7 +430,7 @@ def allocate(
         chosen=chosen,
         tried=tried,
         proportional_tried=proportional_tried,
-        optimum=cheapest_by_models(space, chosen, tried, margin=0.0),
-        inside=cheapest_by_models(space, chosen, tried, margin=1.0),
+        optimum=_cheapest_by_models(space, chosen, tried, margin=0.0),
+        inside=_cheapest_by_models(space, chosen, tried, margin=1.0),
         locked_cost=space.locked_cost,
     )

@@ -68,10 +68,10 @@ _ROUNDING = 1e-9
 """What a number may lose between units, and a zone on its way through a table [-]."""
 
 
-def size_step(nominal: float) -> int:
+def _size_step(nominal: float) -> int:
     """Return the position of the size step of a nominal size [m]; one outside 0 to 500 mm is an InputError.
 
-    >>> SIZE_STEPS[size_step(0.052)]
+    >>> SIZE_STEPS[_size_step(0.052)]
     80
     """
     size = nominal / MILLIMETRE
@@ -86,7 +86,7 @@ def grade_zones(nominal: float) -> dict[str, float]:
     >>> round(grade_zones(0.052)["IT6"] * 1e6), round(grade_zones(0.052)["IT12"] * 1e6)
     (19, 300)
     """
-    step = size_step(nominal)
+    step = _size_step(nominal)
     zones = {grade: row[step] * MICROMETRE for grade, row in PRINTED.items()}
     for number in range(12, 19):
         zones[f"IT{number}"] = 10 * zones[f"IT{number - 5}"]
@@ -180,7 +180,7 @@ def group_ladder(sources: Sequence[Source]) -> Ladder:
         source.feature is Feature.SIZE and source.nominal > 0 and source.name.rsplit(".", 1)[-1] not in RADII
         for source in sources
     )
-    if graded and len({size_step(source.nominal) for source in sources}) == 1:
+    if graded and len({_size_step(source.nominal) for source in sources}) == 1:
         ladder = Ladder.grades(max(source.nominal for source in sources))
     else:
         ladder = Ladder.preferred()

@@ -50,7 +50,7 @@ class QuantileBound:
         return self.sign * self.value if np.isfinite(self.value) else float((self.sign * values).max())
 
 
-def order_statistic(sample: LimitedSample, sign: Literal[1, -1], limit: float, beyond: float) -> QuantileBound:
+def _order_statistic(sample: LimitedSample, sign: Literal[1, -1], limit: float, beyond: float) -> QuantileBound:
     """Return the outermost value that is no further beyond a limit; beyond every limit where nothing is shown.
 
     Parameters
@@ -77,7 +77,7 @@ def order_statistic(sample: LimitedSample, sign: Literal[1, -1], limit: float, b
     Of 100 units 1, 2, … 100 none but the one beyond 99 may be rejected:
 
     >>> units = LimitedSample.all_of(np.arange(1.0, 101), Limits(upper=90.0))
-    >>> bound = order_statistic(units, 1, 90.0, beyond=9.0)
+    >>> bound = _order_statistic(units, 1, 90.0, beyond=9.0)
     >>> bound.value, bound.excess, round(bound.standard_error, 2)
     (99.0, 9.0, 1.4)
     """
@@ -140,12 +140,12 @@ def _order_statistic_error(
     return float(np.sqrt(weights @ (outermost - weights @ outermost) ** 2))
 
 
-def scale_of(sample: OutputSample, limit: float) -> float:
+def _scale_of(sample: OutputSample, limit: float) -> float:
     """Return what an excess is compared with; a limit of zero says nothing of its size [unit of the output]."""
     return max(abs(limit), float(sample.values.std())) or 1.0
 
 
-def name_of(sample: OutputSample, sign: int) -> str:
+def _name_of(sample: OutputSample, sign: int) -> str:
     """Return what the limit of an output is called."""
     return f"{sample.output}, {'upper' if sign > 0 else 'lower'} limit"
 
@@ -249,14 +249,14 @@ class AtYield(NamedFields):
         if sample.law:
             return bounds_of_law(sample, sample.law, 1 - self.target - sample.most_leaving(confidence))
         beyond = sample.units.kept_excess(sample.excess, self.target, confidence)
-        return tuple(order_statistic(sample, sign, limit, beyond) for sign, limit in sample.limits.turned)
+        return tuple(_order_statistic(sample, sign, limit, beyond) for sign, limit in sample.limits.turned)
 
     def least_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what is compared with every limit at its least."""
         if sample.law:
             return bounds_of_law(sample, sample.law, 1 - self.target + sample.most_leaving(confidence))
         beyond = sample.units.least_excess(sample.excess, self.target, confidence)
-        return tuple(order_statistic(sample, sign, limit, beyond) for sign, limit in sample.limits.turned)
+        return tuple(_order_statistic(sample, sign, limit, beyond) for sign, limit in sample.limits.turned)
 
 
 @dataclass(frozen=True)
@@ -369,8 +369,8 @@ def _spread_constraint(sample: OutputSample, bound: QuantileBound, limits: Limit
         limit=bound.limit,
         value=bound.value,
         standard_error=bound.standard_error,
-        scale=scale_of(sample, bound.limit),
-        stack=root_sum_square_stack(name_of(sample, bound.sign), sample.design, excess, gradient, groups),
+        scale=_scale_of(sample, bound.limit),
+        stack=root_sum_square_stack(_name_of(sample, bound.sign), sample.design, excess, gradient, groups),
         batches=batches,
         law=sample.law,
     )
@@ -421,14 +421,14 @@ class WorstCase:
     def _side(self, sample: OutputSample, sign: Literal[1, -1], limit: float) -> OneSidedConstraint:
         value, gradient = sample.worst(sign)
         stack = worst_case_stack(
-            name_of(sample, sign), sample.design, sign * (value - limit), sign * gradient, sample.groups
+            _name_of(sample, sign), sample.design, sign * (value - limit), sign * gradient, sample.groups
         )
         return OneSidedConstraint(
             sign=sign,
             limit=limit,
             value=value,
             standard_error=_MISSED * abs(value),
-            scale=scale_of(sample, limit),
+            scale=_scale_of(sample, limit),
             stack=stack,
         )
 
@@ -469,9 +469,9 @@ class RootSumSquare:
                 limit=limit,
                 value=value + sign * spread,
                 standard_error=0.0,
-                scale=scale_of(sample, limit),
+                scale=_scale_of(sample, limit),
                 stack=Stack(
-                    name=name_of(sample, sign),
+                    name=_name_of(sample, sign),
                     worst_case=np.zeros(sample.groups),
                     root_sum_square=added / scales,
                     # Locked zones take their part of the quadrature: the free ones may fill what it leaves.
