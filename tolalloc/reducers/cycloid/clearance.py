@@ -29,7 +29,18 @@ _TURNED = FLANK[4:-4]
 
 
 def is_large(stage: CycloidStage, modification: Modification) -> bool:
-    """Return whether the modification is too large for the linear formula."""
+    """Return whether the modification is too large for the linear formula.
+
+    Own derivation: max(|Δr_rp|, |Δr_p|, |δ|·r_d) > 50 µm, where the linear formula misses exact distances by more
+    than about 0.3 µm.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> stage = load_reducer("rv40e_xi2015").cycloid_stage
+    >>> [is_large(stage, Modification(equidistant=amount, shift=0.0)) for amount in (4.9e-5, 5.1e-5)]
+    [False, True]
+    """
     amounts = (modification.equidistant, modification.shift, modification.rotation * stage.disc_pitch_radius)
     return max(abs(amount) for amount in amounts) > LARGE
 
@@ -40,6 +51,12 @@ def linear_clearance(
     """Return the material removed along the normal, Δr_rp − Δr_p·cos κ + δ·r_d·|S|, theory page equation (35) [m].
 
     First order in the amounts: good to 0.3 µm up to `LARGE`.
+
+    Good to 0.3 µm on the working flanks up to amounts of about 50 µm; cos κ and S of `normals`.
+
+    References
+    ----------
+    xi2015 and li2018 for Δr_rp and Δr_p (both write Rp − Δr_p); the rotation's term is an own derivation.
 
     Examples
     --------
@@ -64,6 +81,14 @@ def formula_gap(stage: CycloidStage, modification: Modification, pin_angle: Angl
     References
     ----------
     xi2015, equation (3).
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> stage, amounts = load_reducer("rv40e_xi2015").cycloid_stage, Modification(equidistant=-2e-6, shift=-8e-6)
+    >>> found = formula_gap(stage, amounts, np.array([0.0, np.arccos(stage.shortening), pi]))
+    >>> [f"{abs(gap):.3f}" for gap in 1e6 * found]  # root, φ0 and tip [µm]
+    ['6.000', '0.000', '6.000']
     """
     into = normals(stage.shortening, pin_angle)
     shift = into.along_radius - stage.flank_ratio * into.lever
@@ -95,7 +120,19 @@ Gap = Callable[[Angles, Rotation], Float[np.ndarray, "*angles"]]
 
 
 def gap_of(profile: ToothProfile, exact: bool) -> Gap:
-    """Return the clearance as a function of the pins' angles and of the disc's rotation, exact or linear."""
+    """Return the clearance as a function of the pins' angles and of the disc's rotation, exact or linear.
+
+    Linear: `linear_clearance` − β·r_d·S (own derivation), β the disc's rotation [rad], φ [rad], within `is_large`.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> stage = load_reducer("rv40e_xi2015").cycloid_stage
+    >>> gap = gap_of(ToothProfile(stage=stage), exact=False)
+    >>> closed = gap(np.array([np.arccos(stage.shortening)]), 1e-6)  # S = 1: −β·e·zc
+    >>> round(1e9 * float(closed[0]), 2)  # [nm]
+    -50.7
+    """
     stage, lever = profile.stage, profile.stage.disc_pitch_radius
 
     def linear(pin_angle: Angles, rotation: Rotation) -> Float[np.ndarray, "*angles"]:
@@ -158,6 +195,17 @@ def clearance_of(profile: ToothProfile, exact: bool | None = None) -> Clearance:
     ------
     InputError
         A pin overlaps the tooth before any load.
+
+    Own derivation: β of the first contact is the least of L/(r_d·S) over φ, L of `linear_clearance` or exact; at φ0 it
+    is Li Lixing's (Δr_rp − q·Δr_p)/r_d.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> design = load_reducer("rv40e_xi2015")
+    >>> found = clearance_of(ToothProfile(stage=design.cycloid_stage, modification=design.modification))
+    >>> round(1e6 * found.radial, 3), round(float(np.degrees(found.backlash)) * 60, 4)  # [µm, arcmin]
+    (6.0, 0.3612)
     """
     from scipy.optimize import brentq
 

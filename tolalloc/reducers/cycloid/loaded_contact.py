@@ -46,6 +46,17 @@ def contact_stiffness(
 
     First of the linear laws the stiffness, of the logarithmic one its scale C; bending in series [N/m]. Then ln(λ/1 m)
     of the logarithmic law [-].
+
+    1/K = 1/C + 1/k for the linear laws; ln λ + c/k with c = 2C for the logarithmic one, which has the same effect on
+    F/c·ln(cλ/F) (own derivation); k the bending of a pin.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> design = load_reducer("rv40e_xi2015")
+    >>> bent = replace(design.stiffness, pin_contact=2e8, pin_bending=2e8, pin_contact_law="constant")
+    >>> float(contact_stiffness(design.cycloid_stage, bent, np.array([1.0]))[0][0])  # two alike in series [N/m]
+    100000000.0
     """
     contact, law = np.full_like(pin_angle, stiffness.pin_contact), stiffness.pin_contact_law
     if law == "table2":
@@ -69,6 +80,13 @@ def pin_contact_table2(stage: CycloidStage, convex_stiffness: float, pin_angle: 
     References
     ----------
     liu2020, Table 2 (K_djk).
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> found = pin_contact_table2(load_reducer("rv20e_liu2020").cycloid_stage, 1.0, np.array([0.0, np.pi]))
+    >>> found.round(4).tolist()  # K/C at the root, concave, and at the tip, convex
+    [0.0441, 1.0]
     """
     return np.asarray(convex_stiffness / (1 + 2 * stage.pin_radius * np.maximum(path_curvature(stage, pin_angle), 0.0)))
 
@@ -80,6 +98,17 @@ def equivalent_length(stage: CycloidStage, pin_angle: Angles) -> Float[np.ndarra
     flank is convex and minus r_rp where it is concave; with Hertz's half width the approach depends on the radii by L
     alone. Near the inflection L grows without bound and the approach only with its logarithm; Rp as the largest length
     is an assumption.
+
+    References
+    ----------
+    Hertz's line contact; the constant 2/3 is Li Lixing's and Roark's, L an own derivation.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> found = equivalent_length(load_reducer("rv40e_xi2015").cycloid_stage, np.array([np.pi]))
+    >>> round(1e3 * float(found[0]) / exp(APPROACH), 3)  # L at the tip [mm]
+    6.276
     """
     bend = np.abs(path_curvature(stage, pin_angle))
     return np.asarray(exp(APPROACH) / np.maximum(bend, 1 / stage.pin_circle_radius))
@@ -91,6 +120,20 @@ def peak_pressure(
     """Return Hertz's peak pressure √(F·E*/(πb·R)), R from the pin and the tooth's own curvature where it touches [Pa].
 
     E* is that of pin and disc, the angle φ that of the pins from the crank direction [rad], the force theirs [N].
+
+    1/R = 1/r_rp + 1/ρ. For elastic bodies whose contact is narrow against R.
+
+    References
+    ----------
+    Hertz's line contact, p = √(F·E*/(πbR)).
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> stage = load_reducer("rv40e_xi2015").cycloid_stage
+    >>> found = peak_pressure(stage, 206e9 / (2 * (1 - 0.3**2)), np.radians([54.0]), np.array([900.0]))
+    >>> round(float(found[0]) / 1e6)  # of 900 N at 54° [MPa]
+    1539
     """
     path, pin = path_curvature(stage, pin_angle), stage.pin_radius
     # 1/R = 1/r + 1/ρ with ρ = −1/κ − r of the tooth, convex positive.
@@ -170,7 +213,16 @@ class PressedDiscs:
 
 
 def default_phases(reducer: Reducer, count: int = 72) -> Float[np.ndarray, " phase"]:
-    """Return equally spaced phases over one pin pitch, the first with a pin in the crank direction [rad]."""
+    """Return equally spaced phases over one pin pitch, the first with a pin in the crank direction [rad].
+
+    Phase k is 2π·k/(zp·count), own derivation: after one pin pitch everything repeats.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> np.degrees(default_phases(load_reducer("rv40e_xi2015"), 3)).round(6).tolist()  # a pitch of 9° [°]
+    [0.0, 3.0, 6.0]
+    """
     return 2 * pi / reducer.cycloid_stage.pin_count * np.arange(count) / count
 
 
@@ -203,6 +255,17 @@ def loaded(
 
     Phases are angles from the crank direction of disc 1 to the next pin [rad], deflections δ_max [m], forces those of
     the pins [N].
+
+    Own derivation: the disc has turned by β + δ_max/r_d, β that of the first contact; the torque is r_d·Σ S·F.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> discs, phase = PressedDiscs(reducer=load_reducer("rv40e_xi2015"), torque=100.0), np.zeros(1)
+    >>> force = np.zeros((1, 1, 40))
+    >>> force[0, 0, 4] = 1000.0  # the pin at 36°, where S is almost 1: r_d = 50.7 mm
+    >>> round(float(loaded(discs, "one pin", phase, np.array([1e-5]), force).torque[0, 0]), 2)  # [N·m]
+    50.7
     """
     reducer, stage, closed, angles = (
         discs.reducer,
@@ -249,6 +312,14 @@ def pressed_linear(
     References
     ----------
     xi2015, equations (5)–(7); Li Lixing (1984).
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> discs = PressedDiscs(reducer=load_reducer("rv40e_xi2015"), torque=0.55 * 572.0)
+    >>> found = pressed_linear(discs, np.array([0.0]), deflection=17.603e-6)
+    >>> round(float(found.force.max()), 1), int(found.pins_in_contact[0, 0])  # [N, -]
+    (707.2, 16)
     """
     stage, angles = discs.reducer.cycloid_stage, discs.pin_angles(phase)
     gap, closed = gap_of(discs.profile, discs.clearance.exact), discs.clearance
@@ -447,6 +518,12 @@ class Assessment:
 def disc_share(discs: int) -> float:
     """Return the share of the torque on the most loaded disc: Li Lixing's 0.55 of a pair, others in proportion [-].
 
+    References
+    ----------
+    Li Lixing's method as xi2015 uses it; of other numbers than two an assumption.
+
+    Examples
+    --------
     >>> disc_share(2), round(disc_share(3), 4)
     (0.55, 0.3667)
     """
@@ -458,6 +535,14 @@ def pin_moment(reducer: Reducer, torque: float) -> float:
 
     The housing holds what the sun does not, T·(1 − 1/i). All pin forces pass through the pole, e·zp from the housing's
     centre and e·zc from the disc's, so of that moment zc/zp is left about the disc.
+
+
+
+    T_pins = T·(1 − 1/i)·zc/zp; exact without friction and tilt.
+
+    References
+    ----------
+    Own derivation, from the balance of moments about the housing's centre.
 
     Examples
     --------
@@ -485,6 +570,14 @@ def assess(
     ------
     InputError
         The profile cannot be ground, interferes with the pins, or the torque is beyond any contact.
+
+    References
+    ----------
+    xi2015 for Li Lixing's method and 572 N·m; the law at every pin and the discs together are own derivations.
+
+    Examples
+    --------
+    See `tolalloc.reducers.contact.contact_of`.
     """
     reducer = replace(reducer, stiffness=replace(reducer.stiffness, pin_contact_law=law))
     profile, torque = ToothProfile(stage=reducer.cycloid_stage, modification=reducer.modification), abs(torque)

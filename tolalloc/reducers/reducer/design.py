@@ -247,6 +247,20 @@ def interface_forces(reducer: Reducer, torque: float) -> dict[str, float]:
     Without part errors: each crank holds its part of the torque against the carrier and a share of that against every
     disc, beside its share of the disc's pin forces, T/(e·zp) across the crank direction, which turn against it. The
     first stage carries the torque over the ratio; the carrier bearing holds none.
+
+    Crank–carrier T/(n_c·a_sp); crank–disc the mean over φ of |T/(n_c·n_d·a_sp) + e^(iφ)·T/(n_c·n_d·e·zp)|; mesh
+    T/(i·n_c·r_b1). Units N, N·m, m; 3 to 4 % above the solved mean.
+
+    References
+    ----------
+    Own derivation, statics; theory page (66).
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> found = interface_forces(load_reducer("rv20e_liu2020"), 167.0)
+    >>> round(found["crank_carrier_bearing"]), round(found["gear_mesh"])  # two cranks at 27 mm [N]
+    (3093, 113)
     """
     size, stage = abs(torque), reducer.cycloid_stage
     crank = size / (reducer.crank_count * reducer.crank_circle_radius)
@@ -268,7 +282,18 @@ _SMALLEST = 1e-3
 
 
 def compliances(reducer: Reducer, torque: float) -> dict[str, dict[str, float]]:
-    """Return what every part yields by interface, at the forces of a torque on the carrier [m/N]."""
+    """Return what every part yields by interface, at the forces of a torque on the carrier [m/N].
+
+    Own derivation, theory page (67): secants w(F)/F at the forces of `interface_forces`; below 0.1 % of the rated
+    torque those at 0.1 %.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> found = compliances(load_reducer("rv20e"), 167.0)["crank_carrier_bearing"]
+    >>> {part: f"{value:.1e}" for part, value in found.items() if "bear" in part}  # [m/N]
+    {'crank–carrier bearings': '1.5e-09'}
+    """
     least = _SMALLEST * reducer.load.rated_torque
     forces = interface_forces(reducer, max(abs(torque), least))
     unloaded = forces["crank_carrier_bearing"] * _SMALLEST
@@ -280,7 +305,18 @@ def compliances(reducer: Reducer, torque: float) -> dict[str, dict[str, float]]:
 
 
 def at_torque(reducer: Reducer, torque: float) -> Reducer:
-    """Return the reducer with the secant stiffness of its parts at the forces of a torque on the carrier [N·m]."""
+    """Return the reducer with the secant stiffness of its parts at the forces of a torque on the carrier [N·m].
+
+    Own derivation, theory page (67): parts in series, 1/K = Σ 1/K_part.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> design = load_reducer("rv20e")
+    >>> found = [at_torque(design, share * 167.0).stiffness.crank_disc_bearing for share in (0.1, 1.0)]
+    >>> [round(value / 1e6) for value in found]  # a bearing is softer under a tenth of the force [1e6 N/m]
+    [203, 238]
+    """
     if not reducer.parts:
         return reducer
     own: dict[str, Any] = {

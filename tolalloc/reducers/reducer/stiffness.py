@@ -58,7 +58,18 @@ class Material:
 
 
 def contact_modulus(first: Material, second: Material) -> float:
-    """Return E* of two bodies in contact, 1/E* = (1 − µ1²)/E1 + (1 − µ2²)/E2 [Pa]."""
+    """Return E* of two bodies in contact, 1/E* = (1 − µ1²)/E1 + (1 − µ2²)/E2 [Pa].
+
+    References
+    ----------
+    Hertz's contact of two elastic half spaces.
+
+    Examples
+    --------
+    >>> steel = Material(elastic_modulus=206e9, poisson_ratio=0.3)
+    >>> round(contact_modulus(steel, steel) / 1e9, 2)  # E/(2(1 − µ²)) of one material [GPa]
+    113.19
+    """
     return 1.0 / sum((1.0 - body.poisson_ratio**2) / body.elastic_modulus for body in (first, second))
 
 
@@ -153,6 +164,11 @@ def line_contact(face_width: float, contact_modulus: float) -> float:
     References
     ----------
     liu2020, Table 2 (K_djk without its curvature factor).
+
+    Examples
+    --------
+    >>> round(line_contact(0.010, 113.19e9) / 1e9, 3)  # steel on steel over 10 mm [1e9 N/m]
+    1.778
     """
     return pi * face_width * contact_modulus / 2.0
 
@@ -163,6 +179,11 @@ def pin_bending(diameter: float, span: float, elastic_modulus: float) -> float:
     References
     ----------
     Li Lixing's method, as xi2015 uses it; the factor 31/64 is not printed there [A].
+
+    Examples
+    --------
+    >>> round(pin_bending(0.006, 0.031, 206e9) / 1e6, 1)  # a pin of 6 mm over a span of 31 mm [1e6 N/m]
+    43.6
     """
     return 64.0 / 31.0 * 48.0 * elastic_modulus * (pi * diameter**4 / 64.0) / span**3
 
@@ -183,6 +204,15 @@ def shaft_support(diameter: float, length: float, elastic_modulus: float) -> flo
     A shaft on two supports loaded at mid-span would be 48EJ/l³, sixteen times as much. Valid for bending alone: shear
     adds about 0.54(d/l)² of the deflection, 6 % at l = 3d; a reducer file with l below d is refused. The clamp is
     rigid.
+
+    References
+    ----------
+    liu2020, Table 2 (K_s).
+
+    Examples
+    --------
+    >>> round(shaft_support(0.015, 0.1, 206e9) / 1e6, 3)  # Ø 15 mm, 100 mm long [1e6 N/m]
+    1.536
     """
     return 3.0 * pi * diameter**4 * elastic_modulus / (64.0 * length**3)
 
@@ -196,6 +226,15 @@ def roller_bearing(
     the load. Of n rollers around a bearing, n/2 act so if all are preloaded and n/4 if there is neither preload nor
     play: l·n is the length that acts, not the length that is there. Same steel for rollers and rings. Being linear in
     the force it is stiffer than Hertz's line contact, whose logarithm it leaves out.
+
+    References
+    ----------
+    liu2020, Table 2 (K_pd and K_b).
+
+    Examples
+    --------
+    >>> round(roller_bearing(0.1226, 206e9, 0.3) / 1e10, 3)  # l·n of 122.6 mm gives liu2020's K_pd [1e10 N/m]
+    1.09
     """
     return pi * loaded_length * elastic_modulus / (8.0 * (1.0 - poisson_ratio**2) * sin(contact_angle))
 
@@ -214,6 +253,15 @@ def gear_mesh(
     without profile shift under 100 N/mm or more; the standard's factor 0.8 between theory and measurement is left out
     as in the print, and lighter loads are softer still. A reducer file may give contact ratios of 1 to 2.5 and
     virtual teeth from 5.
+
+    References
+    ----------
+    ISO 6336-1; liu2020, Table 2 (K_sp).
+
+    Examples
+    --------
+    >>> round(gear_mesh(1.6, 16.0, 32.0, 0.010, 206e9) / 1e6, 1)  # 16 and 32 teeth, 10 mm wide [1e6 N/m]
+    223.0
     """
     flexibility = 0.04723 + 0.15551 / sun_virtual_teeth + 0.25791 / planet_virtual_teeth
     per_width = (0.75 * contact_ratio + 0.25) / flexibility * 1e9
@@ -227,6 +275,15 @@ def ball_coefficient_as_printed(radius: float, balls: int, elastic_modulus: floa
     at either race, share δ, so c falls by 2^1.5 to E√R/(3√2(1−µ²)). The print halves as if the law were linear; it is
     n balls between two flat races exactly where r_g is half the ball's radius **[D]**. liu2020 takes the number as
     N/m, which it would be at a compression of 4/9 m.
+
+    References
+    ----------
+    liu2020, Table 2 (K_ca); Hertz for the contact of a ball with a plane.
+
+    Examples
+    --------
+    >>> round(ball_coefficient_as_printed(0.003, 30, 206e9, 0.3) / 1e11, 3)  # 30 balls, r_g = 3 mm [1e11 N/m^1.5]
+    1.24
     """
     return elastic_modulus * balls * sqrt(radius) / (3.0 * (1.0 - poisson_ratio**2))
 
@@ -238,6 +295,11 @@ def ball_bearing(ball_radius: float, balls: int, preload: float, elastic_modulus
     all n balls stand in the direction of the displacement, as in the print, and F is what they carry together; a ring
     of n balls at contact angle α has n/2·cos²α of them. **[A]**: flat races; grooves of 0.515 to 0.53 ball diameters
     make the contact 2.1 to 1.8 times as stiff. Valid up to `largest_preload`, beyond which a reducer file is refused.
+
+    Examples
+    --------
+    >>> round(ball_bearing(0.003, 30, 5000.0, 206e9, 0.3) / 1e8, 2)  # 30 balls of radius 3 mm at 5 kN [1e8 N/m]
+    5.06
     """
     coefficient = ball_coefficient_as_printed(ball_radius / 2.0, balls, elastic_modulus, poisson_ratio)
     return float(1.5 * coefficient ** (2.0 / 3.0) * preload ** (1.0 / 3.0))
@@ -248,6 +310,17 @@ def largest_preload(ball_radius: float, balls: int, elastic_modulus: float, pois
 
     Hertz's contact radius a = (3QR/(4E*))^(1/3) with E* = E/(2(1−µ²)). In steel a fifth of it makes 4.2 GPa, ISO 76's
     static limit for ball bearings.
+
+    F = n·(4/3)·E*·R²·0.1³.
+
+    References
+    ----------
+    Hertz for a; the limit of a tenth is an own choice, compared with ISO 76.
+
+    Examples
+    --------
+    >>> round(largest_preload(0.003, 30, 206e9, 0.3))  # 30 balls of radius 3 mm [N]
+    40747
     """
     contact_modulus = elastic_modulus / (2.0 * (1.0 - poisson_ratio**2))
     return balls * 4.0 / 3.0 * contact_modulus * ball_radius**2 * LARGEST_CONTACT**3
@@ -340,6 +413,15 @@ def bore_flexibility(bore_radius: float, outer_radius: float, width: float, mate
     """Return how far a bore moves in its disc per force in the plane [m/N].
 
     Kelvin's force in a plane sheet: (1+µ)(3−µ)/(4πEb)·ln(R/r), from the bore's edge r to the disc's R.
+
+    References
+    ----------
+    Kelvin's point force in a sheet (plane stress); the bounds r and R are an own choice, for r well below R.
+
+    Examples
+    --------
+    >>> f"{bore_flexibility(0.015, 0.052, 0.010, Material(elastic_modulus=206e9, poisson_ratio=0.3)):.2e}"  # [m/N]
+    '1.69e-10'
     """
     poisson = material.poisson_ratio
     per_logarithm = (1.0 + poisson) * (3.0 - poisson) / (4.0 * pi * material.elastic_modulus * width)
