@@ -90,7 +90,6 @@ def path_curvature(stage: CycloidStage, pin_angle: Angles) -> Float[np.ndarray, 
 def flank_angle(stage: CycloidStage) -> float:
     """Return φ0 = arccos K1, where the lever is longest [rad].
 
-
     References
     ----------
     xi2015 and Li Lixing, who close the gap there; there S = 1, for 0 < K1 < 1.

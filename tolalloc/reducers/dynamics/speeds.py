@@ -217,6 +217,21 @@ def orders_against_speed(
     ------
     InputError
         A speed that is not positive, fewer than two turns, or too few steps for an order.
+
+    Equations (61) and (63) of the theory page, own derivation: as the speed goes to 0 the orders are those of the
+    static curve.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.dynamics.motion import inertia_of, newmark
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
+    >>> errors, rates = np.zeros((1, len(model.columns))), np.array([-1.0])
+    >>> try:  # speeds are positive [rad/s]
+    ...     orders_against_speed(model, errors, -1.0, inertia_of(model.reducer), Damping(), newmark(), rates, (1,), 100)
+    ... except InputError as error:
+    ...     print(error)
+    speeds: speeds is [-1.0]; allowed is positive numbers.
     """
     if not np.all((speeds > 0.0) & np.isfinite(speeds)):
         raise InputError.at("speeds", "speeds", speeds.tolist(), "positive numbers")

@@ -58,7 +58,17 @@ def bilateral_groups(at: Positions) -> list[SpringGroup]:
 def spring_groups(
     reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"], orders: tuple[int, ...] = HARMONICS
 ) -> list[SpringGroup]:
-    """Return all spring groups with all their columns, pin contact last: plain and large, for proofs."""
+    """Return all spring groups with all their columns, pin contact last: plain and large, for proofs.
+
+    Rows δ = a·q + b·ε, theory page (5) to (18), liu2020 as read there.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> groups = spring_groups(load_reducer("rv20e_liu2020"), np.zeros(1))
+    >>> [group.stiffness.shape[1] for group in groups]  # rows; 2 discs times 40 pins at last
+    [2, 2, 8, 4, 2, 80]
+    """
     at = Positions(reducer, carrier_angle, orders)
     return [*bilateral_groups(at), dense_rows(at)]
 
@@ -69,7 +79,18 @@ def error_columns(reducer: Reducer, orders: tuple[int, ...]) -> Columns:
 
 
 def rotation_scale(reducer: Reducer, coordinates: Coordinates) -> Float[np.ndarray, " coordinate"]:
-    """Return the lever by which each coordinate is divided so that all are lengths [m or 1]."""
+    """Return the lever by which each coordinate is divided so that all are lengths [m or 1].
+
+    Own derivation: x = ℓ·θ with ℓ = r_b2, r_d or a_sp; any lever gives the same equilibrium.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> design = load_reducer("rv20e_liu2020")
+    >>> scale = rotation_scale(design, Coordinates(design.crank_count, design.disc_count))
+    >>> round(1e3 / float(scale[-1]), 3)  # crank circle radius a_sp [mm]
+    27.0
+    """
     scale = np.ones(coordinates.count)
     for crank in range(reducer.crank_count):
         scale[coordinates.planet(crank) + 2] = 1 / reducer.planet_base_radius
@@ -183,6 +204,20 @@ def condense(reducer: Reducer, orders: tuple[int, ...], angle: Float[np.ndarray,
     """Return the condensed model of a reducer at the carrier angles.
 
     Theory page, equations (19)–(21).
+
+    S = K_dd − K_dr·K_rr⁻¹·K_rd, F = L_d − K_dr·K_rr⁻¹·L_r; exact, N/m and N per error [m].
+
+    References
+    ----------
+    Own derivation, static condensation of liu2020's equations; theory page (19) to (21).
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> found = condense(load_reducer("rv20e_liu2020"), HARMONICS, np.zeros(1))
+    >>> whole = np.linalg.eigvalsh(found.stiffness[0])  # of two discs; the mechanism turns without resistance
+    >>> whole.size, bool(abs(whole[0]) < 1e-9 * whole[-1])
+    (6, True)
     """
     whole: CondensedAngles | None = None
     for start in range(0, angle.size, _ANGLES_AT_ONCE):

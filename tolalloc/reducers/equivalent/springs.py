@@ -119,7 +119,18 @@ class SpringGroup:
 
 
 def with_play(group: SpringGroup, clearance: float, elements: tuple[str, ...]) -> SpringGroup:
-    """Return the group with a clearance [m] in each of its elements; unchanged where there is none."""
+    """Return the group with a clearance [m] in each of its elements; unchanged where there is none.
+
+    Energy ½k·max(0, |δ| − c)², own derivation, theory page (28); convex for c ≥ 0.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.equivalent.interfaces import carrier_support
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> group = carrier_support(Positions(load_reducer("rv20e_liu2020"), np.zeros(1)))
+    >>> with_play(group, 5e-6, ("carrier",)).clearance_columns
+    ('carrier.clearance',)
+    """
     if clearance == 0.0:
         return group
     names = tuple(f"{element}.clearance" for element in elements)
@@ -132,7 +143,15 @@ def vector_columns(name: str) -> tuple[str, str]:
 
 
 def turned(direction: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle 2 2"]:
-    """Return the rotation matrices from a part that has turned by a direction [rad] into the housing's frame."""
+    """Return the rotation matrices from a part that has turned by a direction [rad] into the housing's frame.
+
+    [[cos, −sin], [sin, cos]], own derivation; counter-clockwise positive.
+
+    Examples
+    --------
+    >>> turned(np.array([np.pi / 2]))[0].round(9).tolist()
+    [[0.0, -1.0], [1.0, 0.0]]
+    """
     cosine, sine = np.cos(direction), np.sin(direction)
     return np.stack([np.stack([cosine, -sine], axis=-1), np.stack([sine, cosine], axis=-1)], axis=-2)
 
@@ -143,5 +162,13 @@ def harmonic_columns(name: str, orders: tuple[int, ...]) -> tuple[str, ...]:
 
 
 def harmonic_waves(angle: Float[np.ndarray, "..."], orders: tuple[int, ...]) -> Float[np.ndarray, "... wave"]:
-    """Return the cosine and sine of every order at the angles [-]."""
+    """Return the cosine and sine of every order at the angles [-].
+
+    cos(n·angle), sin(n·angle), for every order n; own derivation of liu2020's pitch and run-out errors of Table 4.
+
+    Examples
+    --------
+    >>> harmonic_waves(np.array([np.pi / 2]), (1, 2))[0].round(9).tolist()
+    [0.0, 1.0, -1.0, 0.0]
+    """
     return np.stack([wave(order * angle) for order in orders for wave in (np.cos, np.sin)], axis=-1)

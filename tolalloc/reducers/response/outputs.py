@@ -160,7 +160,15 @@ def _waves(
 
 
 def orders_reading(orders: tuple[int, ...]) -> Reading:
-    """Return the reading of the waves of the transmission error, cosine and sine of every order."""
+    """Return the reading of the waves of the transmission error, cosine and sine of every order.
+
+    The waves are those of `tolalloc.reducers.equivalent.outputs.waves`, own derivation from Fourier's sum [arcsec].
+
+    Examples
+    --------
+    >>> orders_reading((2,)).outputs
+    ('order 2 cosine [arcsec]', 'order 2 sine [arcsec]')
+    """
 
     def read(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
         found = model.equilibria(errors, torque)
@@ -170,7 +178,15 @@ def orders_reading(orders: tuple[int, ...]) -> Reading:
 
 
 def with_orders(readings: tuple[Reading, ...], orders: tuple[int, ...]) -> tuple[Reading, ...]:
-    """Return the readings and that of the waves, which are read off the curve that a peak-to-peak is searched on."""
+    """Return the readings and that of the waves, which are read off the curve that a peak-to-peak is searched on.
+
+    As `orders_reading`, own derivation; the curve's angles are those of the coarse search.
+
+    Examples
+    --------
+    >>> [name for reading in with_orders((), (3,)) for name in reading.outputs]
+    ['order 3 cosine [arcsec]', 'order 3 sine [arcsec]']
+    """
 
     def read(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
         found, curve = model.extremes_and_curve(errors, torque)
@@ -242,6 +258,22 @@ def loop_derivatives(
     """Return one of `DIFFERENTIABLE` of every sample, and its derivatives by all error columns of the model.
 
     They take two to four times as long as the output alone: the adjoint of the equilibrium at every angle and torque.
+
+    Own derivation, theory page (23): the width is θ(T) − θ(−T), its derivative the difference of the adjoints'; of
+    K = 2·0.97·T/(w₁ − w₃) [N·m/arcmin] it is −K/(w₁ − w₃)·∂(w₁ − w₃). They hold while the same pins carry.
+
+    Examples
+    --------
+    The larger the pins, the less backlash teeth have that are ground 20 µm deeper [arcmin/µm]:
+
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
+    >>> rest = {name: 0.0 for name in model.columns} | {"modification.equidistant": 20e-6}
+    >>> del rest["pin.diameter"]
+    >>> kernel = KernelResponse(model=model, torque=-1.0, columns=("pin.diameter",), fixed=rest)
+    >>> _, slopes = loop_derivatives(kernel, BACKLASH, np.zeros((1, 1)))
+    >>> round(1e-6 * float(slopes[0, model.columns.index("pin.diameter")]), 4)
+    -0.1894
     """
     values, slopes, status = np.empty((len(x), 1)), np.empty((len(x), len(kernel.model.columns))), np.empty(len(x))
     for rows, ((value, slope), worst) in map_chunks(partial(_derived, kernel.alone, output), x, kernel.mapper):
