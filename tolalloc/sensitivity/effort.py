@@ -24,7 +24,15 @@ CLASSES = 10
 
 
 def fewest_units() -> int:
-    """Return the fewest units whose worst share is as many as are needed, whatever the limit [-]."""
+    """Return the fewest units whose worst share is as many as are needed, whatever the limit [-].
+
+    n = ⌈fewest outside / worst share⌉ (own derivation).
+
+    Examples
+    --------
+    >>> fewest_units()
+    1000
+    """
     return ceil(FEWEST_OUTSIDE / WORST_SHARE)
 
 

@@ -91,6 +91,15 @@ def inverse_sensitivity(
     References
     ----------
     Regula falsi with halving of the stale end (Illinois): Dowell & Jarratt 1971.
+
+    Examples
+    --------
+    With σ of 1 and 2 a limit of 8 at 97.72 % (2σ) leaves a spread of 4: the first σ may be √(16 − 4) = 3.46, the second
+    √(16 − 1)/2 = 1.94 of what it is; estimates of 2,048 units scatter by some percent.
+
+    >>> from tolalloc.capability.experiment import sum_of_sizes
+    >>> inverse_sensitivity(sum_of_sizes(6.0, 12.0), limit=8.0, target=0.9772).factor.round(1).tolist()
+    [3.5, 2.0]
     """
     needed = fewest_units(target)
     if units < needed:

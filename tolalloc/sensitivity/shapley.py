@@ -75,6 +75,14 @@ def shapley_effects(experiment: Experiment[Response], permutations: int) -> Shap
     Song, Nelson & Staum 2016, SIAM/ASA J. Uncertainty Quantification 4 (worth, random orders, conditional samples);
     Goda 2021, Reliability Engineering & System Safety 213 (one chain of samples per order); Owen & Prieur 2017,
     SIAM/ASA J. Uncertainty Quantification 5 (dependent inputs).
+
+    Examples
+    --------
+    Independent parts of a sum with σ of 1 and 2 have the shares 1/5 and 4/5.
+
+    >>> from tolalloc.capability.experiment import sum_of_sizes
+    >>> shapley_effects(sum_of_sizes(6.0, 12.0), 4000).effects[0].round(1).tolist()
+    [0.2, 0.8]
     """
     if permutations < 2:
         raise InputError.at("Shapley effects", "permutations", permutations, "2 or more")

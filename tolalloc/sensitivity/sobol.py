@@ -254,6 +254,15 @@ def order_contribution(analysis: SobolAnalysis, waves: Mapping[int, tuple[str | 
     References
     ----------
     Lamboni, Monod & Makowski 2011; Gamboa, Janon, Klein & Lagnoux 2014, eq. (2.2): the trace of the covariance.
+
+    Examples
+    --------
+    A wave whose cosine and sine are the same sum has the shares of that sum, 1/5 and 4/5.
+
+    >>> from tolalloc.capability.experiment import sum_of_sizes
+    >>> found = sobol_indices(sum_of_sizes(6.0, 12.0), SobolEffort(start=512, limit=512, places=1))
+    >>> order_contribution(found, {1: (0, 0)}).total.round(2).tolist()
+    [[0.2, 0.8]]
     """
     if not waves:
         raise InputError("Contribution to orders: no order is given.")
@@ -331,6 +340,15 @@ def sobol_indices(
     ----------
     Saltelli et al. 2010 (first order), Jansen 1999 (total), Saltelli 2002 (second order), as SALib implements them;
     groups of dependent inputs: Jacques, Lavergne & Devictor 2006.
+
+    Examples
+    --------
+    A sum with σ of 1 and 2 has the total indices 1/5 and 4/5.
+
+    >>> from tolalloc.capability.experiment import sum_of_sizes
+    >>> found = sobol_indices(sum_of_sizes(6.0, 12.0), SobolEffort(start=512, limit=512, places=1))
+    >>> found.of(0).total.round(2).tolist()
+    [0.2, 0.8]
     """
     errors, outputs = experiment.errors, experiment.response.outputs
     counted, sample = ranked or outputs, experiment.seeds.child("sample").integer()
@@ -452,6 +470,20 @@ def regrouped(
     ------
     SolveError
         Too many blocks hold a failed sample, or the output does not vary.
+
+    References
+    ----------
+    As `sobol_indices`; a group of columns has the index of all that happens inside it: Saltelli et al. 2010.
+
+    Examples
+    --------
+    The first two of three parts with the variances 1, 1 and 4 have 2/6 together.
+
+    >>> from tolalloc.capability.experiment import sum_of_sizes
+    >>> experiment = sum_of_sizes(6.0, 6.0, 12.0)
+    >>> found = sobol_indices(experiment, SobolEffort(start=512, limit=512, places=1))
+    >>> regrouped(experiment, found, ("both", "both", "last")).total.round(2).tolist()
+    [0.33, 0.67]
     """
     assert analysis.solved is not None
     before, answers = analysis.solved.design, analysis.solved.answers

@@ -133,6 +133,17 @@ def answers_of(
         Fewer than two folds, or fewer than two samples for each.
     SolveError
         More samples failed.
+
+    References
+    ----------
+    k folds of n/k samples each, drawn without replacement: Stone 1974, J. R. Stat. Soc. B 36, 111–147.
+
+    Examples
+    --------
+    >>> from tolalloc.capability.experiment import sum_of_sizes
+    >>> response, x = sum_of_sizes(6.0, 12.0).response, np.random.default_rng(1).normal(size=(100, 2))
+    >>> np.bincount(answers_of(response, x, SeedTree(1)).fold).tolist()
+    [20, 20, 20, 20, 20]
     """
     if not 2 <= folds <= x.shape[0] // FEWEST_OF_FOLD:
         raise InputError.at("surrogate", "folds", folds, f"2 to half of the {x.shape[0]} samples")
@@ -172,6 +183,20 @@ def cross_validate(candidate: Candidate, answers: Answers, quantile: float = 0.9
     Notes
     -----
     The clocked speed alone differs from run to run.
+
+    Q² = 1 − Σ (y − ŷ)² / Σ (y − ȳ)², with ŷ and ȳ from the other folds: Stone 1974, J. R. Stat. Soc. B 36, 111–147.
+
+    Examples
+    --------
+    A sum is a quadratic form.
+
+    >>> from tolalloc.capability.experiment import sum_of_sizes
+    >>> from tolalloc.sensitivity.surrogate.regression import RegressionCandidate, quadratic_regression
+    >>> response, x = sum_of_sizes(6.0, 12.0).response, np.random.default_rng(1).normal(size=(400, 2))
+    >>> made = {"columns": response.columns, "outputs": response.outputs}
+    >>> candidate = RegressionCandidate(name="quadratic", estimator=quadratic_regression, **made)
+    >>> round(cross_validate(candidate, answers_of(response, x, SeedTree(1))).q2, 3)
+    1.0
     """
     if not 0.0 < quantile < 1.0:
         raise InputError.at("surrogate", "quantile", quantile, "a number between 0 and 1")
@@ -265,6 +290,17 @@ def choose(
     -----
     The clocked speed stands in the table alone, because a choice that depends on it could not be repeated. The best of
     several scores is a little too good: with Q² = 0.95 and more the candidates' distances are far above that.
+
+    Examples
+    --------
+    >>> from tolalloc.capability.experiment import sum_of_sizes
+    >>> from tolalloc.sensitivity.surrogate.regression import RegressionCandidate, quadratic_regression
+    >>> response, x = sum_of_sizes(6.0, 12.0).response, np.random.default_rng(1).normal(size=(400, 2))
+    >>> made = {"columns": response.columns, "outputs": response.outputs}
+    >>> candidate = RegressionCandidate(name="quadratic", estimator=quadratic_regression, **made)
+    >>> choice = choose(response, [candidate], x, SeedTree(1))
+    >>> choice.chosen is not None, choice.best
+    (True, 0)
     """
     if not candidates:
         raise InputError.at("surrogate", "candidates", tuple(candidates), "one or more")
