@@ -19,11 +19,12 @@ from published.zhang2025_sections import (
 )
 
 import tolalloc as ta
-from tolalloc.assembly.adjustment import AssemblyRequest, assemble
+from tolalloc.assembly.adjustment import AssemblyRequest
 from tolalloc.assembly.files import load_plan
 from tolalloc.cli.console import shown_progress
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reports.document import Document
+from tolalloc.study.inquiries.assemble import assembled
 
 SEED = 20250711
 """Seed of the parts that stand for zhang2025's Table 3, which is lost."""
@@ -43,8 +44,8 @@ def build(quick: bool) -> Document:
         assemblies=10_000 if quick else 100_000,
     )
     with shown_progress("assemblies") as progress:
-        answer = assemble(request, progress)
-    document, plan = answer.document, answer.plan
+        document = assembled(request, progress).document
+    plan = request.plan
     drawn, shares = drawn_parts_section(plan, 40 if quick else 200)
     mounting, mounted = mounting_section(3 if quick else 100)
     genetic, searched = genetic_section(plan, 2 if quick else 10)

@@ -9,21 +9,25 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tolalloc.assembly.adjustment import AssemblyRequest, assemble
-from tolalloc.assembly.answer import tables, tolerance_tables, transmission
-from tolalloc.assembly.answer.answer import AssemblyAnswer
-from tolalloc.assembly.answer.cautions import assumptions, warnings
-from tolalloc.assembly.answer.summary import plan_record, summary
-from tolalloc.assembly.answer.tables import characteristic_table, larger
+from tolalloc.assembly.adjustment import AssemblyRequest, AssemblyResult, assemble
 from tolalloc.assembly.files import load_plan
 from tolalloc.assembly.gains import assembled, tuned_gains
 from tolalloc.assembly.orientations import TRANSMISSION, TransmissionCurves, TransmissionEffect
 from tolalloc.assembly.steps import Efforts, steps_in_order
 from tolalloc.assembly.trajectory import random_numbers
 from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.equivalent.model import OUTCOMES
 from tolalloc.reducers.equivalent.outputs import ContactPattern
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reports.figure import chart
+from tolalloc.reports.header import Header
+from tolalloc.reports.tellers import assembly_tables as tables
+from tolalloc.reports.tellers import assembly_tolerances as tolerance_tables
+from tolalloc.reports.tellers import assembly_transmission as transmission
+from tolalloc.reports.tellers.assembly import plan_record
+from tolalloc.reports.tellers.assembly_tables import characteristic_table, larger
+from tolalloc.running.progress import RunRecord, Silent
+from tolalloc.study.answer import Answer
 
 CHAIN = """
 name = "pump"
@@ -67,14 +71,26 @@ effort_price = 0.02
 ERRORS = ARCSECOND * np.array([[70.0, -20, 10], [-30, 15, 0], [5, 25, -12]])
 
 
-class Silent:
-    def begin(self, stage: str) -> None: ...
+def run(plan, errors=None) -> AssemblyResult:
+    request = AssemblyRequest(plan=plan, name="seven", errors=errors, assemblies=2000)
+    return assemble(request, RunRecord(Silent(), OUTCOMES))
 
-    def advance(self, units: int) -> None: ...
+
+def answer(results: AssemblyResult) -> Answer[AssemblyResult]:
+    header = Header(name=results.plan.name, model="", seed=1, assumptions=results.plan.assumptions)
+    return Answer(kind="assembly", header=header, result=results)
 
 
-def run(plan, errors=None) -> AssemblyAnswer:
-    return assemble(AssemblyRequest(plan=plan, name="seven", errors=errors, assemblies=2000), Silent())
+def warnings(results: AssemblyResult) -> tuple[str, ...]:
+    return answer(results).warnings
+
+
+def assumptions(results: AssemblyResult) -> tuple[str, ...]:
+    return answer(results).assumptions
+
+
+def summary(results: AssemblyResult) -> dict:
+    return answer(results).summary
 
 
 @pytest.fixture(scope="module")
@@ -85,12 +101,12 @@ def plan(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def expected(plan) -> AssemblyAnswer:
+def expected(plan) -> AssemblyResult:
     return run(plan)
 
 
 @pytest.fixture(scope="module")
-def measured(plan) -> AssemblyAnswer:
+def measured(plan) -> AssemblyResult:
     return run(plan, ERRORS)
 
 
@@ -146,8 +162,8 @@ def effect(samples: int) -> TransmissionEffect:
     )
 
 
-def said(results: AssemblyAnswer) -> str:
-    return " ".join(results.sentences)
+def said(results: AssemblyResult) -> str:
+    return " ".join(answer(results).sentences)
 
 
 @pytest.mark.slow
@@ -167,14 +183,14 @@ def test_a_weighted_norm_is_called_so(plan):
 def test_what_is_to_be_expected_is_said_with_the_noise(expected):
     sweep, at = expected.sweep, tables.at_precision(expected)
     before, after, floor = (value / ARCSECOND for value in (sweep.total[0], sweep.total[at], sweep.noise_floor))
-    sentence = expected.sentences[0]
+    sentence = answer(expected).sentences[0]
     assert f"leave {before:.2f}″ rms of all final angles unadjusted, {after:.2f}″ adjusted" in sentence
     assert f"however large the precision, this plan leaves {floor:.2f}″" in sentence
     assert "noise" not in sentence
 
 
-def text(results: AssemblyAnswer, heading: str) -> str:
-    sections = {section.heading: section.paragraphs for section in results.document.sections}
+def text(results: AssemblyResult, heading: str) -> str:
+    sections = {section.heading: section.paragraphs for section in answer(results).document.sections}
     return " ".join(sections[heading])
 
 
@@ -247,7 +263,7 @@ def test_a_filter_that_gains_nothing_when_tuned_has_no_row_and_no_column(expecte
     same = replace(expected, tolerances=replace(expected.tolerances, retuned=first, verified=first.best))
     assert "Tuning the filter to what is allocated gains nothing here." in said(same)
     assert "random assemblies with the tolerances for a precision of 5, " in said(same)
-    document = same.document
+    document = answer(same).document
     assert "re-tuned" not in " ".join([*document.warnings, *document.answer])
     for _, frame in document.sections[-1].tables:
         assert not any("re-tuned" in column for column in frame.columns)
@@ -362,7 +378,7 @@ def test_a_part_without_a_limit_is_neither_kept_nor_missed(expected):
     assert set(frame.loc[free, "OK"]) == {""} and set(frame.loc[~free, "OK"]) == {"yes"}
 
 
-def limited(results: AssemblyAnswer, limit: float) -> AssemblyAnswer:
+def limited(results: AssemblyResult, limit: float) -> AssemblyResult:
     """Return measured parts of which only the tilt of the bracket is limited [arcsec]."""
     free = np.full(3, np.inf)
     asked = replace(
@@ -453,7 +469,7 @@ def test_of_weighted_angles_only_the_weighted_norm_is_said_to_fall(plan):
     errors = ARCSECOND * np.array([[50.0, 0, 10], [0, 50, 0], [5, 25, -12]])
     weighted = run(replace(plan, weights=np.array([1.0, 2.0, 1.0])), errors)
     assert "The weighted norm of all angles falls, a single angle need not" in " ".join(
-        weighted.document.sections[0].paragraphs
+        answer(weighted).document.sections[0].paragraphs
     )
 
 
@@ -510,7 +526,7 @@ def test_digits_that_mean_nothing_are_cut(measured, expected):
     frame = tables.rounded(pd.DataFrame({"name": ["a"] * 4, "x": [-4.4e-17, -0.0, 13.999999999999998, 1.5e-12]}))
     assert list(map(repr, frame["x"].tolist())) == ["0.0", "0.0", "14.0", "0.0"]
     for results, samples in ((measured, 1), (expected, 10)):
-        for section in replace(results, transmission=effect(samples)).document.sections:
+        for section in answer(replace(results, transmission=effect(samples))).document.sections:
             for name, table in section.tables:
                 for column in table.select_dtypes("float"):
                     values = table[column].dropna().to_numpy()
@@ -522,7 +538,7 @@ def test_without_limits_nothing_is_said_of_tolerances(expected):
     free = np.full(3, np.inf)
     asked = replace(expected.plan.requirements, tilt_limit=free, rotation_limit=free)
     unlimited = replace(expected, plan=replace(expected.plan, requirements=asked))
-    document = unlimited.document
+    document = answer(unlimited).document
     assert "Angular tolerances" not in [section.heading for section in document.sections]
     assert "cost units" not in " ".join(document.answer)
     assert document.summary["tolerances"] is None
@@ -533,7 +549,7 @@ def test_without_limits_nothing_is_said_of_tolerances(expected):
 @pytest.mark.parametrize("errors", [None, ERRORS])
 def test_limits_that_no_tolerances_keep_leave_everything_else(plan, errors):
     tight = replace(plan.requirements, tilt_limit=ARCSECOND * np.array([0.2, np.inf, np.inf]))
-    document = run(replace(plan, requirements=tight), errors).document
+    document = answer(run(replace(plan, requirements=tight), errors)).document
     assert any(warning.startswith("No angular tolerances are given. pump: ") for warning in document.warnings)
     assert "Angular tolerances" not in [section.heading for section in document.sections]
     json.dumps(document.summary, allow_nan=False)
@@ -554,7 +570,7 @@ def test_differences_from_perfect_parts_are_in_percent():
 @pytest.mark.slow
 @pytest.mark.parametrize("samples", [1, 10])
 def test_every_number_has_its_unit_and_every_figure_is_drawn(expected, measured, samples):
-    document = replace(measured if samples == 1 else expected, transmission=effect(samples)).document
+    document = answer(replace(measured if samples == 1 else expected, transmission=effect(samples))).document
     for section in document.sections:
         for name, frame in section.tables:
             for column in frame.columns:
@@ -573,7 +589,7 @@ def test_only_pins_that_carry_are_shown(measured):
 
 
 def test_a_report_without_reducer_and_limits_leaves_their_sections_out(plan):
-    document = run(replace(plan, requirements=None)).document
+    document = answer(run(replace(plan, requirements=None))).document
     assert [section.heading for section in document.sections] == [
         "How errors build up and are adjusted",
         "Precision against effort",
@@ -594,7 +610,7 @@ def test_what_is_assumed_of_parts_is_said_of_those_that_are_measured(measured, e
 def test_a_single_angle_that_rises_is_counted(plan):
     # The rotor's own error, about axes turned by 90°, cancels what the bracket hands on about x.
     results = run(plan, ARCSECOND * np.array([[50.0, 0, 10], [0, 50, 0], [5, 25, -12]]))
-    paragraphs = " ".join(results.document.sections[0].paragraphs)
+    paragraphs = " ".join(answer(results).document.sections[0].paragraphs)
     found = results.measured
     rose = int((np.abs(found.adjusted) > np.abs(found.unadjusted)).sum())
     assert rose > 0

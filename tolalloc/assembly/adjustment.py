@@ -8,26 +8,26 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.assembly.answer.answer import AdjustedParts, AngularTolerances, AssemblyAnswer
 from tolalloc.assembly.control import regulator
 from tolalloc.assembly.files import load_errors, load_plan
-from tolalloc.assembly.gains import expected_angles, norms, precision_sweep, tuned_gains
-from tolalloc.assembly.orientations import transmission_effect
+from tolalloc.assembly.gains import Gains, PrecisionSweep, expected_angles, norms, precision_sweep, tuned_gains
+from tolalloc.assembly.orientations import TransmissionEffect, transmission_effect
 from tolalloc.assembly.plan import LARGEST_PRECISION, AssemblyPlan
 from tolalloc.assembly.tolerances import (
     AngularAllocation,
+    AngularVerification,
+    PrecisionCost,
+    RetunedAllocation,
     allocate_angles,
     angular_limits,
     best_precision,
     retuned_allocation,
     verify_angles,
 )
-from tolalloc.assembly.trajectory import foreseen
+from tolalloc.assembly.trajectory import Trajectory, foreseen
 from tolalloc.drawings.seeds import SeedTree, require_seed
 from tolalloc.exceptions import InputError
-from tolalloc.reducers.equivalent.model import OUTCOMES
-from tolalloc.reports.header import Header
-from tolalloc.running.progress import Progress, RunRecord
+from tolalloc.running.progress import RunRecord
 
 SWEPT = (
     0.0,
@@ -70,6 +70,62 @@ class AssemblyRequest:
     seed: int = 1  # Seed of every random number [-]
 
 
+@dataclass(frozen=True, kw_only=True)
+class AdjustedParts:
+    """Parts whose errors are known, and what is turned."""
+
+    name: str  # Where the errors come from
+    errors: Float[np.ndarray, "part 3"]  # Error of every part about its own axes [rad]
+    sequence: Trajectory  # The assembly step by step
+    unadjusted: Float[np.ndarray, "part 3"]  # Final state if nothing is turned [rad]
+    exact: Float[np.ndarray, "part 3"]  # The same by finite rotations [rad]
+    missed: Float[np.ndarray, "part 3"]  # Standard deviation of what the listed turns miss in the end [rad]
+    norms: Float[np.ndarray, " precision"]  # Weighted norm of the final errors over the precisions of the sweep [rad]
+    # Smallest precision tried at which they keep all limits; none if none of them does, or nothing is limited [-]
+    keeping: float | None
+
+    @property
+    def adjusted(self) -> Float[np.ndarray, "part 3"]:
+        """Final state [rad]."""
+        return np.asarray(self.sequence.adjusted[-1].reshape(-1, 3))
+
+    @property
+    def finite_difference(self) -> float:
+        """Largest difference that finite rotations make in an angle that nobody adjusts [rad]."""
+        return float(np.abs(self.exact - self.unadjusted).max())
+
+
+@dataclass(frozen=True, kw_only=True)
+class AngularTolerances:
+    """Cheapest angular tolerances."""
+
+    adjusted: AngularAllocation  # At the plan's precision, with the filter that expects the plan's tolerances
+    unadjusted: AngularAllocation | str  # The same if nothing is turned, or why there are none
+    retuned: RetunedAllocation  # With the filter tuned again to what was allocated
+    verified: AngularAllocation  # The cheapest of them: with priced effort that at the best precision
+    verification: AngularVerification  # Assemblies at random with it
+    by_precision: PrecisionCost  # Costs over the precision, effort included
+
+
+@dataclass(frozen=True, kw_only=True)
+class AssemblyResult:
+    """One assembly: what is turned, what it leaves, what that does, and what angular tolerances cost."""
+
+    plan: AssemblyPlan  # What was asked
+    gains: Gains  # What is turned at every step, per angle, and what that leaves
+    sweep: PrecisionSweep  # What is to be expected over the precision
+    # Standard deviation of every angle after each step, step by step: with the part as mounted, and as adjusted [rad]
+    expected: Float[np.ndarray, "step 2 state"]
+    # Root of the sum of the variances of all final angles if every step turned the part that it mounts alone; none if
+    # the plan does that [rad]
+    fewer: float | None
+    measured: AdjustedParts | None  # Parts whose errors are known, if any are
+    transmission: TransmissionEffect | None  # What it does to the transmission, if the chain names a reducer
+    # Cheapest angular tolerances, if the chain states limits and costs that some tolerances keep
+    tolerances: AngularTolerances | None
+    unreachable: str  # Why there are none; empty unless limits are out of reach
+
+
 def prepare_assembly(
     chain: str | Path, measured: Path | None = None, precision: float | None = None, seed: int = 1
 ) -> AssemblyRequest:
@@ -93,7 +149,7 @@ def prepare_assembly(
     return AssemblyRequest(plan=plan, name=measured.stem, errors=load_errors(measured, plan), seed=seed)
 
 
-def assemble(request: AssemblyRequest, progress: Progress) -> AssemblyAnswer:
+def assemble(request: AssemblyRequest, record: RunRecord) -> AssemblyResult:
     """Return what is to be turned, what it leaves, what that does, and what tolerances cost.
 
     Raises
@@ -103,7 +159,7 @@ def assemble(request: AssemblyRequest, progress: Progress) -> AssemblyAnswer:
     SolveError
         A unit without equilibrium.
     """
-    plan, record, seeds = request.plan, RunRecord(progress, OUTCOMES), SeedTree(request.seed).child("assembly")
+    plan, seeds = request.plan, SeedTree(request.seed).child("assembly")
     with record.stage("adjustment"):
         gains = tuned_gains(plan, plan.precision, plan.tolerances)
         swept = np.array(sorted({*SWEPT, plan.precision}))
@@ -117,15 +173,7 @@ def assemble(request: AssemblyRequest, progress: Progress) -> AssemblyAnswer:
         transmission = None
         if plan.reducer:
             transmission = transmission_effect(plan, request.errors, shown, seeds.child("transmission"), record.observe)
-    return AssemblyAnswer(
-        header=Header(
-            name=plan.name,
-            model=transmission.reducer.name if transmission else "",
-            seed=request.seed,
-            assumptions=(*plan.assumptions, *(transmission.reducer.assumptions if transmission else ())),
-            statuses=record.counts,
-            stages=record.stages,
-        ),
+    return AssemblyResult(
         plan=plan,
         gains=gains,
         sweep=sweep,

@@ -9,7 +9,6 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.assemble import assemble
 from tolalloc.cli.console import note
 from tolalloc.cli.doctor import doctor
 from tolalloc.cli.inquiries import inquiry_command
@@ -55,7 +54,7 @@ _COMMANDS = (
     inquiry_command("modify"),
     inquiry_command("identify"),
     inquiry_command("diagnose"),
-    assemble,
+    inquiry_command("assemble"),
     inquiry_command("mount"),
     inquiry_command("simulate"),
     schema,

@@ -1,18 +1,23 @@
-"""What the final angles do to the transmission: tables and figures."""
+"""What the final angles of an assembly do to the transmission: sentences, tables and figures."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from jaxtyping import Float
 
-from tolalloc.assembly.answer.tables import rounded
 from tolalloc.assembly.orientations import TransmissionEffect
 from tolalloc.reading.units import ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE
 from tolalloc.reducers import PEAK_TO_PEAK
+from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, HeatMap, Series
+from tolalloc.reports.tellers.assembly_tables import PRECISION, of_rows, tabulated
+from tolalloc.reports.templates import Sentences
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 RATED_PEAK_TO_PEAK = "peak-to-peak transmission error, rated torque [arcsec]"
 PIN_FORCE = "largest pin force, rated torque [N]"
@@ -30,6 +35,7 @@ _CRANK_TURNS = 2
 """Turns of the crank that a curve shows; a whole output turn is too many to read [-]."""
 _EVERY = 4
 """Of the places along the width every such one has a cell [-]."""
+_say = Sentences("assembly")
 
 
 def answers(effect: TransmissionEffect, output: str) -> Float[np.ndarray, "precision good"]:
@@ -64,35 +70,115 @@ def risen(effect: TransmissionEffect, precision: float) -> tuple[str, ...]:
 def value_table(effect: TransmissionEffect) -> pd.DataFrame:
     """Return every output over the precision, the median of random assemblies."""
     names = ["perfect parts", *(f"{precision:g}" for precision in effect.precisions)]
-    values = {
-        output: [perfect(effect, output), *np.median(answers(effect, output), axis=1).tolist()]
-        for output in effect.outputs
-    }
-    return rounded(pd.DataFrame({"precision Q [-]": names, **values}))
+    columns = (
+        of_rows(PRECISION, names),
+        *(
+            of_rows(output, [perfect(effect, output), *np.median(answers(effect, output), axis=1).tolist()])
+            for output in effect.outputs
+        ),
+    )
+    return tabulated("transmission", columns, range(len(names)))
 
 
 def difference_table(effect: TransmissionEffect) -> pd.DataFrame:
     """Return by how much the outputs of that table are above those of perfect parts; a mean angle has no zero."""
-    columns: dict[str, object] = {"precision Q [-]": effect.precisions}
-    for output in effect.outputs:
-        ideal = perfect(effect, output)
-        if ideal > 0:
-            above = 100 * (np.median(answers(effect, output), axis=1) / ideal - 1)
-            columns[f"{output.split(' [')[0]}, above perfect parts [%]"] = above
-    return rounded(pd.DataFrame(columns))
+
+    def above(output: str) -> Float[np.ndarray, " precision"]:
+        return np.asarray(100 * (np.median(answers(effect, output), axis=1) / perfect(effect, output) - 1))
+
+    columns = (
+        of_rows(PRECISION, effect.precisions),
+        *(of_rows(f"{output.split(' [')[0]}, above perfect parts [%]", above(output)) for output in _counted(effect)),
+    )
+    return tabulated("above perfect parts", columns, range(effect.precisions.size))
 
 
-def fallen_table(effect: TransmissionEffect) -> pd.DataFrame:
+def fallen_table(effect: TransmissionEffect) -> pd.DataFrame | None:
     """Return in how many random assemblies an output is smaller than unadjusted; nothing of a single one."""
     if effect.good.size == 1:
-        return pd.DataFrame()
-    shares = {
-        f"{output.split(' [')[0]}, smaller than unadjusted [%]": 100
-        * (answers(effect, output)[1:] < answers(effect, output)[0]).mean(axis=1)
-        for output in effect.outputs
-        if perfect(effect, output) > 0
-    }
-    return rounded(pd.DataFrame({"precision Q [-]": effect.precisions[1:], **shares}))
+        return None
+
+    def smaller(output: str) -> Float[np.ndarray, " precision"]:
+        values = answers(effect, output)
+        return np.asarray(100 * (values[1:] < values[0]).mean(axis=1))
+
+    columns = (
+        of_rows(PRECISION, effect.precisions[1:]),
+        *(
+            of_rows(f"{output.split(' [')[0]}, smaller than unadjusted [%]", smaller(output))
+            for output in _counted(effect)
+        ),
+    )
+    return tabulated("smaller than unadjusted", columns, range(effect.precisions.size - 1))
+
+
+def _counted(effect: TransmissionEffect) -> tuple[str, ...]:
+    """Return the outputs that have a zero."""
+    return tuple(output for output in effect.outputs if perfect(effect, output) > 0)
+
+
+def transmission_sentences(effect: TransmissionEffect, precision: float) -> tuple[str, str]:
+    """Return what adjusting gains: the line load, and outputs that need not follow the angles."""
+    at, single = int(np.flatnonzero(effect.precisions == precision)[0]), effect.good.size == 1
+
+    def said(output: str) -> str:
+        values, (before, after) = answers(effect, output), change(effect, output, precision)
+        return _say(
+            "change" if single else "change_of_many",
+            before=before,
+            after=after,
+            unit=output.removesuffix("]").split(" [")[1],
+            perfect=perfect(effect, output),
+            smaller=int((values[at] < values[0]).sum()),
+            many=values.shape[1],
+        )
+
+    key = "line_load" if single else "line_load_of_many"
+    return (
+        _say(key, many=int(effect.good.sum()), change=said(LINE_LOAD)),
+        _say(
+            "transmission",
+            torque=effect.test_torque,
+            test=said(PEAK_TO_PEAK),
+            rated=said(RATED_PEAK_TO_PEAK),
+            force=said(PIN_FORCE),
+        ),
+    )
+
+
+def transmission_warnings(effect: TransmissionEffect, precision: float) -> tuple[str, ...]:
+    """Return which outputs adjusting leaves larger, how that can be, and how many assemblies are left out."""
+    rose, failed = risen(effect, precision), int((~effect.good).sum())
+    key = "warn_risen" if effect.good.size == 1 else "warn_risen_of_many"
+    many = int(effect.good.sum())
+    return (
+        *((_say(key, outputs=", ".join(rose), many=many, why=_say("why_larger")),) if rose else ()),
+        *((_say("warn_failed", failed=failed),) if failed else ()),
+    )
+
+
+def transmission_section(effect: TransmissionEffect, precision: float, *, measured: bool) -> Section:
+    """Return the section on the transmission."""
+    fallen = fallen_table(effect)
+    which = _say("of_measured" if measured else "of_first_random")
+    return Section(
+        heading=_say("transmission_heading"),
+        paragraphs=(
+            _say("section_transmission", why=_say("why_larger"), torque=effect.test_torque),
+            _say("section_curves", which=which),
+        ),
+        figures=(
+            *curve_figures(effect),
+            *precision_figures(effect),
+            pressure_map(effect, precision),
+            deformation_figure(effect),
+        ),
+        tables=(
+            ("transmission", value_table(effect)),
+            ("above perfect parts", difference_table(effect)),
+            *((("smaller than unadjusted", fallen),) if fallen is not None else ()),
+        ),
+    )
 
 
 def curve_figures(effect: TransmissionEffect) -> tuple[Figure, Figure]:
@@ -114,14 +200,14 @@ def curve_figures(effect: TransmissionEffect) -> tuple[Figure, Figure]:
     return (
         Figure(
             name="transmission_error",
-            title=f"Transmission error at rated torque less its mean over a turn, {_CRANK_TURNS} turns of the cranks",
+            title=_say("transmission_error_figure", turns=_CRANK_TURNS),
             x_label="carrier angle [°]",
             y_label="transmission error less its mean [arcsec]",
             series=drawn(error - error.mean(axis=1, keepdims=True)),
         ),
         Figure(
             name="mesh_force",
-            title="Sum of the pin forces of the disc that carries most, at rated torque",
+            title=_say("mesh_force_figure"),
             x_label="carrier angle [°]",
             y_label="sum of pin forces of a disc [N]",
             series=drawn(force),
@@ -137,12 +223,12 @@ def precision_figures(effect: TransmissionEffect) -> tuple[Figure, ...]:
 def _over_precision(effect: TransmissionEffect, name: str, output: str) -> Figure:
     values, many = answers(effect, output), effect.good.size > 1
     low, high = (list(edge) for edge in np.percentile(values, BAND, axis=1)) if many else ((), ())
-    label = f"median and band from {BAND[0]:g} to {BAND[1]:g} % of random assemblies" if many else "measured parts"
-    short = f"median, {BAND[0]:g} to {BAND[1]:g} %" if many else label
+    label = _say("band" if many else "single", low=BAND[0], high=BAND[1])
+    short = _say("short_band" if many else "single", low=BAND[0], high=BAND[1])
     return Figure(
         name=name,
-        title=f"{output.split(' [')[0].capitalize()}: {short}; dashed: perfect parts",
-        x_label="precision Q [-]",
+        title=_say("over_precision_figure", output=output.split(" [")[0].capitalize(), of=short),
+        x_label=PRECISION,
         y_label=output,
         series=(
             Series(
@@ -167,8 +253,7 @@ def pressure_map(effect: TransmissionEffect, precision: float) -> HeatMap:
     first = effect.patterns[0]
     return HeatMap(
         name="pressure",
-        title=f"Hertz pressure of the pins that carry, disc {first.disc} at carrier angle "
-        f"{first.carrier_angle / DEGREE:.1f}°",
+        title=_say("pressure_figure", disc=first.disc, angle=first.carrier_angle / DEGREE),
         columns=[f"{place:.1f}" for place in first.position[::_EVERY] / MILLIMETRE],
         rows=[f"Q = {value:g}, pin {pin + 1}" for value, _, pin in rows],
         x_label="place along the width [mm]",
@@ -181,7 +266,7 @@ def deformation_figure(effect: TransmissionEffect) -> Figure:
     """Return the largest compression of every pin that carries."""
     return Figure(
         name="deformation",
-        title=f"Largest compression of the pins that carry, disc {effect.patterns[0].disc}",
+        title=_say("deformation_figure", disc=effect.patterns[0].disc),
         x_label="pin [-]",
         y_label="compression [µm]",
         series=tuple(

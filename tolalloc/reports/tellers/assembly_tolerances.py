@@ -1,0 +1,225 @@
+"""Angular tolerances of an assembly: what each may be, what it costs, which limit asks for it, and what proves it."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tolalloc.assembly.adjustment import AngularTolerances, AssemblyResult
+from tolalloc.assembly.plan import AssemblyPlan
+from tolalloc.assembly.tolerances import AngularAllocation, angular_problem
+from tolalloc.reading.units import ARCSECOND
+from tolalloc.reports.columns import Column
+from tolalloc.reports.document import Section
+from tolalloc.reports.figure import Figure, Series
+from tolalloc.reports.tellers.assembly_tables import PRECISION, has_limits, of_rows, tabulated
+from tolalloc.reports.templates import Sentences
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_NOTHING = 1e-6
+"""Share of the cost below which one filter is as cheap as another; solvers differ by less [-]."""
+_say = Sentences("assembly")
+
+
+def limited_tolerances(result: AssemblyResult) -> AngularTolerances | None:
+    """Return the cheapest tolerances; where nothing is limited, none mean anything."""
+    return result.tolerances if has_limits(result) else None
+
+
+def is_priced(plan: AssemblyPlan) -> bool:
+    """Return whether turning has a price."""
+    return plan.requirements is not None and plan.requirements.effort_price > 0
+
+
+def is_retuned(tolerances: AngularTolerances) -> bool:
+    """Return whether a filter that is tuned to what is allocated gains anything."""
+    return tolerances.retuned.best.total < tolerances.adjusted.total * (1 - _NOTHING)
+
+
+def allocations(plan: AssemblyPlan, tolerances: AngularTolerances) -> dict[str, AngularAllocation]:
+    """Return the allocations that differ, by what was adjusted; only priced effort makes one precision the best."""
+    found = {} if isinstance(tolerances.unadjusted, str) else {"unadjusted": tolerances.unadjusted}
+    found["adjusted"] = tolerances.adjusted
+    if is_retuned(tolerances):
+        found["re-tuned"] = tolerances.retuned.best
+    if is_priced(plan):
+        found["best precision"] = tolerances.by_precision.best
+    return found
+
+
+def verified_name(plan: AssemblyPlan, tolerances: AngularTolerances) -> str:
+    """Return which of the allocations is verified."""
+    made = allocations(plan, tolerances)
+    # A filter tuned again that gains nothing leaves the adjusted tolerances.
+    return next((name for name, each in made.items() if each is tolerances.verified), "adjusted")
+
+
+def tolerance_table(plan: AssemblyPlan, tolerances: AngularTolerances) -> pd.DataFrame:
+    """Return every tolerance and what it costs, part by part and axis by axis."""
+    part, axis = zip(*product(plan.chain.names, "xyz"), strict=True)
+    made = allocations(plan, tolerances)
+
+    def cost(each: AngularAllocation) -> list[float]:
+        features = angular_problem(plan, each.gains.errors).features
+        return [
+            float(feature.processes[0].total(np.array(tolerance)))
+            for feature, tolerance in zip(features, each.tolerances.ravel() / ARCSECOND, strict=True)
+        ]
+
+    columns = (
+        of_rows("part", part),
+        of_rows("axis", axis),
+        of_rows("stated, ± [arcsec]", plan.tolerances.ravel() / ARCSECOND),
+        *(of_rows(f"{name}, ± [arcsec]", each.tolerances.ravel() / ARCSECOND) for name, each in made.items()),
+        *(of_rows(f"cost {name} [{{cost}}]", cost(each)) for name, each in made.items()),
+    )
+    return tabulated("angular tolerances", columns, range(len(part)))
+
+
+def limit_table(plan: AssemblyPlan, tolerances: AngularTolerances) -> pd.DataFrame:
+    """Return every limit: what fills it, what it costs, and what random assemblies keep."""
+    found, verified = tolerances.verified, tolerances.verification
+    limits, name = found.limits, verified_name(plan, tolerances)
+    noise = 100 * (limits.noise(found.gains.errors) / limits.values) ** 2
+    columns = (
+        of_rows("limit of", limits.names),
+        of_rows("limit, 3σ [arcsec]", limits.values / ARCSECOND),
+        *(
+            of_rows(f"{made}, 3σ [arcsec]", each.spread / ARCSECOND)
+            for made, each in allocations(plan, tolerances).items()
+        ),
+        of_rows(f"noise in the limit's square, {name} [%]", noise),
+        of_rows(f"saved by a wider limit, {name} [{{cost}}/arcsec]", found.prices * ARCSECOND),
+        of_rows(f"verified, {name}, 3σ [arcsec]", verified.spread / ARCSECOND),
+        of_rows("its standard error [arcsec]", verified.standard_error / ARCSECOND),
+        of_rows("within [%]", [100 * share.estimate for share in verified.shares]),
+        of_rows("low 2.5 % [%]", [100 * share.low for share in verified.shares]),
+        of_rows("high 97.5 % [%]", [100 * share.high for share in verified.shares]),
+    )
+    return tabulated("limits", columns, range(len(limits.names)))
+
+
+_CERTIFICATES: tuple[Column[tuple[str, AngularAllocation]], ...] = (
+    Column(header="allocation", value=lambda row: row[0]),
+    Column(header=PRECISION, value=lambda row: row[1].gains.precision),
+    Column(header="tolerances [{cost}]", value=lambda row: row[1].cost),
+    Column(header="effort [{cost}]", value=lambda row: row[1].effort_cost),
+    Column(header="total [{cost}]", value=lambda row: row[1].total),
+    Column(header="lower bound, own gains [{cost}]", value=lambda row: row[1].bound),
+    Column(header="above the bound [%]", value=lambda row: 100 * row[1].gap),
+)
+
+
+def certificate_table(plan: AssemblyPlan, tolerances: AngularTolerances) -> pd.DataFrame:
+    """Return costs and lower bounds of the allocations."""
+    return tabulated("certificates", _CERTIFICATES, list(allocations(plan, tolerances).items()))
+
+
+def precision_table(tolerances: AngularTolerances) -> pd.DataFrame:
+    """Return costs over the precision."""
+    found = tolerances.by_precision
+    columns = (
+        of_rows(PRECISION, found.precisions),
+        of_rows("tolerances [{cost}]", found.cost),
+        of_rows("effort [{cost}]", found.effort_cost),
+        of_rows("total [{cost}]", found.total),
+    )
+    return tabulated("cost by precision", columns, range(found.precisions.size))
+
+
+def cost_sentences(plan: AssemblyPlan, tolerances: AngularTolerances) -> tuple[str, ...]:
+    """Return what the cheapest tolerances cost, with and without adjusting."""
+    adjusted, best, found = tolerances.adjusted, tolerances.retuned.best, tolerances.by_precision
+    without = (
+        _say("no_tolerances_unadjusted")
+        if isinstance(tolerances.unadjusted, str)
+        else _say("cost_unadjusted", total=tolerances.unadjusted.total)
+    )
+    share, verified = tolerances.verification.share, tolerances.verified.gains.precision
+    which = {"adjusted": "of_adjusted", "re-tuned": "of_retuned", "best precision": "of_best"}
+    priced = _say(
+        "cost_best" if found.interior else "cost_best_at_end",
+        best=found.best.gains.precision,
+        total=found.best.total,
+        adjusted=adjusted.total,
+        precision=plan.precision,
+    )
+    return (
+        _say(
+            "cost_adjusted",
+            total=adjusted.total,
+            precision=adjusted.gains.precision,
+            without=without,
+            bound=adjusted.bound,
+            gap=max(adjusted.gap, 0.0),
+        ),
+        _say("cost_retuned", total=best.total, less=1 - best.total / adjusted.total)
+        if is_retuned(tolerances)
+        else _say("nothing_retuned"),
+        *((priced,) if is_priced(plan) else ()),
+        _say(
+            "verified",
+            assemblies=tolerances.verification.assemblies,
+            which=_say(which[verified_name(plan, tolerances)], precision=verified),
+            share=share.estimate,
+            low=share.low,
+            high=share.high,
+        ),
+    )
+
+
+def tolerance_warnings(tolerances: AngularTolerances) -> tuple[str, ...]:
+    """Return what is not proven of the allocations."""
+    return (
+        *((_say("warn_unadjusted", why=tolerances.unadjusted),) if isinstance(tolerances.unadjusted, str) else ()),
+        *((_say("warn_retuned"),) if is_retuned(tolerances) else ()),
+        *(() if tolerances.retuned.settled else (_say("warn_not_settled"),)),
+    )
+
+
+def tolerance_section(plan: AssemblyPlan, tolerances: AngularTolerances) -> Section:
+    """Return the section on angular tolerances."""
+    tuned = _say("section_retuned" if is_retuned(tolerances) else "section_nothing_retuned")
+    best = f" {_say('section_best')}" if is_priced(plan) else ""
+    return Section(
+        heading=_say("tolerances_heading"),
+        paragraphs=(
+            _say("section_tolerances", tuned=f"{tuned}{best}"),
+            _say("section_verified", which=verified_name(plan, tolerances)),
+        ),
+        figures=(_cost_figure(plan, tolerances),),
+        tables=(
+            ("angular tolerances", tolerance_table(plan, tolerances)),
+            ("limits", limit_table(plan, tolerances)),
+            ("certificates", certificate_table(plan, tolerances)),
+            ("cost by precision", precision_table(tolerances)),
+        ),
+    )
+
+
+def _cost_figure(plan: AssemblyPlan, tolerances: AngularTolerances) -> Figure:
+    """Return what tolerances and effort cost over the precision."""
+    found = tolerances.by_precision
+    known = np.isfinite(found.total)
+    costs = {"tolerances": found.cost, "effort": found.effort_cost, "both": found.total}
+    priced, best = is_priced(plan), found.best
+    least = Series(label="least of both", kind="points", x=[best.gains.precision], y=[best.total])
+    return Figure(
+        name="cost",
+        title=_say("cost_figure"),
+        x_label=PRECISION,
+        y_label="cost [cost units]",
+        series=(
+            *(
+                Series(label=label, kind="line", x=list(found.precisions[known]), y=list(values[known]))
+                for label, values in costs.items()
+                if priced or label == "tolerances"
+            ),
+            *((least,) if priced else ()),
+        ),
+        logarithmic_x=True,
+    )
