@@ -160,6 +160,15 @@ def limited_shares(requirement: Requirement) -> tuple[float, ...]:
     """Return the share of the quantile that each limit must keep, the upper one's first [-].
 
     Two limits leave half of the rejects beyond either of them.
+
+    1 − (1 − Y)/k of k limits, or its complement for a lower one (own derivation).
+
+    Examples
+    --------
+    >>> from tolalloc.capability.indices import Limits
+    >>> both = Requirement(output="gap [mm]", limits=Limits(lower=0.0, upper=1.0), guarantee=AtYield(target=0.99))
+    >>> [round(share, 4) for share in limited_shares(both)]
+    [0.995, 0.005]
     """
     target = requirement.guarantee.target if isinstance(requirement.guarantee, AtYield) else USUAL_YIELD
     sides = requirement.limits.turned

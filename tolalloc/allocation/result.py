@@ -195,7 +195,26 @@ class AllocationResult:
 
 
 def solver_noise(solution: Solution) -> float:
-    """Return the cost below which a price tells nothing of a solution [cost units]."""
+    """Return the cost below which a price tells nothing of a solution [cost units].
+
+    max(gap, 1e-6)·cost, with gap = cost/bound − 1 (own derivation).
+
+    Examples
+    --------
+    >>> from tolalloc.allocation.space.problem import Solution
+    >>> none = np.empty(0)
+    >>> found = Solution(
+    ...     zones=none,
+    ...     processes=none.astype(int),
+    ...     shared=none,
+    ...     cost=50.0,
+    ...     bound=49.0,
+    ...     prices=none,
+    ...     bound_prices=np.empty((0, 2)),
+    ... )
+    >>> round(solver_noise(found), 3)
+    1.02
+    """
     return max(solution.gap, _ROUNDING) * solution.cost
 
 

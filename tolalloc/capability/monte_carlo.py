@@ -135,6 +135,8 @@ def proportion(units: int, rejected: int) -> Yield:
 def allowed_rejections(units: int, target: float, confidence: float = CONFIDENCE) -> int:
     """Return how many rejected units still show the target yield with one-sided confidence; −1 if none do.
 
+    The largest k with P(rejects ≤ k) ≤ 1 − confidence, rejects ~ B(units, 1 − target): Clopper & Pearson 1934.
+
     Notes
     -----
     As many as a design just at the target rejects with at most the error that is left: what Clopper–Pearson's bound
@@ -174,6 +176,18 @@ def monte_carlo(
     -----
     The deviations are kept, the uniform numbers behind them only for one chunk at a time. The response takes all units
     at once and solves them in chunks of its own, so that an executor has many chunks to spread.
+
+    References
+    ----------
+    Deviations are quantiles x = F⁻¹(u) of uniform numbers u: Devroye 1986, Non-Uniform Random Variate Generation, ch. 2.
+
+    Examples
+    --------
+    A sum with σ of 1 and 2 has √(1 + 4) = 2.24.
+
+    >>> from tolalloc.capability.experiment import sum_of_sizes
+    >>> round(float(monte_carlo(sum_of_sizes(6.0, 12.0), 10_000).values.std()), 1)
+    2.2
     """
     errors, seeds = experiment.errors, experiment.seeds
     x = np.empty((units, len(errors.columns)))

@@ -74,6 +74,14 @@ def worst_unit(
     References
     ----------
     Frank, M. and Wolfe, P. (1956). An algorithm for quadratic programming. Naval Research Logistics 3, 95-110.
+
+    Examples
+    --------
+    Sizes with zones of 6 and 8 add up to 3 + 4 at worst.
+
+    >>> from tolalloc.capability.experiment import sum_of_sizes
+    >>> worst_unit(sum_of_sizes(6.0, 8.0), starts=2, steps=4).value
+    7.0
     """
     errors, allowed = experiment.errors, experiment.largest_failed_share
     if errors.joint:

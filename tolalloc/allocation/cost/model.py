@@ -203,6 +203,8 @@ ClosedForm = Reciprocal | ReciprocalPower | Exponential | Combined
 def stacked(costs: Sequence[ClosedForm]) -> ClosedForm:
     """Return costs of one form as one whose parameters are columns, so that a row of zones belongs to each.
 
+    cᵢ(tᵢ) by its own form for every row i (own derivation) [cost units]; nothing is approximated.
+
     >>> stacked([Reciprocal(factor=1.0), Reciprocal(factor=2.0)]).value(np.array([[1.0, 2.0], [1.0, 2.0]]))
     array([[1. , 0.5],
            [2. , 1. ]])

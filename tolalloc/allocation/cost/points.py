@@ -366,6 +366,9 @@ class CostFit:
 def fits(points: Points) -> tuple[CostFit, ...]:
     """Return every closed form that the points suffice for, fitted to the smallest squares of relative errors.
 
+    Least Σ (c(tᵢ)/cᵢ − 1)² of c(t) = A + B/t, A + B/tᵏ, A + B·exp(−t/T), A + B/tᵏ·exp(−t/T) [cost units] (own
+    derivation); valid from the smallest to the largest zone of the points.
+
     Raises
     ------
     InputError
@@ -413,6 +416,14 @@ def best_fit(points: Points) -> CostFit:
     References
     ----------
     T. Hastie, R. Tibshirani, J. Friedman, The Elements of Statistical Learning, 2nd ed., Springer (2009), section 7.10.
+
+    Examples
+    --------
+    Costs of 2 + 30/t are told by the form with two parameters.
+
+    >>> points = Points(zones=(10.0, 20.0, 40.0, 60.0), costs=(5.0, 3.5, 2.75, 2.5))
+    >>> type(best_fit(points).model).__name__
+    'Reciprocal'
     """
     candidates = fits(points)
     best = min(candidates, key=lambda fit: fit.leave_one_out)

@@ -146,7 +146,19 @@ PlacedRow = tuple[str, ProcessCostRow]
 
 
 def today(source: Source) -> Process:
-    """Return the one way to make a feature that the tolerance table knows: its cost falls as 1/zone."""
+    """Return the one way to make a feature that the tolerance table knows: its cost falls as 1/zone.
+
+    c(t) = cost·zone/t [cost units]: the reciprocal form of Chase & Greenwood 1988, Manuf. Rev. 1, 50–59.
+
+    Examples
+    --------
+    Half of a zone that costs 9 costs 18.
+
+    >>> from tolalloc.drawings.zones import Feature
+    >>> hub = Source(name="hub", part="hub", feature=Feature.SIZE, zone=0.2e-3, minimum=0.03e-3, maximum=0.5e-3, cost=9)
+    >>> round(float(today(hub).total(np.array(0.1e-3))), 6)
+    18.0
+    """
     return Process(
         name=source.process or "as today",
         cost=Reciprocal(factor=source.cost * source.zone),
@@ -161,6 +173,8 @@ def priced(
     tolerance: Literal["zone", "half zone"] = "zone",
 ) -> ProcessesOfSources:
     """Return the ways to make features from costs A + B/t, for a user's own model.
+
+    The cost A + B/t, valid within the range of the process: Chase & Greenwood 1988, Manuf. Rev. 1, 50–59.
 
     A feature without a row keeps the one way of the tolerance table.
 

@@ -194,6 +194,9 @@ def best_front(found: SearchedDesigns, number: int) -> SearchedDesigns:
 def nondominated(losses: Float[np.ndarray, "design objective"]) -> Bool[np.ndarray, " design"]:
     """Return which designs no other one beats in one objective without losing in another; equal ones stay both.
 
+    Beaten by b: bᵢ ≤ aᵢ in every objective and bᵢ < aᵢ in one. Sorted as by Deb, Pratap, Agarwal & Meyarivan 2002, IEEE
+    Trans. Evol. Comput. 6, 182–197.
+
     Examples
     --------
     >>> nondominated(np.array([[1.0, 3.0], [2.0, 2.0], [2.0, 4.0]]))
@@ -210,6 +213,13 @@ def thinned(losses: Float[np.ndarray, "design objective"], number: int) -> Int[n
     References
     ----------
     Kukkonen & Deb 2006, CEC, 1179–1186, for two objectives; Kukkonen & Deb 2006, PPSN IX, 553–562, for more.
+
+    Examples
+    --------
+    Of two neighbours one is left out, the ends stay.
+
+    >>> thinned(np.array([[0.0, 4.0], [2.0, 2.0], [2.1, 1.9], [4.0, 0.0]]), 3).tolist()
+    [0, 1, 3]
     """
     if len(losses) <= number:
         return np.arange(len(losses))

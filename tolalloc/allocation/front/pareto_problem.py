@@ -116,12 +116,28 @@ Ladders = Mapping[str, Float[np.ndarray, " position"]]
 
 
 def to_genes(designs: Float[np.ndarray, "*designs variable"], groups: int) -> Float[np.ndarray, "*designs variable"]:
-    """Return designs with the logarithms of their scales, of which there are as many as groups."""
+    """Return designs with the logarithms of their scales, of which there are as many as groups.
+
+    gene = ln(scale) for scales above 0, so that equal steps are equal ratios (own derivation).
+
+    Examples
+    --------
+    >>> to_genes(np.array([np.e, 5.0]), 1).tolist()
+    [1.0, 5.0]
+    """
     return np.concatenate([np.log(designs[..., :groups]), designs[..., groups:]], axis=-1)
 
 
 def from_genes(genes: Float[np.ndarray, "*designs variable"], groups: int) -> Float[np.ndarray, "*designs variable"]:
-    """Return the designs whose scales have these logarithms."""
+    """Return the designs whose scales have these logarithms.
+
+    scale = exp(gene), the inverse of `to_genes` (own derivation).
+
+    Examples
+    --------
+    >>> from_genes(np.array([0.0, 5.0]), 1).tolist()
+    [1.0, 5.0]
+    """
     return np.concatenate([np.exp(genes[..., :groups]), genes[..., groups:]], axis=-1)
 
 
@@ -210,6 +226,8 @@ def normalised(
 ) -> Float[np.ndarray, "design objective"]:
     """Return losses where 0 is the best and 1 the worst value on a front, (loss − ideal)/(nadir − ideal) [-].
 
+    As by Das 1999, Struct. Optim. 18, 107–115; an objective that is the same on the whole front is only shifted.
+
     >>> normalised(np.array([[2.0, 3.0]]), np.array([[1.0, 5.0], [3.0, 1.0]]))
     array([[0.5, 0.5]])
     """
@@ -246,6 +264,8 @@ def knee(losses: Float[np.ndarray, "design objective"]) -> int:
 
 def spread_over(count: int, number: int) -> list[int]:
     """Return at most so many positions among ``count``, evenly spread, the first and the last among them.
+
+    Position k is ⌊k·(count − 1)/(number − 1)⌋ (own derivation).
 
     >>> spread_over(10, 4)
     [0, 3, 6, 9]

@@ -272,6 +272,18 @@ def choose_whole_numbers(
     ------
     SolveError
         The solver gave up.
+
+    References
+    ----------
+    Branch and bound on the relaxation 0 ≤ z ≤ 1: Land & Doig 1960, Econometrica 28, 497–520; solved by HiGHS.
+
+    Examples
+    --------
+    The cheap choice of two would take more than the limit.
+
+    >>> one = np.ones((1, 2))
+    >>> choose_whole_numbers(np.array([3.0, 1.0]), np.array([[1.0, 4.0]]), np.array([2.0]), one, 100).values.round().astype(int)
+    array([1, 0])
     """
     import cvxpy as cp
 

@@ -47,6 +47,18 @@ def feature_options(
     ------
     InputError
         No process of the feature can hold a step.
+
+    Notes
+    -----
+    cost = A + c(t) + loss·t² of every step t within the range of the process (own derivation) [cost units].
+
+    Examples
+    --------
+    >>> from tolalloc.allocation.cost.model import Process, Reciprocal
+    >>> made = Process(name="bored", cost=Reciprocal(factor=8.0), minimum=2.0, maximum=9.0)
+    >>> bore = PricedFeature(name="bore", processes=(made,))
+    >>> [option.cost for option in feature_options(bore, np.array([1.0, 2.0, 4.0]), ("a", "b", "c"))]
+    [4.0, 2.0]
     """
     options = tuple(
         Option(

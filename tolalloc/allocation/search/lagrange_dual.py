@@ -285,6 +285,24 @@ def ascend(
     Nothing more is asked for once a bound is enough [cost units]. The logarithms of the prices and the directions of
     the norms move together. Where processes tie the dual has a kink, and the ascent may stop short of its top; every
     multiplier on the way gives a valid bound all the same.
+
+    References
+    ----------
+    max over λ ≥ 0 of the dual, Boyd & Vandenberghe 2004, ch. 5; by L-BFGS-B, Byrd, Lu, Nocedal & Zhu 1995.
+
+    Examples
+    --------
+    Zones of 1/t each that add up to 2 cost 2; the price is 1.
+
+    >>> from tolalloc.allocation.space.problem import PricedFeature, Stack
+    >>> made = Process(name="turned", cost=Reciprocal(factor=1.0), minimum=0.5, maximum=9.0)
+    >>> features = tuple(PricedFeature(name=name, processes=(made,)) for name in ("bore", "pin"))
+    >>> stack = Stack(name="play", worst_case=np.ones(2), root_sum_square=np.zeros(2), budget=2.0)
+    >>> problem = AllocationProblem(features=features, stacks=(stack,))
+    >>> dual = LagrangeDual(problem)
+    >>> start = dual.price(np.array([0.2]), dual.planes(np.ones(2)))
+    >>> round(max(dual.bound(priced, np.ones(2, bool)) for priced in ascend(dual, start, np.ones(2, bool))), 6)
+    2.0
     """
     from scipy.optimize import minimize
 
@@ -325,6 +343,9 @@ def cost_bound(
     enough: float = np.inf,
 ) -> float:
     """Return a lower bound on the cost of every design, made by whatever processes, that keeps all stacks.
+
+    max over λ ≥ 0 of min over zones of cost + Σ λ·(load − budget) ≤ cost of any design: Boyd & Vandenberghe 2004, ch. 5
+    [cost units].
 
     Parameters
     ----------

@@ -114,6 +114,20 @@ def exchanged(program: MultipleChoice, values: Float[np.ndarray, " choice"]) -> 
     """Return choices that no exchange of two improves: less violation first, then less cost.
 
     The exchanges start from the dearest of the choices of which the relaxation takes some value [-].
+
+    An exchange of two of groups a and b changes the cost by Δa + Δb < 0 (own derivation); it need not end at the best.
+
+    Examples
+    --------
+    >>> program = MultipleChoice(
+    ...     group=np.array([0, 0, 1, 1]),
+    ...     cost=np.array([9.0, 4.0, 6.0, 3.0]),
+    ...     worst_case=np.array([[0.2, 0.6, 0.2, 0.6]]),
+    ...     squares=np.zeros((1, 4)),
+    ...     budget=np.ones(1),
+    ... )
+    >>> exchanged(program, np.ones(4)).tolist()
+    [1, 2]
     """
     liking = np.where(values > 1e-9, program.cost + 1e-9 * (1.0 + np.ptp(program.cost)) * values, -np.inf)
     parts = np.split(liking, program.starts[1:])
@@ -308,6 +322,9 @@ ProvenChoice = tuple[Int[np.ndarray, " group"], float, float]
 
 def best_choice(program: MultipleChoice, most_nodes: int) -> ProvenChoice | None:
     """Return the best choice, None where no choice is allowed.
+
+    min Σ cost·z with Σ worst_case·z + √(Σ squares·z) ≤ budget and one z = 1 in every group: the module's notes. Branch
+    and bound: Land & Doig 1960, Econometrica 28, 497–520.
 
     After so many nodes of the mixed-integer programs together [-] it is the best allowed one so far with its bound.
 

@@ -83,6 +83,22 @@ def second_best(problem: AllocationProblem, best: Solution, most_nodes: int = 50
 
     Sets that differ only in which of several alike features takes which process count as one. The search ends with what
     it has after so many nodes [-].
+
+    Branch and bound over all sets but one: Lawler 1972, Management Science 18, 401–405.
+
+    Examples
+    --------
+    A bore 4 wide is ground for 3 or honed for 5.
+
+    >>> from tolalloc.allocation.cost.model import Process, Reciprocal
+    >>> from tolalloc.allocation.space.problem import PricedFeature, Stack
+    >>> ground = Process(name="ground", cost=Reciprocal(factor=12.0), minimum=1.0, maximum=9.0)
+    >>> honed = Process(name="honed", cost=Reciprocal(fixed=2.0, factor=12.0), minimum=1.0, maximum=9.0)
+    >>> stack = Stack(name="play", worst_case=np.ones(1), root_sum_square=np.zeros(1), budget=4.0)
+    >>> bore = PricedFeature(name="bore", processes=(ground, honed))
+    >>> problem = AllocationProblem(features=(bore,), stacks=(stack,))
+    >>> round(second_best(problem, allocate(problem)).cost, 6)
+    5.0
     """
     search = _BranchAndBound(problem)
     others, free = [], np.ones(search.dual.feature.size, dtype=bool)

@@ -83,6 +83,8 @@ def _size_step(nominal: float) -> int:
 def grade_zones(nominal: float) -> dict[str, float]:
     """Return the zone of every grade of a nominal size in metres, finest first [m]; printed values of ISO 286-1.
 
+    As printed in ISO 286-1:2010; from IT12 on IT(n) = 10·IT(n − 5). For 0 to 500 mm.
+
     >>> round(grade_zones(0.052)["IT6"] * 1e6), round(grade_zones(0.052)["IT12"] * 1e6)
     (19, 300)
     """

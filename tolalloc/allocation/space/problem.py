@@ -179,6 +179,8 @@ class LeastInfeasible:
 def least_infeasible(problem: AllocationProblem) -> LeastInfeasible:
     """Return the design with the smallest largest violation; if it does not keep all stacks, no design does.
 
+    min max (load − budget)/scale over all stacks [-] (own derivation); exact.
+
     Raises
     ------
     SolveError

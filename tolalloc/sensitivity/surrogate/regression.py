@@ -356,7 +356,16 @@ class RegressionCandidate:
 
 
 def fitted(estimator: Any, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, "sample *output"]) -> Any:
-    """Return the fitted estimator."""
+    """Return the fitted estimator.
+
+    w = argmin of the estimator's own objective, such as Σ (y − ŷ)² + α·Σ w² (Hoerl & Kennard 1970).
+
+    Examples
+    --------
+    >>> x = np.linspace(-1.0, 1.0, 20)[:, np.newaxis]
+    >>> round(float(fitted(quadratic_regression(), x, 3.0 + x[:, 0]).predict([[0.0]])[0]), 3)
+    3.0
+    """
     from sklearn.exceptions import ConvergenceWarning
 
     with warnings.catch_warnings():
