@@ -179,7 +179,7 @@ def monte_carlo(
 
     References
     ----------
-    Deviations are quantiles x = F⁻¹(u) of uniform numbers u: Devroye 1986, Non-Uniform Random Variate Generation, ch. 2.
+    Quantiles x = F⁻¹(u) of uniform numbers u: Devroye 1986, Non-Uniform Random Variate Generation, ch. 2.
 
     Examples
     --------

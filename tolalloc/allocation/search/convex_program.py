@@ -282,8 +282,9 @@ def choose_whole_numbers(
     The cheap choice of two would take more than the limit.
 
     >>> one = np.ones((1, 2))
-    >>> choose_whole_numbers(np.array([3.0, 1.0]), np.array([[1.0, 4.0]]), np.array([2.0]), one, 100).values.round().astype(int)
-    array([1, 0])
+    >>> found = choose_whole_numbers(np.array([3.0, 1.0]), np.array([[1.0, 4.0]]), np.array([2.0]), one, 100)
+    >>> found.is_optimal, found.values.round().astype(int).tolist()
+    (True, [1, 0])
     """
     import cvxpy as cp
 
