@@ -148,6 +148,8 @@ def reference(problem: ModificationProblem) -> Optimum:
     Both searches narrow a grid down around its best point, by comparison alone. So kinks, bounds and corners of the
     constraints need no care, and an optimum is missed only if it hides between the points of the first grid, 33 × 33.
 
+    Own derivation: min over Δr_rp of the min over Δr_p, to 1e-4 of a grid's cell [m].
+
     Examples
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
@@ -203,6 +205,8 @@ def residual_gap(
     is a well-posed reading [A]: least mean gap (`tolalloc.reducers.cycloid.clearance.formula_gap`) with a radial
     clearance of j or more and a gap of 0 or more everywhere. It is a linear program, `closed_form`. Gaps are the linear
     formula's, good for amounts up to 50 µm.
+
+    Mean over φ of Δr_rp·(1 − S) − Δr_p·(C − q·S) ≥ 0, Δr_rp − Δr_p ≥ j (own derivation).
 
     Examples
     --------
@@ -476,6 +480,8 @@ def choose(request: ModificationRequest, reducer: Reducer, torque: float) -> Mod
     References
     ----------
     song2019, equation (10); li2018, whose formulas are lost, as `residual_gap` reads it.
+
+    Least mean gap of song2019 (2019) or li2018 (2018), with Δr_rp − Δr_p ≥ j.
 
     Examples
     --------

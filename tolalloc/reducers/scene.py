@@ -120,7 +120,7 @@ _POINTS = 22
 """Points of a tooth [-]."""
 
 
-def outlines(reducer: Reducer) -> tuple[dict[str, Any], tuple[str, ...]]:
+def _outlines(reducer: Reducer) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Return radii and counts [mm, -] with names for the picture, and what of them is an assumption of the drawing."""
     stage, first, dimensions = reducer.cycloid_stage, reducer.first_stage, reducer.friction_dimensions
     circle, crank_circle = stage.pin_circle_radius, reducer.crank_circle_radius
@@ -167,11 +167,20 @@ def _rings(bearing: RollingBearing | None, room: float, circle: float) -> tuple[
     return inner * shrunk, outer * shrunk
 
 
-def tooth(reducer: Reducer) -> dict[str, list[Any]]:
+def _tooth(reducer: Reducer) -> dict[str, list[Any]]:
     """Return one tooth space of a disc, counter-clockwise from tip to tip about its root at angle 0.
 
     ``exact`` and ``modified`` are points of the profile without and with the tooth modification [mm], ``normal`` the
     unit vector into the disc [-]; the last point is left out, as it is the next space's first.
+
+    Points of theory page (34), own derivation, x + iy for 0 ≤ φ ≤ π and mirrored [mm].
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> found = _tooth(load_reducer("rv40e_xi2015"))
+    >>> len(found["exact"]), round(max(x for x, _ in found["exact"]), 3), round(min(x for x, _ in found["exact"]), 3)
+    (22, 62.098, 59.7)
     """
     stage = reducer.cycloid_stage
     exact, modified = ToothProfile(stage=stage), ToothProfile(stage=stage, modification=reducer.modification)
@@ -217,7 +226,7 @@ class Turn:
 
 
 @lru_cache(maxsize=4)
-def turn_of(model: EquivalentModel, count: int) -> Turn:
+def _turn_of(model: EquivalentModel, count: int) -> Turn:
     """Return what all units of a model share at equally spaced angles [-]; remembered for the next unit."""
     angle = 2 * pi * np.arange(count) / count
     at = Positions(model.reducer, angle, model.orders)
@@ -238,7 +247,7 @@ def turn_of(model: EquivalentModel, count: int) -> Turn:
     )
 
 
-def solved_states(turn: Turn, errors: Float[np.ndarray, " column"], torque: float) -> States:
+def _solved_states(turn: Turn, errors: Float[np.ndarray, " column"], torque: float) -> States:
     """Return the equilibria of one unit [m, angles rad] under a torque on the carrier [N·m].
 
     Raises
@@ -254,16 +263,30 @@ def solved_states(turn: Turn, errors: Float[np.ndarray, " column"], torque: floa
     return States(
         torque=torque,
         force=carried.pins[0],
-        gap=-compressions(equilibria),
-        displacement=displacements(turn, equilibria, carried),
+        gap=-_compressions(equilibria),
+        displacement=_displacements(turn, equilibria, carried),
         transmission_error=equilibria.transmission_error[0],
     )
 
 
-def compressions(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]:
+def _compressions(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]:
     """Return the compression at mid-width of every pin and disc of one unit, negative where a gap is left [m].
 
     Summed in the order of the solver, so that no digit differs from what it balances.
+
+    δ = D·q + H·ε, own derivation, theory page (17) and (21).
+
+    Examples
+    --------
+    Under no errors those that carry are force over stiffness:
+
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
+    >>> solved = model.equilibria(np.zeros((1, len(model.columns))), -167.0, np.zeros(1))
+    >>> found = _compressions(solved)
+    >>> ratio = forces(solved).pins[0].max() / found.max()
+    >>> f"{ratio / model.reducer.stiffness.pin_contact:.6f}"
+    '1.000000'
     """
     tables, layout = equilibria.tables, equilibria.columns.layout
     values = _values(equilibria)
@@ -292,10 +315,22 @@ def _values(equilibria: Equilibria) -> Float[np.ndarray, " value"]:
     return values
 
 
-def displacements(turn: Turn, equilibria: Equilibria, carried: Forces) -> Float[np.ndarray, "angle coordinate"]:
+def _displacements(turn: Turn, equilibria: Equilibria, carried: Forces) -> Float[np.ndarray, "angle coordinate"]:
     """Return all coordinates of one unit, of which the equilibria hold those alone that pins and play touch [m, rad].
 
     The others follow from the ways of the springs, force over stiffness, theory page equation (5).
+
+    q_rest = A⁺·(F/K − b·ε − A_d·q_d), own derivation.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> turn = _turn_of(EquivalentModel(load_reducer("rv20e_liu2020")), 1)
+    >>> errors = np.zeros((1, len(turn.model.columns)))
+    >>> solved = turn.model.equilibria_of(turn.tables, errors, -167.0, turn.carrier_angle)
+    >>> found = _displacements(turn, solved, forces(solved))
+    >>> f"{found[0, -1] / solved.transmission_error[0, 0]:.6f}"  # the last one is the carrier's rotation
+    '1.000000'
     """
     found = np.zeros((equilibria.carrier_angle.size, turn.scale.size))
     found[:, turn.retained] = equilibria.retained[0] * turn.scale[turn.retained]
@@ -389,15 +424,15 @@ def scene_of(
     """
     own = dict(zip(model.columns, (float(value) for value in errors), strict=True))
     reducer = _as_modified(model.reducer, own)
-    turn = turn_of(model.at_torque(torque), per_crank_turn * reducer.cycloid_stage.disc_teeth)
-    forward, backward = (solved_states(turn, errors, sign * abs(torque)) for sign in (-1.0, 1.0))
-    outline, assumptions = outlines(reducer)
+    turn = _turn_of(model.at_torque(torque), per_crank_turn * reducer.cycloid_stage.disc_teeth)
+    forward, backward = (_solved_states(turn, errors, sign * abs(torque)) for sign in (-1.0, 1.0))
+    outline, assumptions = _outlines(reducer)
     turns, start = _motion(reducer)
     return Scene(
         reducer=reducer.name,
         unit=unit,
         outline=outline,
-        tooth=tooth(reducer),
+        tooth=_tooth(reducer),
         turns=turns,
         start=start,
         coordinates=_coordinates(reducer),
@@ -408,7 +443,7 @@ def scene_of(
         backward=backward,
         offsets=_offsets(reducer, own),
         places=places_of(reducer, sources),
-        magnification=magnification(reducer, forward, backward),
+        magnification=_magnification(reducer, forward, backward),
         assumptions=assumptions,
     )
 
@@ -478,12 +513,22 @@ def _offsets(reducer: Reducer, own: Mapping[str, float]) -> dict[str, list[float
     return {place: [own[f"{name}.{axis}"] / MILLIMETRE for axis in "xy"] for place, name in columns.items()}
 
 
-def magnification(reducer: Reducer, *states: States) -> float:
+def _magnification(reducer: Reducer, *states: States) -> float:
     """Return the largest of 1, 2, 5, 10, … at which no gap is drawn wider than half a pin's radius [-].
 
     Examples
     --------
     A gap of 20 µm beside pins of 2 mm radius is drawn 50 times larger, 1 mm wide.
+
+    Own derivation: m = r_rp/(2·largest gap), rounded down to 1, 2 or 5 times a power of ten.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> none = np.zeros((1, 1))
+    >>> state = States(torque=1.0, force=none, gap=none + 20e-6, displacement=none, transmission_error=none[0])
+    >>> _magnification(load_reducer("rv20e_liu2020"), state)
+    50.0
     """
     widest = max(float(np.abs(state.gap).max()) for state in states)
     most = 0.5 * reducer.cycloid_stage.pin_radius / max(widest, 1e-9)

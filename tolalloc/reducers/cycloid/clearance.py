@@ -98,7 +98,19 @@ def formula_gap(stage: CycloidStage, modification: Modification, pin_angle: Angl
 def exact_clearance(
     profiles: Sequence[ToothProfile], pin_angle: Float[np.ndarray, " pin"], rotation: Rotation = 0.0
 ) -> Float[np.ndarray, "profile pin"]:
-    """Return exact distances of pins from the teeth of discs turned by the rotations [rad], overlap negative [m]."""
+    """Return exact distances of pins from the teeth of discs turned by the rotations [rad], overlap negative [m].
+
+    Own derivation: the nearest point lies where (P − w)·w′ = 0 on the path w of the grinding pin's centre; exact to
+    rounding.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> design = load_reducer("rv40e_xi2015")
+    >>> profile = ToothProfile(stage=design.cycloid_stage, modification=design.modification)
+    >>> round(1e6 * float(exact_clearance([profile], np.zeros(1))[0, 0]), 3)  # a pin at the root: Δr_rp − Δr_p [µm]
+    6.0
+    """
     from tolalloc.reducers.cycloid.solvers.pins import FIELDS, pin_clearances
 
     designs, clearance = np.empty((len(profiles), FIELDS)), np.empty((len(profiles), pin_angle.size))

@@ -81,6 +81,8 @@ def pin_contact_table2(stage: CycloidStage, convex_stiffness: float, pin_angle: 
     ----------
     liu2020, Table 2 (K_djk).
 
+    K = C/(1 + 2·r_rp·max(κ, 0)), C and K in N/m, for 0 < K1 < 1.
+
     Examples
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
@@ -244,7 +246,7 @@ def _zones(gap: Gap, rotation: Float[np.ndarray, " phase"], contact: float) -> F
     return np.stack(edges, axis=1)
 
 
-def loaded(
+def _loaded(
     discs: PressedDiscs,
     method: str,
     phase: Float[np.ndarray, " phase"],
@@ -264,7 +266,7 @@ def loaded(
     >>> discs, phase = PressedDiscs(reducer=load_reducer("rv40e_xi2015"), torque=100.0), np.zeros(1)
     >>> force = np.zeros((1, 1, 40))
     >>> force[0, 0, 4] = 1000.0  # the pin at 36°, where S is almost 1: r_d = 50.7 mm
-    >>> round(float(loaded(discs, "one pin", phase, np.array([1e-5]), force).torque[0, 0]), 2)  # [N·m]
+    >>> round(float(_loaded(discs, "one pin", phase, np.array([1e-5]), force).torque[0, 0]), 2)  # [N·m]
     50.7
     """
     reducer, stage, closed, angles = (
@@ -344,7 +346,7 @@ def pressed_linear(
         depth = _iterated(discs, nearest, largest_force)
         method = "Li Lixing's linear method"
     force = largest_force(depth)[:, np.newaxis, np.newaxis] * shares(depth)
-    return loaded(discs, method, phase, depth, force)
+    return _loaded(discs, method, phase, depth, force)
 
 
 def _iterated(
@@ -458,12 +460,27 @@ def pressed(discs: PressedDiscs, phase: Float[np.ndarray, " phase"]) -> LoadedCo
     ------
     InputError
         The torque would press a pin in by more than its radius.
+
+    Σ r_d·S·F(δ_max·S − gap) = T; F of the law at each tooth's own curvature.
+
+    References
+    ----------
+    Own derivation; Li Lixing's method, xi2015, takes the curvature at φ0 for all.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> design = load_reducer("rv40e_xi2015")
+    >>> lines = replace(design, stiffness=replace(design.stiffness, pin_contact_law="logarithmic"))
+    >>> found = pressed(PressedDiscs(reducer=lines, torque=0.55 * 572.0), np.array([0.0]))
+    >>> round(float(found.force.max())), round(float(found.torque[0, 0]), 3)  # [N, N·m]
+    (1144, 314.6)
     """
     angles = discs.pin_angles(phase)
     balance = _Balance(discs, angles.reshape(phase.size, -1))
     deflection, law = balance.deflection(), discs.reducer.stiffness.pin_contact_law
     force = balance.forces(deflection, np.arange(phase.size))
-    return loaded(discs, f"{law} law at every pin", phase, deflection, force.reshape(angles.shape))
+    return _loaded(discs, f"{law} law at every pin", phase, deflection, force.reshape(angles.shape))
 
 
 _ROUNDING = 1e-12  # difference of amounts that counts as none [m]
@@ -515,16 +532,18 @@ class Assessment:
         )
 
 
-def disc_share(discs: int) -> float:
+def _disc_share(discs: int) -> float:
     """Return the share of the torque on the most loaded disc: Li Lixing's 0.55 of a pair, others in proportion [-].
 
     References
     ----------
     Li Lixing's method as xi2015 uses it; of other numbers than two an assumption.
 
+    2·0.55/n of n discs, 1 of one (own derivation but for a pair).
+
     Examples
     --------
-    >>> disc_share(2), round(disc_share(3), 4)
+    >>> _disc_share(2), round(_disc_share(3), 4)
     (0.55, 0.3667)
     """
     return 1.0 if discs == 1 else 2 * PAIR_SHARE / discs
@@ -582,7 +601,7 @@ def assess(
     reducer = replace(reducer, stiffness=replace(reducer.stiffness, pin_contact_law=law))
     profile, torque = ToothProfile(stage=reducer.cycloid_stage, modification=reducer.modification), abs(torque)
     require_sound(profile, reducer.name)
-    share, phase = disc_share(reducer.disc_count), default_phases(reducer, phases)
+    share, phase = _disc_share(reducer.disc_count), default_phases(reducer, phases)
     one = PressedDiscs(reducer=reducer, torque=share * torque, exact=exact)
     every = PressedDiscs(reducer=reducer, torque=pin_moment(reducer, torque), discs=reducer.disc_count, exact=exact)
     return Assessment(

@@ -147,6 +147,8 @@ def nominal_acceleration(at: Positions, motion: Motion) -> Float[np.ndarray, "ti
     sun's centre rests. Cranks turn with −zc·θc, discs and carrier with θc. A point on a circle of radius r that
     turns by φ has r·φ̈ along its path and r·φ̇² towards the centre; theory page (61).
 
+    Own derivation: exact for rigid parts without errors.
+
     Examples
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer

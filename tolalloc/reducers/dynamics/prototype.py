@@ -97,6 +97,8 @@ def part_errors(reducer: Reducer, errors: Mapping[str, float]) -> PartErrors:
     InputError
         Another column.
 
+    Own derivation: effective pin radius error = pin deviation − groove deviation, as theory page (18).
+
     Examples
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
@@ -147,6 +149,8 @@ def mesh_of(reducer: Reducer, errors: PartErrors) -> Mesh:
     ------
     InputError
         A rotation modification.
+
+    Own derivation: pins stand at (Rp + radial + i·tangential)·e^(iφ), teeth are ground by Rp + Δr_p and r_rp + Δr_rp.
 
     Examples
     --------
@@ -332,13 +336,15 @@ def with_rigid_bearings(reducer: Reducer) -> Reducer:
     return replace(reducer, stiffness=rigid)
 
 
-def reference_places(reducer: Reducer) -> Float[np.ndarray, "body 2"]:
+def _reference_places(reducer: Reducer) -> Float[np.ndarray, "body 2"]:
     """Return the centres of carrier, cranks and discs at the carrier angle 0 [m].
+
+    Own derivation: a_sp·e^(iP) of the cranks and e·e^(iβ) of the discs, at θc = 0.
 
     Examples
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> reference_places(load_reducer("rv40e_xi2015")).round(6).tolist()[3:]  # discs, e = 1.3 mm off, opposite
+    >>> _reference_places(load_reducer("rv40e_xi2015")).round(6).tolist()[3:]  # discs, e = 1.3 mm off, opposite
     [[0.0013, 0.0], [-0.0013, 0.0]]
     """
     at = Positions(reducer, np.zeros(1))
@@ -349,7 +355,7 @@ def reference_places(reducer: Reducer) -> Float[np.ndarray, "body 2"]:
     return np.array([(0.0, 0.0), *((r * np.cos(a), r * np.sin(a)) for r, a in zip(radius, turns, strict=True))])
 
 
-def assemble(
+def _assemble(
     reducer: Reducer,
     inertia: Inertia,
     damping: Damping,
@@ -361,7 +367,7 @@ def assemble(
     """Return a reducer in the engine, at rest at the carrier angle 0."""
     exudyn, bearings = engine(), damping.stiffness_proportional
     new = System(exudyn, exudyn.SystemContainer().AddSystem())
-    stiffness, places = reducer.stiffness, reference_places(reducer)
+    stiffness, places = reducer.stiffness, _reference_places(reducer)
     ground = new.content.AddObject(exudyn.itemInterface.ObjectGround())
     carrier = new.body(places[0], inertia.carrier, inertia.carrier_moment)
     first_disc = 1 + reducer.crank_count
@@ -478,7 +484,7 @@ def _answer(
     time = stored(prototype.carrier_acceleration)[:, 0]
     moved, speed = (np.stack([stored(part[kind])[:, 1:] for part in prototype.parts], axis=1) for kind in (0, 1))
     first_disc = 1 + reducer.crank_count
-    moved[:, :, :2] += reference_places(reducer)
+    moved[:, :, :2] += _reference_places(reducer)
     pin_forces = np.empty((time.size, reducer.disc_count, mesh.place.size))
     fill_pin_forces(mesh, moved[:, first_disc:].reshape(time.size, -1), pin_forces)
     bodies = (
@@ -541,7 +547,7 @@ def simulate_prototype(
         raise InputError.at("virtual prototype", "interface with its own damping", [*damping.interfaces], "none")
     found = part_errors(reducer, errors or {})
     mesh = mesh_of(reducer, found)
-    prototype = assemble(reducer, inertia, damping, found, mesh, speed, torque)
+    prototype = _assemble(reducer, inertia, damping, found, mesh, speed, torque)
     _run(prototype, steps, progress)
     answer = _answer(prototype, reducer, inertia, mesh, speed, torque)
     if not np.isfinite(answer.transmission_error).all():

@@ -151,6 +151,8 @@ def critical_speeds(
     InputError
         An order below 1.
 
+    Own derivation: Ω = 2πf/n, over the lowest and highest f of a mode within a turn.
+
     Examples
     --------
     >>> one = np.array([[100.0]])

@@ -34,7 +34,7 @@ from tolalloc.reducers.reducer.bearings import FrictionDimensions, Part, Rolling
 from tolalloc.reducers.reducer.design import Reducer
 
 
-def interpolated(
+def _interpolated(
     at: Float[np.ndarray, "sample step"],
     levels: Float[np.ndarray, " level"] | Float[np.ndarray, "sample level"],
     values: Float[np.ndarray, " level"] | Float[np.ndarray, "sample level"],
@@ -45,7 +45,7 @@ def interpolated(
 
     Examples
     --------
-    >>> interpolated(np.array([[0.5, 3.0]]), np.array([0.0, 1.0]), np.array([10.0, 20.0])).tolist()
+    >>> _interpolated(np.array([[0.5, 3.0]]), np.array([0.0, 1.0]), np.array([10.0, 20.0])).tolist()
     [[15.0, 20.0]]
     """
     samples = at.shape[0]
@@ -82,8 +82,8 @@ class Play:
 
         Exact wherever the torque only rises or only falls between two steps.
         """
-        low = interpolated(path, self.rising, self.inside)
-        high = interpolated(path, self.falling, self.inside)
+        low = _interpolated(path, self.rising, self.inside)
+        high = _interpolated(path, self.falling, self.inside)
         felt = np.empty(path.shape)
         state = low[:, 0]
         for step in range(path.shape[1]):
@@ -96,7 +96,9 @@ MESH, PINS = "gear_mesh", "pins"
 CRANK_BEARINGS = ("crank_disc_bearing", "crank_carrier_bearing")
 
 
-def angles_of_pins(reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle disc pin"]:
+def _angles_of_pins(
+    reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"]
+) -> Float[np.ndarray, "angle disc pin"]:
     """Return the angle of every pin from the crank direction of every disc [rad].
 
     φ_k − β_j, theory page (2) and (13), own derivation.
@@ -104,7 +106,7 @@ def angles_of_pins(reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"])
     Examples
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> found = angles_of_pins(load_reducer("rv20e_liu2020"), np.zeros(1))
+    >>> found = _angles_of_pins(load_reducer("rv20e_liu2020"), np.zeros(1))
     >>> np.degrees(found[0, :, 0]).round(6).tolist()  # disc 1's crank points at pin 1, disc 2's away from it [°]
     [0.0, -180.0]
     """
@@ -130,7 +132,7 @@ def sliding_ways(reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"]) -
     >>> round(1e3 * float(found.min()), 3)  # R_p·(1 − K1) − r_rp, at the root [mm/rad]
     9.0
     """
-    stage, angle = reducer.cycloid_stage, angles_of_pins(reducer, carrier_angle)
+    stage, angle = reducer.cycloid_stage, _angles_of_pins(reducer, carrier_angle)
     root = np.sqrt(1.0 + stage.shortening**2 - 2.0 * stage.shortening * np.cos(angle))
     return np.asarray(stage.pin_circle_radius * root - stage.pin_radius)
 
@@ -434,9 +436,9 @@ def _followed(
     with_cranks = np.sum([turning[name] for name in (PINS, *CRANK_BEARINGS)], axis=0)
     cranks = Play.of(levels, with_cranks).follow(outside)
     return np.asarray(
-        interpolated(outside, levels, twist - shares.discs - shares.cranks)
-        + interpolated(discs, levels, shares.discs)
-        + interpolated(cranks, levels, shares.cranks)
+        _interpolated(outside, levels, twist - shares.discs - shares.cranks)
+        + _interpolated(discs, levels, shares.discs)
+        + _interpolated(cranks, levels, shares.cranks)
     )
 
 
@@ -505,7 +507,7 @@ def _disc_ways(
     stage, discs = reducer.cycloid_stage, reducer.disc_count
     moved = (own.retained - before.equilibria.retained)[:, :, : 3 * discs]
     moved = moved.reshape(*moved.shape[:2], discs, 3)
-    into = normals(stage.shortening, angles_of_pins(reducer, own.carrier_angle))
+    into = normals(stage.shortening, _angles_of_pins(reducer, own.carrier_angle))
     turning = into.towards_crank - sliding_ways(reducer, own.carrier_angle) / stage.disc_pitch_radius
     by_disc = own.tables.contact_by_disc
     along = np.stack([by_disc[:, :, 1], -by_disc[:, :, 0], turning], axis=2)

@@ -58,6 +58,16 @@ def forces(equilibria: Equilibria) -> Forces:
 
     Stiffness times compression of every row, theory page equation (5); pins by their law, equations (30) and (31),
     elements with play by equation (28).
+
+    F = k·δ, own derivation; NaN where nothing converged.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
+    >>> found = forces(model.equilibria(np.zeros((1, len(model.columns))), -167.0, np.zeros(1)))
+    >>> round(float(found.of("crank_carrier_bearing").mean()))  # by statics 167 N·m/(2·27 mm) = 3093 N
+    3093
     """
     from tolalloc.reducers.equivalent.solvers.turn import solve_forces
 
@@ -107,13 +117,31 @@ class Orders:
 
 
 def order_spectrum(transmission_error: Float[np.ndarray, "sample angle"]) -> Orders:
-    """Return the orders 1, 2, … of curves on equally spaced angles of one output turn, the end point left out."""
+    """Return the orders 1, 2, … of curves on equally spaced angles of one output turn, the end point left out.
+
+    Amplitude = |`waves`| [rad], own derivation: Fourier's sum; orders below half the number of angles.
+
+    Examples
+    --------
+    >>> turn = 2 * np.pi * np.arange(8) / 8
+    >>> order_spectrum(3.0 * np.cos(2 * turn)[np.newaxis]).amplitude[0].round(9).tolist()
+    [0.0, 3.0, 0.0]
+    """
     found = waves(transmission_error)
     return Orders(order=np.arange(1, found.shape[1] + 1), amplitude=np.abs(found), phase=np.angle(found))
 
 
 def waves(curve: Float[np.ndarray, "row angle"]) -> Complex[np.ndarray, "row order"]:
-    """Return the orders of curves as in `order_spectrum`: cosine amplitudes, minus i times sine amplitudes."""
+    """Return the orders of curves as in `order_spectrum`: cosine amplitudes, minus i times sine amplitudes.
+
+    2/N·Σ y·e^(−inθ), own derivation: Fourier's sum over N angles; order N/2 is left out.
+
+    Examples
+    --------
+    >>> turn = 2 * np.pi * np.arange(4) / 4
+    >>> waves((3.0 * np.cos(turn) + 4.0 * np.sin(turn))[np.newaxis]).round(9).tolist()
+    [[(3-4j)]]
+    """
     angles = curve.shape[1]
     return np.asarray(np.fft.rfft(curve, axis=1)[:, 1 : (angles + 1) // 2] * (2 / angles))
 
@@ -132,7 +160,15 @@ class Solved:
 
 
 def load_share(pins: Float[np.ndarray, "sample angle disc pin"]) -> Float[np.ndarray, "sample disc"]:
-    """Return the share of all pin force that each disc carries, mean over the turn [-]."""
+    """Return the share of all pin force that each disc carries, mean over the turn [-].
+
+    Σ_disc F/Σ F, own derivation.
+
+    Examples
+    --------
+    >>> load_share(np.array([[[[100.0, 200.0], [0.0, 100.0]]]])).tolist()  # two discs with two pins
+    [[0.75, 0.25]]
+    """
     total = pins.sum(axis=(1, 3))
     return np.asarray(total / total.sum(axis=1, keepdims=True))
 
@@ -188,6 +224,18 @@ def radial_clearance(
 
     Within an output turn every pin is once at the tip and once at the root of every tooth of every disc. So the pin
     that stands out most meets the tooth that stands out most, and the rows of one pin give the gaps of all.
+
+    Of errors without waves: −Δr_p + Δr_rp − d_k + r_k (own derivation) [m].
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
+    >>> errors = np.zeros((1, len(model.columns)))
+    >>> errors[0, model.columns.index("modification.equidistant")] = 20e-6
+    >>> errors[0, model.columns.index("modification.shift")] = 12e-6
+    >>> round(1e6 * float(radial_clearance(model, errors)[0]), 6)  # Δr_rp − Δr_p [µm]
+    8.0
     """
     mapped, layout, orders = model.error_columns, model.error_columns.layout, model.orders
     values = np.asarray((mapped.matrix @ errors.T).T) + mapped.map.nominal
@@ -256,6 +304,19 @@ def line_contact(equilibria: Equilibria, forces: Forces) -> LineContact:
     """Return the contacts of all pins and discs, [sample, angle, disc, pin].
 
     A tilt γ moves a tooth at height z by z·(γy, −γx) in the housing's plane; the tilt turns with the disc.
+
+    Slope γ = γ_y·n_x − γ_x·n_y [rad], own derivation, theory page (31).
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
+    >>> errors = np.zeros((1, len(model.columns)))
+    >>> errors[0, model.columns.index("disc1.tilt.x")] = 1e-4
+    >>> solved = Solved.of(model.equilibria(errors, -167.0, np.zeros(1)))
+    >>> found = line_contact(solved.equilibria, solved.forces)
+    >>> round(1e4 * float(np.abs(found.slope[0, 0, 0]).max()), 2)  # all of the tilt where the normal lies along y
+    1.0
     """
     tables, layout = equilibria.tables, equilibria.columns.layout
     tilt = (equilibria.columns.matrix[layout.tilt : layout.end] @ equilibria.errors.T).T
@@ -272,7 +333,19 @@ def line_contact(equilibria: Equilibria, forces: Forces) -> LineContact:
 
 
 def peak_line_load(equilibria: Equilibria, forces: Forces) -> Float[np.ndarray, "sample angle disc pin"]:
-    """Return the largest line load of every pin and disc, the even one where no disc is tilted [N/m]."""
+    """Return the largest line load of every pin and disc, the even one where no disc is tilted [N/m].
+
+    F/b + C|γ|/2, own derivation; without tilt F/b.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
+    >>> solved = Solved.of(model.equilibria(np.zeros((1, len(model.columns))), -167.0, np.zeros(1)))
+    >>> found = peak_line_load(solved.equilibria, solved.forces)
+    >>> round(float(solved.forces.pins.max() / found.max()), 6)  # face width [m]
+    0.01
+    """
     layout = equilibria.columns.layout
     if not np.any(equilibria.columns.matrix[layout.tilt : layout.end] @ equilibria.errors.T):
         return np.asarray(forces.pins / equilibria.reducer.cycloid_stage.face_width)
@@ -280,7 +353,22 @@ def peak_line_load(equilibria: Equilibria, forces: Forces) -> Float[np.ndarray, 
 
 
 def unit_pressure(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]:
-    """Return Hertz's peak pressure under a line load of 1 N/m; it grows with the root of the line load [Pa]."""
+    """Return Hertz's peak pressure under a line load of 1 N/m; it grows with the root of the line load [Pa].
+
+    p = √(E*/(πR)) per √(N/m).
+
+    References
+    ----------
+    Hertz's line contact, as `peak_pressure`.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
+    >>> found = unit_pressure(model.equilibria(np.zeros((1, len(model.columns))), -1.0, np.zeros(1)))
+    >>> f"{found.max():.2e}"  # at the tip, where the tooth is most convex [Pa]
+    '5.63e+06'
+    """
     reducer, at = equilibria.reducer, Positions(equilibria.reducer, equilibria.carrier_angle)
     discs = [at.pin_direction - at.disc_direction(disc)[:, np.newaxis] for disc in range(reducer.disc_count)]
     pin_angle, stage = np.stack(discs, axis=1), reducer.cycloid_stage
@@ -329,6 +417,20 @@ def contact_pattern(
         A disc that the reducer does not have, or a contact law that knows no load along the width.
     SolveError
         No equilibrium at one of the angles.
+
+    Line load q(z) = C/b·max(0, s + γz) [N/m] and pressure √(q·E*/(πR)) [Pa], slice by slice (assumed).
+
+    References
+    ----------
+    Own derivation, theory page (31) and (60); Hertz's line contact for the pressure.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
+    >>> found = contact_pattern(model, np.zeros(len(model.columns)), -167.0, carrier_angle=0.0)
+    >>> bool(np.ptp(found.line_load, axis=1).max() == 0.0)  # even without tilt
+    True
     """
     reducer, law = model.reducer, model.reducer.stiffness.pin_contact_law
     if not 1 <= disc <= reducer.disc_count:
@@ -381,6 +483,22 @@ def attribute(model: EquivalentModel, errors: Float[np.ndarray, "1 column"], tor
     long as the contact law is linear, so Euler's theorem splits it into deviation times derivative. The split holds for
     this unit: with other errors other pins carry, and a source's share changes. Under the logarithmic law the part that
     is not proportional is listed by itself.
+
+    TE = Σ ε·∂TE/∂ε + T·∂TE/∂T + Σ c·∂TE/∂c; exact for linear laws.
+
+    References
+    ----------
+    Euler's theorem on homogeneous functions; own derivation for the waves.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
+    >>> errors = np.zeros((1, len(model.columns)))
+    >>> errors[0, model.columns.index("carrier.assembly.x")] = 5e-6
+    >>> found = attribute(model, errors, -1.0)
+    >>> found.sources, f"{206264.8 * found.amplitude.max():.2f}"  # largest order [arcsec]
+    (('carrier.assembly', 'torque'), '1.23')
     """
     curve, derivatives = model.rotation_derivatives(errors, torque)
     parts: dict[str, Float[np.ndarray, " angle"]] = {}

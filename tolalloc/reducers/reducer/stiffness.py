@@ -180,6 +180,8 @@ def pin_bending(diameter: float, span: float, elastic_modulus: float) -> float:
     ----------
     Li Lixing's method, as xi2015 uses it; the factor 31/64 is not printed there [A].
 
+    f = F·l³/(48EJ)·31/64, J = πd⁴/64; slender, no shear.
+
     Examples
     --------
     >>> round(pin_bending(0.006, 0.031, 206e9) / 1e6, 1)  # a pin of 6 mm over a span of 31 mm [1e6 N/m]
@@ -257,6 +259,8 @@ def gear_mesh(
     References
     ----------
     ISO 6336-1; liu2020, Table 2 (K_sp).
+
+    K_sp = (0.75ε + 0.25)/(0.04723 + 0.15551/z1 + 0.25791/z2)·b·E/206 GPa, in N/(mm·µm) per width.
 
     Examples
     --------
@@ -338,6 +342,8 @@ def shaft_flexibility(
     Places are measured from one support [m]. Euler's bending, and Timoshenko's shear with the factor of a circle,
     6(1+µ)/(7+6µ).
 
+    f(a, b) = a·b'·(l² − a² − b'²)/(6·l·E·J) + a·b'/(l·κ·G·A), b' = l − b ≥ 0 the way behind the farther place.
+
     Examples
     --------
     In the middle of a slender shaft it is l³/(48EJ):
@@ -417,6 +423,8 @@ def bore_flexibility(bore_radius: float, outer_radius: float, width: float, mate
     References
     ----------
     Kelvin's point force in a sheet (plane stress); the bounds r and R are an own choice, for r well below R.
+
+    f = (1 + µ)(3 − µ)/(4πEb)·ln(R/r).
 
     Examples
     --------
