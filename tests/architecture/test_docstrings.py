@@ -151,25 +151,6 @@ COMPUTES_NOTHING = {
 """Function → what it does instead of computing."""
 
 NOT_YET: tuple[str, ...] = (
-    "allocation.cost.unit_price.best_yield",
-    "allocation.difference.difference",
-    "allocation.front.genetic.best_front",
-    "allocation.front.genetic.search",
-    "allocation.front.what_if.cost_at_yield",
-    "allocation.front.what_if.robustness",
-    "allocation.front.what_if.setting_trade",
-    "allocation.result.limit_price",
-    "allocation.result.unit_quantile",
-    "allocation.search.discrete.allocate_grades",
-    "allocation.search.discrete.with_shared_zones",
-    "allocation.search.lower_bound.least_cost",
-    "allocation.search.lower_bound.lower_bound",
-    "allocation.search.zone_allocation.aimed",
-    "allocation.search.zone_allocation.kept_stacks",
-    "allocation.search.zone_allocation.scale_in_proportion",
-    "allocation.search.zone_allocation.step_to_optimum",
-    "allocation.space.requirement.bounds_of_law",
-    "allocation.verify.acceptance.accept_cheapest",
     "reducers.cycloid.solvers.pins.design_clearances",
     "reducers.cycloid.solvers.pins.pin_force",
     "reducers.cycloid.solvers.pins.pin_forces",
@@ -208,8 +189,6 @@ NOT_YET: tuple[str, ...] = (
     "reducers.equivalent.solvers.workspace.interpolation",
     "reducers.equivalent.solvers.workspace.moved_too_far",
     "reducers.equivalent.solvers.workspace.problem_between",
-    "sensitivity.uncertain.first_order_error",
-    "sensitivity.uncertain.uncertain_effect",
 )
 """Functions that compute and do not say so yet; nothing is added here."""
 

@@ -219,7 +219,18 @@ def solver_noise(solution: Solution) -> float:
 
 
 def limit_price(side: OneSidedConstraint, price: float) -> tuple[float, str]:
-    """Return the price of a limit [cost units] and what it is per: its unit, or a tenth where the limit is below 1."""
+    """Return the price of a limit [cost units] and what it is per: its unit, or a tenth where the limit is below 1.
+
+    λ per unit, or λ/10 per tenth where |limit| < 1 (own derivation); as every shadow price for small changes.
+
+    Examples
+    --------
+    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
+    >>> verifier = verifier_of_sum(0.6, 0.8, limit=0.5)
+    >>> [side] = verifier.verify(verifier.space.uniform(1.0), "as drawn").constraints
+    >>> limit_price(side, 2.0)
+    (0.2, '0.1 mm')
+    """
     unit = unit_of(side.stack.name)
     return (price / 10, f"0.1 {unit}") if abs(side.limit) < 1 else (price, unit)
 
@@ -238,6 +249,21 @@ def unit_quantile(design: VerifiedDesign, check: Check) -> float:
     -------
     float
         Not a number unless the requirement is a yield with one limit; two share the units beyond.
+
+    Notes
+    -----
+    Order statistic y₍ₖ₎, k = ⌈target·units⌉ (Hahn & Meeker 1991, Statistical Intervals), of
+    1/(1 − target) units or more.
+
+    Examples
+    --------
+    A normal sum of σ = √2 is below 1.282·√2 = 1.81 with 90 %.
+
+    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
+    >>> verifier = verifier_of_sum(6.0, 6.0, limit=5.0, guarantee=AtYield(target=0.9))
+    >>> design = verifier.verify(verifier.space.uniform(1.0), "as drawn")
+    >>> round(unit_quantile(design, design.checks[0]), 1)
+    1.8
     """
     guarantee = check.requirement.guarantee
     if not isinstance(guarantee, AtYield) or len(check.constraints) > 1:

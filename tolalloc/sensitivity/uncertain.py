@@ -63,6 +63,28 @@ def uncertain_effect(
         Good units, the first of which are taken.
     seeds
         Node of the seed tree, from which the directions of the changes come.
+
+    Notes
+    -----
+    σ² = gᵀ·C·g to first order, g the gradient by the uncertain columns, C their covariance: JCGM 100:2008, eq. (13). It
+    holds where `FirstOrderError.fails` is false.
+
+    Examples
+    --------
+    y = x·(1 + k) with σ(k) = 0.1 at x = 2:
+
+    >>> from types import SimpleNamespace
+    >>> from tolalloc.models.model import Evaluation
+    >>> answer = lambda x, k: Evaluation(values=(x[:, :1] * k), status=np.zeros(len(x), np.uint8))
+    >>> model = SimpleNamespace(
+    ...     uncertain=(CorrelatedSource(name="k", columns=("k",), covariance=np.array([[0.01]])),),
+    ...     accuracy={},
+    ...     reading=lambda _: lambda x: answer(x, 1.0),
+    ...     with_uncertain=lambda _: lambda x: answer(x, 1.0 + x[:, 1:]),
+    ...     changed=lambda by: SimpleNamespace(reading=lambda _: lambda x: answer(x, 1.0 + by[0])),
+    ... )
+    >>> round(uncertain_effect(model, "y [mm]", np.array([[2.0]]), SeedTree(1)).sigma, 6)
+    0.2
     """
     factor = _factor(model.uncertain)
     gradient = _gradient(model, output, x[:_UNITS])
@@ -88,6 +110,28 @@ def first_order_error(
     ------
     SolveError
         No unit has an answer at any of the changes.
+
+    Notes
+    -----
+    e = g·Δ − (y(k + Δ) − y(k)), what Taylor's first order leaves: JCGM 100:2008, 5.1.2 [output].
+
+    Examples
+    --------
+    y = x·(1 + k) is linear in k, so nothing is left.
+
+    >>> from types import SimpleNamespace
+    >>> from tolalloc.models.model import Evaluation
+    >>> answer = lambda x, k: Evaluation(values=(x[:, :1] * k), status=np.zeros(len(x), np.uint8))
+    >>> model = SimpleNamespace(
+    ...     uncertain=(CorrelatedSource(name="k", columns=("k",), covariance=np.array([[0.01]])),),
+    ...     accuracy={},
+    ...     reading=lambda _: lambda x: answer(x, 1.0),
+    ...     with_uncertain=lambda _: lambda x: answer(x, 1.0 + x[:, 1:]),
+    ...     changed=lambda by: SimpleNamespace(reading=lambda _: lambda x: answer(x, 1.0 + by[0])),
+    ... )
+    >>> found = first_order_error(model, "y [mm]", np.array([[2.0]]), np.array([[0.1]]))
+    >>> round(found.effect, 6), found.root_mean_square < 1e-12
+    (0.2, True)
     """
     before = model.reading((output,))(x)
     predicted = _gradient(model, output, x) @ changes.T

@@ -157,7 +157,7 @@ class YieldLadder:
 def best_yield(cost_of_yield: Callable[[float], float], price: UnitPrice, yields: Sequence[float]) -> YieldLadder:
     """Return the prices of a good unit over a ladder of yield targets; its `best` is the cheapest.
 
-    argmin over y of (c(y) + inspection + (1 − y)·(r·rework + (1 − r)·scrap)) / (y + (1 − y)·r), as `UnitPrice` (own
+    The least p(y) = (c(y) + inspection + (1 − y)·(r·rework + (1 − r)·scrap)) / (y + (1 − y)·r), as `UnitPrice` (own
     derivation) [cost units]; for yields from 0 to 1 that leave good units.
 
     Parameters

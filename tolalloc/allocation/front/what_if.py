@@ -81,6 +81,21 @@ def cost_at_yield(space: DesignSpace, allocation: ZoneAllocation, target: float)
     of what was compared with the limit; at the yield asked for they are the same. What the zones spread, s, is in
     proportion to it, so the weights of the model are, too: all are multiplied by (s + shown − compared)/s. Other
     requirements stay. It holds near the verified yield, where the shape of the output's tail does.
+
+    Own derivation, w′ = w·(s + shown − compared)/s.
+
+    Examples
+    --------
+    99 % of a normal sum needs less than 99.73 %: the cost falls.
+
+    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
+    >>> from tolalloc.allocation.search.zone_allocation import allocate, scale_in_proportion
+    >>> from tolalloc.allocation.space.effort import SearchEffort
+    >>> from tolalloc.allocation.space.requirement import AtYield
+    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0, guarantee=AtYield(target=0.9973))
+    >>> found = allocate(verifier, scale_in_proportion(verifier, 3), SearchEffort())
+    >>> round(found.chosen.cost, 1), round(cost_at_yield(verifier.space, found, 0.99), 1)
+    (2.0, 1.7)
     """
     chosen, (first, *others) = allocation.chosen, allocation.asked_stacks
     shown = chosen.shown_at(target)
@@ -152,6 +167,24 @@ def setting_trade(
     Far from the chosen design its models are off, so for every choice the program is solved, the real model runs the
     found design, and the budget of the leading output is corrected by what the local model missed; then again, until it
     misses little. Every choice has processes of its own. Other requirements keep their models.
+
+    Corrections are secant steps mₖ₊₁ = mₖ + e/(1 − min(e/e₋, 0)) (own derivation).
+
+    Examples
+    --------
+    Without settings it is the least cost itself, 1.9731 of `lower_bound`.
+
+    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
+    >>> from tolalloc.allocation.search.zone_allocation import allocate, scale_in_proportion
+    >>> from tolalloc.allocation.space.effort import SearchEffort
+    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
+    >>> found = allocate(verifier, scale_in_proportion(verifier, 3), SearchEffort())
+    >>> standard = np.random.default_rng(1).normal(size=(500, 2)) / 6
+    >>> response = QuantileResponse(
+    ...     space=verifier.space, model=verifier.model, output="y [mm]", standard=standard, spread=3.0
+    ... )
+    >>> round(float(setting_trade(response, found, ()).cost), 4)
+    1.9731
     """
     programs = Programs(response.space, len(allocation.asked_stacks))
     known = float(response(allocation.chosen.design[np.newaxis]).values[0, 0])
@@ -272,6 +305,20 @@ def robustness(
     models around the same design. How far it moves what is compared with a limit is the difference between two
     models on the same units, added to what the verification of the chosen design found: the luck of a second sample,
     often smaller and so less able to show a yield, tells nothing of the change.
+
+    regret = cost of the answer / cost of the changed answer − 1 (own derivation) [-].
+
+    Examples
+    --------
+    With either cost 20 % up or down the answer loses less than 1 %.
+
+    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
+    >>> from tolalloc.allocation.search.zone_allocation import allocate, scale_in_proportion
+    >>> from tolalloc.allocation.space.effort import SearchEffort
+    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
+    >>> found = allocate(verifier, scale_in_proportion(verifier, 3), SearchEffort())
+    >>> max(variant.regret for variant in robustness(verifier, found, (), SeedTree(1), draws=4).costs) < 0.01
+    True
     """
     problem, optimum, locked = verifier.space.problem(allocation.stacks), allocation.inside, allocation.locked_cost
     corners = seeds.child("costs").generator().choice([1 - COST_CHANGE, 1 + COST_CHANGE], (draws, optimum.zones.size))

@@ -286,6 +286,20 @@ def with_shared_zones(space: DesignSpace) -> DesignSpace:
     ----------
     space
         Groups whose members keep the ratios of their zones. The shared zone is the geometric mean.
+
+    Notes
+    -----
+    zone = exp(mean of ln zoneᵢ) (own derivation), which keeps the product of the zones; for zones above 0.
+
+    Examples
+    --------
+    Zones of 6 and 8 mm become √48 = 6.928 mm.
+
+    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
+    >>> errors = verifier_of_sum(6.0, 8.0, limit=5.0).space.errors
+    >>> together = tuple(replace(source, group="both") for source in errors.sources)
+    >>> with_shared_zones(DesignSpace(errors=replace(errors, sources=together))).errors.zones.round(6).tolist()
+    [0.006928, 0.006928]
     """
     active = [source for source in space.errors.active if not source.locked]
     shared = {
@@ -412,6 +426,19 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
     after a choice that missed a limit, less far after one that kept them all. Where the models let no choice keep the
     limits, the one that violates them least is tried, and where that misses them again, it is the answer. A scale is
     the same factor on the shared zone as on the zones of the members, so the start keeps its scales.
+
+    The margin is halved like any bracket, mₖ₊₁ = (missed + kept)/2 (own derivation); each choice is that of
+    `best_choice`.
+
+    Examples
+    --------
+    Zones a, b of 1/a and 1/b with √(a² + b²)/2 ≤ 50 µm: of R′10 50 and 80 µm are the cheapest.
+
+    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
+    >>> verifier = verifier_of_sum(0.06, 0.08, limit=0.05)
+    >>> found = allocate_grades(verifier, verifier.verify(verifier.space.uniform(1.0), "as drawn"), steps=6).chosen
+    >>> (1e6 * found.space.zones(found.design)).round().tolist(), round(found.cost, 6)
+    ([50.0, 80.0], 2.2)
     """
     space = with_shared_zones(verifier.space)
     own, design = replace(verifier, space=space), np.clip(start.design, space.lower, space.upper)

@@ -45,6 +45,17 @@ def lower_bound(design: VerifiedDesign) -> LowerBound:
     Where every output is linear in the deviations, the quantile and its derivatives are those of the exact law. For
     symmetric log-concave deviations and one limit the quantile is convex in the zones, so it lies above the plane
     that touches it, and the bound holds for every allowed design.
+
+    cost ≥ min cost over the weaker requirements (own derivation) [cost units]; by the Lagrange dual, `cost_bound`.
+
+    Examples
+    --------
+    Least 1/a + 1/b with (3a)² + (4b)² ≤ 5²: (3^⅔ + 4^⅔)^(3/2)/5 = 1.9731.
+
+    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
+    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
+    >>> round(lower_bound(verifier.verify(verifier.space.uniform(1.0), "as drawn")).cost, 4)
+    1.9731
     """
     space = design.space
 
@@ -70,6 +81,18 @@ def least_cost(design: VerifiedDesign, cheapest: Cheapest) -> float:
     -----
     Theory page, equation (76): budgets load(design) − (q̲ − limit) + z·s. Half of the error of 5 % is that of the least
     quantiles q̲, the other half, shared among all limits, that of what sixteen batches say of the derivatives (s).
+
+    min(own cost, cost of what keeps Σ load ≤ budget) (own derivation).
+
+    Examples
+    --------
+    What chooses nothing cheaper leaves the cost of the design itself.
+
+    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
+    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
+    >>> design = verifier.verify(verifier.space.uniform(1.0), "as drawn")
+    >>> least_cost(design, lambda stacks: (1.9, design.design)), least_cost(design, lambda stacks: None)
+    (1.9, 2.0)
     """
     stacks = tuple(stack for _, stack in _weaker(design))
     free = design.cost - design.space.locked_cost

@@ -106,6 +106,18 @@ def scale_in_proportion(verifier: Verifier, steps: int) -> tuple[VerifiedDesign,
     The next scale is 1 + left/rise times this one, with what is left of a limit, a standard error kept, and what all
     zones together take of it, the tightest limit counting and at most a factor of 2.5, until a met design has next to
     nothing left to gain.
+
+    sₖ₊₁ = sₖ·clip(1 + left/rise, 0.4, 2.5) (own derivation); exact in one step where a quantile is in
+    proportion to the zones.
+
+    Examples
+    --------
+    Half of the limit that the drawing keeps asks for half of its zones.
+
+    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
+    >>> verifier = verifier_of_sum(6.0, 8.0, limit=2.5)
+    >>> [design.scales.tolist() for design in scale_in_proportion(verifier, 3)]
+    [[1.0, 1.0], [0.5, 0.5]]
     """
     space, scale = verifier.space, 1.0
     tried: list[VerifiedDesign] = []
@@ -154,6 +166,18 @@ def aimed(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float = 1.0
     The values of a few thousand units are uncertain by a percent or two, so a search aims one standard error inside
     each limit. Where the models of the last design also explain other ones near by, their mean deviation from them
     corrects them, each with the weight of its units, so the noise averages out. The law of a linear output has none.
+
+    budget′ = budget − margin·standard error − mean deviation (own derivation) [unit of the output].
+
+    Examples
+    --------
+    A root sum square has no error, so all of the limit is left.
+
+    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
+    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
+    >>> design = verifier.verify(verifier.space.uniform(1.0), "as drawn")
+    >>> [stack.budget for stack in aimed(design, [design])]
+    [5.0]
     """
     similar = [item for item in tried if _is_similar(item, last)]
     stacks = []
@@ -188,6 +212,20 @@ def kept_stacks(chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margi
         All designs of its search, which tell how lucky its own sample was.
     margin
         How far inside each limit the aim is; 0 for the limits themselves [standard errors].
+
+    Notes
+    -----
+    budget′ = max(aimed budget, load of the design) (own derivation), so that the design itself is always allowed.
+
+    Examples
+    --------
+    A design that takes 5 of a limit of 4 keeps its 5.
+
+    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
+    >>> verifier = verifier_of_sum(6.0, 8.0, limit=4.0)
+    >>> design = verifier.verify(verifier.space.uniform(1.0), "as drawn")
+    >>> [stack.budget for stack in kept_stacks(design, (design,), 0.0)]
+    [5.0]
     """
     loads = [float(constraint.stack.load(chosen.scales, chosen.settings)) for constraint in chosen.constraints]
     stacks = aimed(chosen, list(tried), margin)
@@ -239,6 +277,16 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
     ----------
     A. R. Conn, N. I. M. Gould, Ph. L. Toint, Trust-Region Methods, SIAM (2000); K. Svanberg, The method of moving
     asymptotes, Int. J. Numer. Meth. Eng. 24 (1987) 359–373, for convex models that are made anew at every design.
+
+    Examples
+    --------
+    Least 1/a + 1/b with (3a)² + (4b)² ≤ 5² is where a/b = (4/3)^⅔.
+
+    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
+    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
+    >>> start = verifier.verify(verifier.space.uniform(1.0), "as drawn")
+    >>> step_to_optimum(verifier, start, steps=3, reach=2.0)[-1].scales.round(3).tolist()
+    [1.121, 0.925]
     """
     space, tried = verifier.space, [start]
     programs, processes = Programs(space, len(start.constraints)), space.process_positions(start.design)

@@ -98,6 +98,21 @@ def bounds_of_law(sample: LimitedSample, law: LinearLaw, beyond: float) -> tuple
     """Return what a law says of every limit if such a share of it may lie beyond the limits [-].
 
     With two limits both move by the same excess, outwards where it is above zero, until just that share lies beyond.
+
+    The excess e solves P(y > upper + e) + P(y < lower − e) = beyond (own derivation) [unit of the output].
+
+    Examples
+    --------
+    A normal sum of σ = √5 lies beyond 2.326·√5 = 5.20 with 1 %.
+
+    >>> from tolalloc.capability.experiment import sum_of_sizes
+    >>> from tolalloc.capability.linear_function import LinearFunction
+    >>> experiment = sum_of_sizes(6.0, 12.0)
+    >>> plane = LinearFunction(offset=0.0, slopes=np.ones(2), rounding=0.0)
+    >>> law = LinearLaw.of(plane, experiment.errors, experiment.zones)
+    >>> [bound] = bounds_of_law(LimitedSample.all_of(np.zeros(1), Limits(upper=4.0)), law, 0.01)
+    >>> round(bound.value, 2)
+    5.2
     """
     excess = law.excess(sample.limits, beyond)
     error = _ACCURACY * law.half_width

@@ -11,13 +11,19 @@ from jaxtyping import Float
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.output_sample import DesignSample
 from tolalloc.allocation.space.problem import OneSidedConstraint
-from tolalloc.allocation.space.requirement import Check, Requirement
+from tolalloc.allocation.space.requirement import Check, Guarantee, Requirement, RootSumSquare
 from tolalloc.allocation.verify.independent_sample import IndependentSample
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
+from tolalloc.capability.indices import Limits
 from tolalloc.capability.linear_function import LinearLaw
 from tolalloc.capability.monte_carlo import CONFIDENCE, RedrawnUnits, Yield, proportion, require_few_failures
+from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import Source
+from tolalloc.drawings.zones import Feature
+from tolalloc.models.function_model import FunctionModel
 from tolalloc.models.model import Model
+from tolalloc.reading.units import MILLIMETRE
 
 SLOPE_UNITS = 1024
 """Units that differences of an output without derivatives are averaged over [-]."""
@@ -199,3 +205,36 @@ def cheapest_met(tried: tuple[VerifiedDesign, ...]) -> VerifiedDesign:
     if met:
         return min(met, key=lambda design: design.cost)
     return min(tried, key=lambda design: design.blocking.tightest.relative_excess)
+
+
+def verifier_of_sum(*zones: float, limit: float, guarantee: Guarantee | None = None) -> Verifier:
+    """Return what verifies designs of y = Σ xᵢ ≤ limit, xᵢ normal of σᵢ = zoneᵢ/6, for worked numbers [mm].
+
+    Every zone costs 1, in proportion to 1/zone, and may change tenfold either way. Unless another guarantee is given,
+    √(Σ (zoneᵢ/2)²) must keep the limit.
+
+    Examples
+    --------
+    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
+    >>> float(verifier.verify(verifier.space.uniform(1.0), "as drawn").constraints[0].value)
+    5.0
+    """
+    names = tuple(f"x{at}" for at in range(1, len(zones) + 1))
+    sources = tuple(
+        Source(
+            name=name,
+            part="part",
+            feature=Feature.SIZE,
+            zone=zone * MILLIMETRE,
+            minimum=zone * MILLIMETRE / 10,
+            maximum=zone * MILLIMETRE * 10,
+            cost=1.0,
+            group=name,
+        )
+        for name, zone in zip(names, zones, strict=True)
+    )
+    errors = ErrorModel(sources)
+    model = FunctionModel(function=lambda *x: sum(x), inputs=names, outputs=("y [mm]",)).bound(errors, "")
+    shown = Requirement(output="y [mm]", limits=Limits(upper=limit), guarantee=guarantee or RootSumSquare())
+    space = DesignSpace(errors=errors)
+    return Verifier(space=space, model=model, requirements=(shown,), seeds=SeedTree(1), units=2000)
