@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from tolalloc.reports.document import Section as Section
     from tolalloc.reports.figure import Figure as Figure
     from tolalloc.reports.figure import Series as Series
+    from tolalloc.reports.portrait import Portrait as Portrait
     from tolalloc.reports.teller import Teller as Teller
     from tolalloc.sensitivity.effort import RankingEffort as RankingEffort
     from tolalloc.sensitivity.effort import SobolEffort as SobolEffort
@@ -96,6 +97,7 @@ _WHERE = {
     "Model": "models.model",
     "PEAK_TO_PEAK": "reducers",
     "PRELOAD": "reducers",
+    "Portrait": "reports.portrait",
     "QualityLoss": "allocation.cost.unit_price",
     "Question": "study.questions",
     "RADIAL_CLEARANCE": "reducers",

@@ -178,3 +178,15 @@ def test_what_is_not_known_of_the_model_is_a_source_of_every_ranked_output():
     assert found.result.local.sources == ("a", "b")
     assert says(found.sentences, "ranking.uncertain", names="scale")
     assert ranked({GAP: Limits(upper=1.02)}).summary.keys().isdisjoint({"not known of the model"})
+
+
+def test_an_own_model_without_a_portrait_says_its_assumptions_itself():
+    class Said(Model):
+        name, columns, outputs = "said", ("a",), (GAP,)
+        assumptions = ("all holes are round",)
+
+        def reading(self, outputs):
+            raise NotImplementedError
+
+    assert portrait_of(Said()).assumptions == ("all holes are round",)
+    assert portrait_of(Said()).facts == {}

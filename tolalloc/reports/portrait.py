@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from tolalloc.drawings.error_model import ErrorModel
 
 Own = TypeVar("Own", bound=Model)
+Said = TypeVar("Said")
 
 
 @dataclass(frozen=True)
@@ -59,30 +60,35 @@ class Portrait(Generic[Own]):
         if of is not None:
             _PORTRAITS[of] = cls
 
+    def _said(self, name: str, otherwise: Said) -> Said:
+        """Return what an own model says of itself under this name, as it may without a portrait."""
+        said: Said = getattr(self.model, name, otherwise)
+        return said
+
     @property
     def outcomes(self) -> Mapping[int, str]:
         """Status → outcome of a sample in words, the good one first."""
-        return {0: "answer found", 1: "no answer"}
+        return self._said("outcomes", {0: "answer found", 1: "no answer"})
 
     @property
     def facts(self) -> Mapping[str, Any]:
         """What is worth knowing of the model itself, units in the names."""
-        return {}
+        return self._said("facts", {})
 
     @property
     def assumptions(self) -> tuple[str, ...]:
         """What no source of the model states."""
-        return ()
+        return self._said("assumptions", ())
 
     @property
     def left_out(self) -> tuple[str, ...]:
         """What the drawing does not state and the model takes as exact, a sentence each."""
-        return ()
+        return self._said("left_out", ())
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """What every report says of the model itself beside what is asked, in sentences."""
-        return ()
+        return self._said("remarks", ())
 
     @property
     def spectra_note(self) -> str:
