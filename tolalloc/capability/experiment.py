@@ -86,6 +86,8 @@ class SumOfSizes:
 def sum_of_sizes(*zones: float, seed: int = 1) -> Experiment[SumOfSizes]:
     """Return the experiment of y = Σ xᵢ, xᵢ normal sizes of σᵢ = zoneᵢ/6, for worked numbers [m].
 
+    Its mean is 0 and its variance Σ σᵢ² (own derivation).
+
     Examples
     --------
     >>> experiment = sum_of_sizes(6.0, 12.0)

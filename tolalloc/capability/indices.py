@@ -151,7 +151,7 @@ def capability(sample: Float[np.ndarray, " unit"], limits: Limits, subgroup: int
 
     References
     ----------
-    ISO 22514-2, indices Cp, Cpk (within) and Pp, Ppk (overall); Montgomery, Statistical Quality Control, ch. 8.
+    ISO 22514-2, indices Cp, Cpk (within) and Pp, Ppk (overall); Montgomery 2012, Statistical Quality Control, ch. 8.
 
     Examples
     --------
@@ -197,7 +197,7 @@ def defects_per_million_opportunities(defects: int, units: int, opportunities: i
 
     References
     ----------
-    Montgomery, Statistical Quality Control.
+    Montgomery 2012, Statistical Quality Control.
 
     Examples
     --------
@@ -261,7 +261,7 @@ def quantile_interval(sample: Float[np.ndarray, " unit"], share: float, confiden
 
     References
     ----------
-    David & Nagaraja, Order Statistics, ch. 7: P(X₍ᵣ₎ ≤ q < X₍ₛ₎) = P(r ≤ B < s) with B binomial (n, share).
+    David & Nagaraja 2003, Order Statistics, ch. 7: P(X₍ᵣ₎ ≤ q < X₍ₛ₎) = P(r ≤ B < s) with B binomial (n, share).
 
     Examples
     --------

@@ -151,7 +151,8 @@ def _crossing(is_beyond: Callable[[float], bool]) -> float:
 def largest_first(values: Float[np.ndarray, " value"], count: int) -> Int[np.ndarray, " largest"]:
     """Return where so many of the largest values stand, the largest first; without sorting all of many.
 
-    Order statistics x₍₁₎ ≥ x₍₂₎ ≥ … ≥ x₍count₎; of equals the earlier one leads.
+    Order statistics x₍₁₎ ≥ x₍₂₎ ≥ … ≥ x₍count₎; of equals the earlier one leads: David & Nagaraja 2003,
+    Order Statistics.
 
     Examples
     --------

@@ -390,7 +390,8 @@ def log_normal_interval(failure: RareFailure, runs: int, confidence: float = CON
     References
     ----------
     p·exp(±t·√(ln(1 + δ²))) with δ the coefficient of variation and t Student's quantile of one degree of freedom less
-    than runs, because few runs know little of their own spread; unlike p ± t·s it cannot fall below zero.
+    than runs, because few runs know little of their own spread; unlike p ± t·s it cannot fall below zero (own
+    derivation).
 
     Examples
     --------

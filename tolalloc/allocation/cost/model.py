@@ -312,6 +312,8 @@ class Weighted:
 def made_together(models: Sequence[CostModel], ratios: Sequence[float]) -> CostModel:
     """Return the cost of several callouts that change together, as simple as it can be said; see `SumOfCosts`.
 
+    c(s) = Σ cᵢ(zoneᵢ·s) over the scale s (own derivation) [cost units], exact.
+
     >>> made_together([Reciprocal(factor=1.0), Reciprocal(factor=2.0)], [0.5, 1.0])
     Reciprocal(fixed=0.0, factor=4.0)
     """

@@ -294,10 +294,10 @@ def root_sum_square_stack(
 
     Notes
     -----
-    Theory page, equation (25). The norm is how independent random errors combine, and it is homogeneous, so its value
-    is gradient·scales: weightᵢ² = gᵢ·(g·scales)/scaleᵢ with gᵢ = max(∂excess/∂scaleᵢ, 0). A group whose larger zone
-    relieves the limit, by noise or because its errors open the contact, gets weight zero: the model never rewards a
-    larger error. It is exact at the design, and near it to first order.
+    Theory page, equation (25), own derivation. The norm is how independent random errors combine, and it is
+    homogeneous, so its value is gradient·scales: weightᵢ² = gᵢ·(g·scales)/scaleᵢ with gᵢ = max(∂excess/∂scaleᵢ, 0). A
+    group whose larger zone relieves the limit, by noise or because its errors open the contact, gets weight zero: the
+    model never rewards a larger error. It is exact at the design, and near it to first order.
 
     Examples
     --------
@@ -326,6 +326,8 @@ def worst_case_stack(
     groups: int,
 ) -> Stack:
     """Return the model of a worst case, weights·scales + slopes·settings ≤ budget, from the same arguments.
+
+    weightᵢ = max(∂excess/∂scaleᵢ, 0) (own derivation), exact at the design and near it to first order.
 
     Examples
     --------

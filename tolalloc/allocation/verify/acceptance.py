@@ -173,7 +173,8 @@ def confidence_of_fewer(confidence: float, units: int, final: int) -> float:
     Notes
     -----
     Φ(Φ⁻¹(confidence)·√(units/final)), with Φ the standard normal distribution: what a guarantee takes beyond the middle
-    of the units falls with the root of their number. For confidences from 0.5 on.
+    of the units falls with the root of their number. For confidences from 0.5 on (own
+    derivation).
 
     Examples
     --------

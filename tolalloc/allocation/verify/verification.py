@@ -211,7 +211,7 @@ def verifier_of_sum(*zones: float, limit: float, guarantee: Guarantee | None = N
     """Return what verifies designs of y = Σ xᵢ ≤ limit, xᵢ normal of σᵢ = zoneᵢ/6, for worked numbers [mm].
 
     Every zone costs 1, in proportion to 1/zone, and may change tenfold either way. Unless another guarantee is given,
-    √(Σ (zoneᵢ/2)²) must keep the limit.
+    √(Σ (zoneᵢ/2)²) must keep the limit (own derivation).
 
     Examples
     --------

@@ -262,6 +262,8 @@ def choose(
 ) -> Choice:
     """Return the candidate with the highest Q² among those tried that pass the gate, fitted to all answers.
 
+    The gate is Q² ≥ 0.95 of `cross_validate`, |error of the quantile| ≤ 2 % of it, and ≤ 1 % failed (own derivation).
+
     Parameters
     ----------
     response
