@@ -15,10 +15,10 @@ from tolalloc.assembly.files import load_errors, load_plan
 from tolalloc.bench.measurements import load_measurements
 from tolalloc.cli.main import EXAMPLES, app
 from tolalloc.cli.samples import FACTOR, STIFFER
-from tolalloc.cli.start import PRESETS
 from tolalloc.drawings.drawing import load_drawing
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.family import RV
 from tolalloc.reducers.reducer.files import load_reducer
 
 
@@ -169,7 +169,7 @@ def test_what_is_missing_is_asked_on_a_terminal_alone(tmp_path, monkeypatch):
     assert (reducer.crank_count, reducer.disc_count) == (4, 3)
 
 
-@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("preset", RV.new.presets)
 def test_a_preset_that_is_not_changed_is_the_preset_under_another_name(tmp_path, preset):
     from dataclasses import replace
 

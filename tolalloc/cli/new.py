@@ -22,13 +22,14 @@ def new(
     ] = "",
 ) -> None:
     """Make a folder with a reducer, its tolerance table, a study and samples: the start of your own."""
-    from tolalloc.cli.start import PRESETS, SAMPLES, Likeness, NewFolder
+    from tolalloc.cli.start import SAMPLES, Likeness, NewFolder
+    from tolalloc.reducers.family import RV
 
     if name is None:
         if not sys.stdin.isatty():
             raise InputError("tolalloc new: NAME is missing; give the folder to make, such as mine.")
         name = Path(typer.prompt("Name of the folder", default="mine"))
-        like = like or typer.prompt(f"Like which preset ({', '.join(PRESETS)})", default="rv20e")
+        like = like or typer.prompt(f"Like which preset ({', '.join(RV.new.presets)})", default="rv20e")
         preset = Likeness(preset=like).reducer
         cranks = cranks or typer.prompt("Cranks, 2 to 4", default=preset.crank_count, type=int)
         discs = discs or typer.prompt("Discs, 1 to 3", default=preset.disc_count, type=int)

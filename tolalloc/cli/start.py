@@ -27,9 +27,9 @@ from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import ARCSECOND, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.equivalent.columns import source_name
-from tolalloc.reducers.equivalent.interfaces import SOURCES
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.sources import ErrorSource
+from tolalloc.reducers.family import RV
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import IdentifiedStiffnessRecord, ReducerRecord, load_reducer
 from tolalloc.reducers.unit_file import UnitRecord
@@ -89,11 +89,7 @@ def schema(kind: str) -> dict[str, Any]:
     return {**found, "$schema": "https://json-schema.org/draft/2020-12/schema", "title": title}
 
 
-PRESETS = ("rv20e", "rv40e", "rv80e", "rv110e", "rv160e")
-"""Presets whose dimensions follow one rule, smallest first."""
 _FOLDER = Path(__file__).parents[1] / "reducers" / "reducer" / "presets"
-CRANKS, DISCS = (2, 3, 4), (1, 2, 3)
-"""Counts that a folder can be made for [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,9 +101,9 @@ class Likeness:
     discs: int | None = None
 
     def __post_init__(self) -> None:
-        if self.preset not in PRESETS:
-            raise UnknownNameError.among("new reducer", "preset", self.preset, PRESETS)
-        for name, count, allowed in (("cranks", self.cranks, CRANKS), ("discs", self.discs, DISCS)):
+        if self.preset not in RV.new.presets:
+            raise UnknownNameError.among("new reducer", "preset", self.preset, RV.new.presets)
+        for name, count, allowed in (("cranks", self.cranks, RV.new.cranks), ("discs", self.discs, RV.new.discs)):
             if count is not None and count not in allowed:
                 raise InputError.of_argument("new reducer", name, count, f"{allowed[0]} to {allowed[-1]}")
 
@@ -133,8 +129,6 @@ class Likeness:
 
 
 _NUMBERED = re.compile(r"(disc|crank|bore|journal|planet|mesh)\d+")
-_KNOWN_DIAMETER = 104.0
-"""Diameter of the pin circle of the RV-20E, whose zones are the shipped ones [mm]."""
 
 
 def sources_of(reducer: Reducer) -> tuple[Source, ...]:
@@ -143,9 +137,9 @@ def sources_of(reducer: Reducer) -> tuple[Source, ...]:
     Zones and their ranges are those of the shipped RV-20E, scaled by the tolerance unit i = 0.45·D^(1/3) + 0.001·D of
     ISO 286-1 with D the diameter of the pin circle in mm. The first stage is locked.
     """
-    known = {source.name: source for source in load_tolerance_table("rv20e_all_sources")}
+    known = {source.name: source for source in load_tolerance_table(RV.new.table)}
     scale = size_factor(2 * reducer.cycloid_stage.pin_circle_radius / MILLIMETRE)
-    kinds = {name: SOURCES.of(name) for name in map(source_name, EquivalentModel(reducer).columns)}
+    kinds = {name: RV.sources.of(name) for name in map(source_name, EquivalentModel(reducer).columns)}
     found = []
     for name, kind in kinds.items():
         like = known.get(name) or known.get(_NUMBERED.sub(r"\g<1>1", name))
@@ -165,7 +159,7 @@ def size_factor(diameter: float) -> float:
     def unit(size: float) -> float:
         return float(0.45 * size ** (1 / 3) + 0.001 * size)
 
-    return unit(diameter) / unit(_KNOWN_DIAMETER)
+    return unit(diameter) / unit(RV.new.diameter)
 
 
 def _scaled(source: Source, kind: ErrorSource, reducer: Reducer, scale: float) -> Source:

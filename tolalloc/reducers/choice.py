@@ -16,10 +16,10 @@ from tolalloc.reading.named_fields import is_number
 from tolalloc.reading.units import MICROMETRE, MILLIMETRE
 from tolalloc.reducers import TORQUE
 from tolalloc.reducers.equivalent.columns import source_name
-from tolalloc.reducers.equivalent.interfaces import SOURCES
 from tolalloc.reducers.equivalent.model import EquivalentModel, cached_model
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
 from tolalloc.reducers.equivalent.springs import HARMONICS
+from tolalloc.reducers.family import RV
 from tolalloc.reducers.reducer.design import Modification, Reducer, at_torque
 from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from tolalloc.reducers.model import ReducerModel
 
 
-NEGLECTED = SOURCES.neglected
+NEGLECTED = RV.sources.neglected
 """Sources that a tolerance table need not list; they are then taken as exact, and the report says so."""
 
 _LARGEST_ZONE = 200.0 * MICROMETRE
@@ -109,7 +109,7 @@ def _require_each(errors: ErrorModel, own: Mapping[str, Sequence[str]], reducer:
     """
     wrong: dict[int, list[str]] = {}
     for source in errors.sources:
-        kind = SOURCES.of(source.name)
+        kind = RV.sources.of(source.name)
         if own[source.name] and kind and source.each != kind.count(reducer):
             wrong.setdefault(source.each, []).append(source.name)
     if not wrong:
@@ -130,7 +130,7 @@ def _other_sizes(errors: ErrorModel, reducer: Reducer) -> tuple[str, ...]:
     """Return which nominal sizes of a table are not those of the reducer, in sentences; a size of 0 is not stated."""
     sentences = []
     for source in errors.sources:
-        kind = SOURCES.of(source.name)
+        kind = RV.sources.of(source.name)
         if kind is None or kind.nominal is None or not source.nominal:
             continue
         what, size = kind.nominal.said, kind.nominal.of(reducer)

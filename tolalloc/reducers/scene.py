@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from math import gcd, pi, sin
+from math import gcd, pi
 from typing import Any
 
 import numpy as np
@@ -24,22 +24,11 @@ from tolalloc.reducers.equivalent.condensation import (
     retained_coordinates,
     rotation_scale,
 )
-from tolalloc.reducers.equivalent.interfaces import SOURCES
 from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel, Status
 from tolalloc.reducers.equivalent.outputs import Forces, forces
 from tolalloc.reducers.equivalent.springs import Positions, SpringGroup
-from tolalloc.reducers.reducer.bearings import RollingBearing
+from tolalloc.reducers.family import RV, Place
 from tolalloc.reducers.reducer.design import Reducer
-
-
-@dataclass(frozen=True, kw_only=True)
-class Place:
-    """A feature of a part that the picture shows and that sources of the drawing limit."""
-
-    id: str  # Name of the feature, the beginning of its sources' names where they share one
-    label: str  # What a reader calls it
-    part: str  # Part that carries it
-    sources: tuple[str, ...] = ()  # Names of the drawing's sources that sit there
 
 
 def place_of(source: str) -> str:
@@ -55,16 +44,16 @@ def place_of(source: str) -> str:
     >>> place_of("disc2.each_tooth.pitch"), place_of("crank1.journal2.phase"), place_of("carrier.tilt")
     ('disc2.teeth', 'crank1.journal2', 'carrier')
     """
-    kind = SOURCES.of(source)
+    kind = RV.sources.of(source)
     if kind is None or not kind.place:
-        names = [own.name for own in SOURCES.kinds if own.place]
+        names = [own.name for own in RV.sources.kinds if own.place]
         raise UnknownNameError.among("places of a reducer", "source", source, names)
     return kind.place_of(source)
 
 
 def is_placed(source: str) -> bool:
     """Return whether the picture has a place for a source."""
-    kind = SOURCES.of(source)
+    kind = RV.sources.of(source)
     return kind is not None and bool(kind.place)
 
 
@@ -76,7 +65,7 @@ def places_of(reducer: Reducer, sources: Iterable[str] = ()) -> tuple[Place, ...
     UnknownNameError
         A source that sits at no part of the reducer.
     """
-    found = {place.id: place for place in _all_places(reducer)}
+    found = {place.id: place for place in RV.places(reducer)}
     for source in sources:
         own = place_of(source)
         if own not in found:
@@ -85,86 +74,8 @@ def places_of(reducer: Reducer, sources: Iterable[str] = ()) -> tuple[Place, ...
     return tuple(found.values())
 
 
-def _all_places(reducer: Reducer) -> Iterable[Place]:
-    cranks, discs = range(1, reducer.crank_count + 1), range(1, reducer.disc_count + 1)
-    yield Place(id="housing.pins", label="places of the pins in the housing", part="housing")
-    yield Place(id="housing.grooves", label="grooves of the pins", part="housing")
-    yield Place(id="pins", label="pins", part="pins")
-    for disc in discs:
-        yield Place(id=f"disc{disc}", label=f"disc {disc}", part=f"disc{disc}")
-        yield Place(id=f"disc{disc}.teeth", label=f"teeth of disc {disc}", part=f"disc{disc}")
-        yield Place(id=f"disc{disc}.bores", label=f"pattern of the bores of disc {disc}", part=f"disc{disc}")
-        for crank in cranks:
-            yield Place(id=f"disc{disc}.bore{crank}", label=f"bore {crank} of disc {disc}", part=f"disc{disc}")
-    for crank in cranks:
-        yield Place(id=f"crank{crank}", label=f"crankshaft {crank}", part=f"crank{crank}")
-        for disc in discs:
-            label = f"journal {disc} of crankshaft {crank}"
-            yield Place(id=f"crank{crank}.journal{disc}", label=label, part=f"crank{crank}")
-    yield Place(id="carrier", label="carrier", part="carrier")
-    for crank in cranks:
-        yield Place(id=f"carrier.bore{crank}", label=f"bore {crank} of the carrier", part="carrier")
-    yield Place(id="sun", label="sun gear", part="sun")
-    yield Place(id="sun.teeth", label="teeth of the sun gear", part="sun")
-    for crank in cranks:
-        yield Place(id=f"planet{crank}", label=f"planet gear {crank}", part=f"planet{crank}")
-        yield Place(id=f"planet{crank}.teeth", label=f"teeth of planet gear {crank}", part=f"planet{crank}")
-        yield Place(id=f"mesh{crank}", label=f"mesh of sun and planet {crank}", part=f"planet{crank}")
-
-
-_BORE, _JOURNAL = 0.155, 0.103
-"""Radii of a disc's bore and of a journal over that of the pin circle, where no bearing is stated; an assumption."""
-_HOUSING, _LAND = 1.17, 0.05
-"""Outer radius of the ring of pins, and least material between drawn features, both over that of the pin circle."""
 _POINTS = 22
 """Points of a tooth [-]."""
-
-
-def _outlines(reducer: Reducer) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return radii and counts [mm, -] with names for the picture, and what of them is an assumption of the drawing."""
-    stage, first, dimensions = reducer.cycloid_stage, reducer.first_stage, reducer.friction_dimensions
-    circle, crank_circle = stage.pin_circle_radius, reducer.crank_circle_radius
-    root = stage.pin_circle_radius - stage.eccentricity - stage.pin_radius
-    land = _LAND * circle
-    room = min(crank_circle * sin(pi / reducer.crank_count), root - crank_circle, crank_circle) - land
-    journal, bore = _rings(dimensions.crank_disc_bearing, room, circle)
-    shaft, carrier_bore = _rings(dimensions.crank_carrier_bearing, room, circle)
-    lengths = {
-        "pin_circle_radius": circle,
-        "pin_radius": stage.pin_radius,
-        "eccentricity": stage.eccentricity,
-        "crank_circle_radius": crank_circle,
-        "module": first.module,
-        "bore_radius": bore,
-        "journal_radius": journal,
-        "carrier_bore_radius": carrier_bore,
-        "shaft_radius": min(shaft, max(journal - stage.eccentricity, 0.4 * journal)),
-        "disc_hole_radius": max(min(crank_circle - bore - land, 0.3 * circle), 0.2 * land),
-        "carrier_radius": min(crank_circle + carrier_bore + land, root - stage.eccentricity),
-        "housing_radius": _HOUSING * circle + stage.pin_radius,
-    }
-    counts = {
-        "crank_count": reducer.crank_count,
-        "disc_count": reducer.disc_count,
-        "pin_count": stage.pin_count,
-        "disc_teeth": stage.disc_teeth,
-        "sun_teeth": first.sun_teeth,
-        "planet_teeth": first.planet_teeth,
-        "pressure_angle": float(first.pressure_angle),
-    }
-    stated = {"housing": False, "bearings of the cranks": dimensions.crank_disc_bearing is not None}
-    open_names = [name for name, known in stated.items() if not known]
-    assumed = f"drawn by a rule, as the reducer file does not state them: outlines of {', '.join(open_names)}, carrier"
-    return {name: float(length / MILLIMETRE) for name, length in lengths.items()} | counts, (assumed,)
-
-
-def _rings(bearing: RollingBearing | None, room: float, circle: float) -> tuple[float, float]:
-    """Return the radii of the inner and the outer raceway, at most as large as there is room [m]."""
-    inner, outer = _JOURNAL * circle, _BORE * circle
-    if bearing is not None:
-        inner, outer = ((bearing.pitch_diameter + sign * bearing.diameter) / 2 for sign in (-1.0, 1.0))
-    shrunk = min(1.0, room / outer)
-    return inner * shrunk, outer * shrunk
 
 
 def _tooth(reducer: Reducer) -> dict[str, list[Any]]:
@@ -426,7 +337,7 @@ def scene_of(
     reducer = _as_modified(model.reducer, own)
     turn = _turn_of(model.at_torque(torque), per_crank_turn * reducer.cycloid_stage.disc_teeth)
     forward, backward = (_solved_states(turn, errors, sign * abs(torque)) for sign in (-1.0, 1.0))
-    outline, assumptions = _outlines(reducer)
+    outline, assumptions = RV.outlines(reducer)
     turns, start = _motion(reducer)
     return Scene(
         reducer=reducer.name,
@@ -492,7 +403,7 @@ def _motion(reducer: Reducer) -> tuple[dict[str, float], dict[str, list[float]]]
 
 def _coordinates(reducer: Reducer) -> dict[str, list[int]]:
     """Return the first coordinate of every part [-]."""
-    own = Positions(reducer, np.zeros(1)).coordinates
+    own = RV.coordinates(reducer.crank_count, reducer.disc_count)
     return {
         "sun": [own.sun],
         "planet": [own.planet(crank) for crank in range(reducer.crank_count)],

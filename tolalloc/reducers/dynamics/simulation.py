@@ -21,6 +21,7 @@ from tolalloc.reducers.equivalent.condensation import (
 )
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.springs import Coordinates, Positions
+from tolalloc.reducers.family import RV
 from tolalloc.reducers.reducer.design import Reducer
 
 _STEPS_AT_ONCE = 512
@@ -74,7 +75,7 @@ class Steps:
     @property
     def coordinates(self) -> Coordinates:
         """The layout of q."""
-        return Coordinates(self.reducer.crank_count, self.reducer.disc_count)
+        return RV.coordinates(self.reducer.crank_count, self.reducer.disc_count)
 
     @cached_property
     def scale(self) -> Float[np.ndarray, " coordinate"]:

@@ -12,8 +12,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.reducers.equivalent.columns import Columns, columns_of
-from tolalloc.reducers.equivalent.interfaces import INTERFACES, PinContact, dense_rows, pin_contact
+from tolalloc.reducers.equivalent.interfaces import PinContact, dense_rows, pin_contact
 from tolalloc.reducers.equivalent.springs import HARMONICS, Coordinates, Positions, SpringGroup, harmonic_waves
+from tolalloc.reducers.family import RV
 from tolalloc.reducers.reducer.design import Reducer
 
 _ANGLES_AT_ONCE = 64
@@ -52,7 +53,7 @@ class CondensedAngles(NamedTuple):
 
 def bilateral_groups(at: Positions) -> list[SpringGroup]:
     """Return all spring groups but the pin contact."""
-    return [interface.rows(at) for interface in INTERFACES]
+    return RV.groups(at)
 
 
 def spring_groups(

@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 
 from tolalloc.reducers.cycloid.loaded_contact import contact_stiffness
 from tolalloc.reducers.cycloid.tooth_profile import normals
-from tolalloc.reducers.equivalent.sources import ErrorSource, ErrorSources, Nominal
+from tolalloc.reducers.equivalent.sources import ErrorSource, Nominal
 from tolalloc.reducers.equivalent.springs import (
     Positions,
     SpringGroup,
@@ -342,9 +342,6 @@ CARRIER_SUPPORT = Interface(
     sources=(ErrorSource(name="carrier.assembly", shape="vector", place="carrier"), _clearance("carrier")),
 )
 
-INTERFACES: tuple[Interface, ...] = (SUN_SUPPORT, GEAR_MESH, CRANK_DISC, CRANK_CARRIER, CARRIER_SUPPORT)
-"""All interfaces but the pins; a further one is its function, its record, and its name here."""
-
 
 Terms = dict[str, list[tuple[int, float]]]
 """Column → the entries of a table that it moves, and by how much each [m/m or -]."""
@@ -539,9 +536,6 @@ PIN_SOURCES = (
     ErrorSource(name="disc{j}.tilt", shape="vector", mirror="kept", place="disc{j}", neglected="*.tilt", fine=True),
 )
 """What the contact of pins and teeth declares."""
-
-SOURCES = ErrorSources((*(kind for interface in INTERFACES for kind in interface.sources), *PIN_SOURCES))
-"""All kinds of sources of a reducer."""
 
 
 def dense_rows(at: Positions) -> SpringGroup:

@@ -17,6 +17,8 @@ from jaxtyping import Float, UInt8
 from tolalloc.reducers.equivalent.hysteresis import BACKLASH, TURN_ANGLES, HysteresisLoop, hysteresis_loop, sliding_ways
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import Solved, forces
+from tolalloc.reducers.equivalent.springs import Positions
+from tolalloc.reducers.family import RV
 from tolalloc.reducers.reducer.design import Reducer, at_torque, compliances
 
 PHASES = 72
@@ -111,9 +113,6 @@ def preload(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) 
     )
 
 
-_INTERFACES = ("sun_support", "gear_mesh", "crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing")
-
-
 def rated_pin_force(reducer: Reducer) -> float:
     """Return the largest force of a pin of the perfect reducer under its rated torque [N].
 
@@ -161,8 +160,8 @@ def twist_shares(reducer: Reducer) -> tuple[TwistShare, ...]:
     own, torque = solved.reducer, solved.torque
     work = torque * float(solved.transmission_error.mean())
     rows, left, parts = [], 1.0, compliances(own, torque)
-    for interface in _INTERFACES:
-        stiffness = getattr(own.stiffness, interface)
+    for group in RV.groups(Positions(own, np.zeros(1))):
+        interface, stiffness = group.stiffness_name, float(group.stiffness[0, 0])
         share = float((found.of(interface) ** 2).sum(axis=2).mean() / stiffness / work)
         left -= share
         plain = {interface.replace("_", " ").replace("crank ", "crank–"): 1.0 / stiffness}

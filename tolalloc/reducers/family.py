@@ -1,0 +1,188 @@
+"""What one family of reducers is: coordinates, spring groups, sources, its picture, and what a new folder starts from.
+
+The model is the same for every family; what says "disc", "crank" or "planet" by a number or a name stands here, or in
+the spring groups that the family names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from math import pi, sin
+from typing import Any
+
+from tolalloc.reading.units import MILLIMETRE
+from tolalloc.reducers.equivalent.interfaces import (
+    CARRIER_SUPPORT,
+    CRANK_CARRIER,
+    CRANK_DISC,
+    GEAR_MESH,
+    PIN_SOURCES,
+    SUN_SUPPORT,
+    Interface,
+)
+from tolalloc.reducers.equivalent.sources import ErrorSource, ErrorSources
+from tolalloc.reducers.equivalent.springs import Coordinates, Positions, SpringGroup
+from tolalloc.reducers.reducer.bearings import RollingBearing
+from tolalloc.reducers.reducer.design import Reducer
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """A feature of a part that the picture shows and that sources of the drawing limit."""
+
+    id: str  # Name of the feature, the beginning of its sources' names where they share one
+    label: str  # What a reader calls it
+    part: str  # Part that carries it
+    sources: tuple[str, ...] = ()  # Names of the drawing's sources that sit there
+
+
+@dataclass(frozen=True, kw_only=True)
+class NewRows:
+    """What a new folder starts from: presets, allowed counts, and the table whose zones are scaled."""
+
+    presets: tuple[str, ...]  # Presets whose dimensions follow one rule, smallest first
+    cranks: tuple[int, ...]  # Counts that a folder can be made for [-]
+    discs: tuple[int, ...]
+    table: str  # Tolerance table that is scaled
+    diameter: float  # Of the pin circle to which the table belongs [mm]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReducerFamily:
+    """One family of reducers.
+
+    Parameters
+    ----------
+    name
+        What it is called.
+    coordinates
+        Layout of the displacements for a number of cranks and of discs [-].
+    interfaces
+        All spring groups but the contact of pins and teeth.
+    contact_sources
+        What the contact of pins and teeth declares.
+    places
+        What the picture shows of a reducer, from the inside of the housing to the input.
+    outlines
+        Radii and counts for the picture [mm, -], and what of them is an assumption of the drawing.
+    new
+        What a new folder starts from.
+    """
+
+    name: str
+    coordinates: Callable[[int, int], Coordinates]
+    interfaces: tuple[Interface, ...]
+    contact_sources: tuple[ErrorSource, ...]
+    places: Callable[[Reducer], Iterable[Place]]
+    outlines: Callable[[Reducer], tuple[dict[str, Any], tuple[str, ...]]]
+    new: NewRows
+
+    @cached_property
+    def sources(self) -> ErrorSources:
+        """All kinds of sources: of the interfaces, then of pins and teeth."""
+        declared = (kind for interface in self.interfaces for kind in interface.sources)
+        return ErrorSources((*declared, *self.contact_sources))
+
+    def groups(self, at: Positions) -> list[SpringGroup]:
+        """Return all spring groups but the contact of pins and teeth."""
+        return [interface.rows(at) for interface in self.interfaces]
+
+
+def _places(reducer: Reducer) -> Iterator[Place]:
+    cranks, discs = range(1, reducer.crank_count + 1), range(1, reducer.disc_count + 1)
+    yield Place(id="housing.pins", label="places of the pins in the housing", part="housing")
+    yield Place(id="housing.grooves", label="grooves of the pins", part="housing")
+    yield Place(id="pins", label="pins", part="pins")
+    for disc in discs:
+        yield Place(id=f"disc{disc}", label=f"disc {disc}", part=f"disc{disc}")
+        yield Place(id=f"disc{disc}.teeth", label=f"teeth of disc {disc}", part=f"disc{disc}")
+        yield Place(id=f"disc{disc}.bores", label=f"pattern of the bores of disc {disc}", part=f"disc{disc}")
+        for crank in cranks:
+            yield Place(id=f"disc{disc}.bore{crank}", label=f"bore {crank} of disc {disc}", part=f"disc{disc}")
+    for crank in cranks:
+        yield Place(id=f"crank{crank}", label=f"crankshaft {crank}", part=f"crank{crank}")
+        for disc in discs:
+            label = f"journal {disc} of crankshaft {crank}"
+            yield Place(id=f"crank{crank}.journal{disc}", label=label, part=f"crank{crank}")
+    yield Place(id="carrier", label="carrier", part="carrier")
+    for crank in cranks:
+        yield Place(id=f"carrier.bore{crank}", label=f"bore {crank} of the carrier", part="carrier")
+    yield Place(id="sun", label="sun gear", part="sun")
+    yield Place(id="sun.teeth", label="teeth of the sun gear", part="sun")
+    for crank in cranks:
+        yield Place(id=f"planet{crank}", label=f"planet gear {crank}", part=f"planet{crank}")
+        yield Place(id=f"planet{crank}.teeth", label=f"teeth of planet gear {crank}", part=f"planet{crank}")
+        yield Place(id=f"mesh{crank}", label=f"mesh of sun and planet {crank}", part=f"planet{crank}")
+
+
+_BORE, _JOURNAL = 0.155, 0.103
+"""Radii of a disc's bore and of a journal over that of the pin circle, where no bearing is stated; an assumption."""
+_HOUSING, _LAND = 1.17, 0.05
+"""Outer radius of the ring of pins, and least material between drawn features, both over that of the pin circle."""
+
+
+def _outlines(reducer: Reducer) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return radii and counts [mm, -] with names for the picture, and what of them is an assumption of the drawing."""
+    stage, first, dimensions = reducer.cycloid_stage, reducer.first_stage, reducer.friction_dimensions
+    circle, crank_circle = stage.pin_circle_radius, reducer.crank_circle_radius
+    root = stage.pin_circle_radius - stage.eccentricity - stage.pin_radius
+    land = _LAND * circle
+    room = min(crank_circle * sin(pi / reducer.crank_count), root - crank_circle, crank_circle) - land
+    journal, bore = _rings(dimensions.crank_disc_bearing, room, circle)
+    shaft, carrier_bore = _rings(dimensions.crank_carrier_bearing, room, circle)
+    lengths = {
+        "pin_circle_radius": circle,
+        "pin_radius": stage.pin_radius,
+        "eccentricity": stage.eccentricity,
+        "crank_circle_radius": crank_circle,
+        "module": first.module,
+        "bore_radius": bore,
+        "journal_radius": journal,
+        "carrier_bore_radius": carrier_bore,
+        "shaft_radius": min(shaft, max(journal - stage.eccentricity, 0.4 * journal)),
+        "disc_hole_radius": max(min(crank_circle - bore - land, 0.3 * circle), 0.2 * land),
+        "carrier_radius": min(crank_circle + carrier_bore + land, root - stage.eccentricity),
+        "housing_radius": _HOUSING * circle + stage.pin_radius,
+    }
+    counts = {
+        "crank_count": reducer.crank_count,
+        "disc_count": reducer.disc_count,
+        "pin_count": stage.pin_count,
+        "disc_teeth": stage.disc_teeth,
+        "sun_teeth": first.sun_teeth,
+        "planet_teeth": first.planet_teeth,
+        "pressure_angle": float(first.pressure_angle),
+    }
+    stated = {"housing": False, "bearings of the cranks": dimensions.crank_disc_bearing is not None}
+    open_names = [name for name, known in stated.items() if not known]
+    assumed = f"drawn by a rule, as the reducer file does not state them: outlines of {', '.join(open_names)}, carrier"
+    return {name: float(length / MILLIMETRE) for name, length in lengths.items()} | counts, (assumed,)
+
+
+def _rings(bearing: RollingBearing | None, room: float, circle: float) -> tuple[float, float]:
+    """Return the radii of the inner and the outer raceway, at most as large as there is room [m]."""
+    inner, outer = _JOURNAL * circle, _BORE * circle
+    if bearing is not None:
+        inner, outer = ((bearing.pitch_diameter + sign * bearing.diameter) / 2 for sign in (-1.0, 1.0))
+    shrunk = min(1.0, room / outer)
+    return inner * shrunk, outer * shrunk
+
+
+RV = ReducerFamily(
+    name="RV",
+    coordinates=Coordinates,
+    interfaces=(SUN_SUPPORT, GEAR_MESH, CRANK_DISC, CRANK_CARRIER, CARRIER_SUPPORT),
+    contact_sources=PIN_SOURCES,
+    places=_places,
+    outlines=_outlines,
+    new=NewRows(
+        presets=("rv20e", "rv40e", "rv80e", "rv110e", "rv160e"),
+        cranks=(2, 3, 4),
+        discs=(1, 2, 3),
+        table="rv20e_all_sources",
+        diameter=104.0,
+    ),
+)
+"""Two stages: sun and planets, then cranks, discs and pins; a further spring group is its function, record and name."""
