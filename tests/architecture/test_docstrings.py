@@ -147,8 +147,6 @@ COMPUTES_NOTHING = {
     "allocation.space.design_space.repriced": "passes on",
     "sensitivity.measures.rank": "passes on",
     "sensitivity.sobol.solved": "passes on",
-    "sensitivity.surrogate.regression.gaussian_process": "passes on",
-    "sensitivity.surrogate.regression.lasso": "passes on",
 }
 """Function → what it does instead of computing."""
 

@@ -417,7 +417,19 @@ def sparse_quadratic_regression() -> Any:
 
 
 def lasso() -> Any:
-    """Return a linear regressor that keeps few columns, how few found by cross-validation."""
+    """Return a linear regressor that keeps few columns, how few found by cross-validation.
+
+    Least Σ (y − ŷ)²/2n + α·Σ |w|, α by cross-validation: Tibshirani 1996, J. R. Stat. Soc. B 58, 267–288.
+
+    Examples
+    --------
+    Of ten columns the one that matters is kept.
+
+    >>> x = np.random.default_rng(1).normal(size=(200, 10))
+    >>> weights = fitted(lasso(), x, x[:, 0]).regressor_.coef_
+    >>> int(np.abs(weights).argmax()), int(np.count_nonzero(np.abs(weights) > 1e-2))
+    (0, 1)
+    """
     from sklearn.compose import TransformedTargetRegressor
     from sklearn.linear_model import LassoCV
     from sklearn.preprocessing import StandardScaler
@@ -426,7 +438,19 @@ def lasso() -> Any:
 
 
 def gaussian_process(columns: int) -> Any:
-    """Return a Gaussian process of the logarithm of a positive output, one length per column, and noise."""
+    """Return a Gaussian process of the logarithm of a positive output, one length per column, and noise.
+
+    Kernel c·exp(−Σ (Δuᵢ/lᵢ)²/2) + noise of standardised columns u, its parameters by the largest likelihood: Rasmussen
+    & Williams 2006, Gaussian Processes for Machine Learning, ch. 2 and 5. For positive outputs.
+
+    Examples
+    --------
+    y = exp(x) at x = 0.1, between the samples:
+
+    >>> x = np.linspace(-1.0, 1.0, 12)[:, np.newaxis]
+    >>> round(float(fitted(gaussian_process(1), x, np.exp(x[:, 0])).predict([[0.1]])[0]), 2)
+    1.11
+    """
     from sklearn.compose import TransformedTargetRegressor
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
