@@ -276,7 +276,7 @@ class Scene:
     reducer: str  # Name of the reducer
     unit: str  # Name of the unit
     outline: Mapping[str, float]  # Radii and counts of parts [mm, -], angles [rad]
-    tooth: Mapping[str, list[Any]]  # One tooth space of a disc, `tolalloc.reducers.scene.tooth` [mm, -, rad]
+    tooth: Mapping[str, list[Any]]  # One tooth space of a disc, `tolalloc.reducers.scene._tooth` [mm, -, rad]
     turns: Mapping[str, float]  # Turns of carrier, cranks, discs, planets and sun per output turn, with their sign [-]
     # Angles at θc = 0, one entry per crank, disc, pin or planet, and of the sun's first tooth [rad]
     start: Mapping[str, list[float]]

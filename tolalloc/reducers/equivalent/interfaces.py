@@ -312,6 +312,8 @@ def carrier_support(at: Positions) -> SpringGroup:
 
     ``carrier.assembly`` is (a_cx, a_cy), fixed in the housing [m].
 
+    δ = Xca − a_cx, Yca − a_cy [m].
+
     References
     ----------
     liu2020, equations (2) to (12), whose energy's gradient it is.

@@ -42,6 +42,19 @@ def pin_force(law, stiffness, log_length, half_tilt, compression):
     """Return force [N] and its derivative [N/m] of one pin contact.
 
     ``half_tilt`` is how much deeper the tilted tooth's end lies than its middle, equation (31), for linear laws only.
+
+    F = K·δ of the linear laws; δ = F/c·ln(cλ/F) of the logarithmic one, c = 2·``stiffness``; 0 for δ ≤ 0.
+
+    References
+    ----------
+    Hertz's line contact with Li Lixing's constant, see `tolalloc.reducers.cycloid.loaded_contact.equivalent_length`;
+    the tilt is an own derivation.
+
+    Examples
+    --------
+    >>> force, slope = pin_force.py_func(LINEAR, 2e8, 0.0, 0.0, 1e-6)  # 1 µm at 200 N/µm [N, N/m]
+    >>> round(force, 6), slope
+    (200.0, 200000000.0)
     """
     if abs(compression) < half_tilt:  # one end of the tooth is lifted
         deep = compression + half_tilt
@@ -204,7 +217,7 @@ def _near(design, convex, angle, px, py):
 
 
 @jit
-def design_clearances(design, pin_angle, turned, clearance):
+def _design_clearances(design, pin_angle, turned, clearance):
     """Fill the clearances [m] of pins at exact places on a turned disc, [pin].
 
     ``turned`` are the rotations of the disc, one for each pin. Flanks turned by a positive rotation modification leave
@@ -241,7 +254,7 @@ def design_clearances(design, pin_angle, turned, clearance):
 @jit
 def _clearances(designs, pin_angle, turned, clearance):
     for d in range(designs.shape[0]):
-        design_clearances(designs[d], pin_angle, turned[d], clearance[d])
+        _design_clearances(designs[d], pin_angle, turned[d], clearance[d])
 
 
 def pin_clearances(designs: Any, pin_angle: Any, turned: Any, clearance: Any) -> None:

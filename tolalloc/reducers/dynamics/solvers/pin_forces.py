@@ -60,6 +60,24 @@ def pin_contacts(mesh, disc, q, contact):
     """Fill force [N], its derivative [N/m], compression [m], x and y of the normal into the disc [-] and its lever [m].
 
     ``q`` are x, y and turn of a disc; ``contact`` is [pin, 6]. The pins only push.
+
+    Compression = depth + r_k − r_rp, depth that of the pin's centre behind the path of the grinding pin's.
+
+    References
+    ----------
+    Own derivation, as the exact distance of `tolalloc.reducers.cycloid.clearance.exact_clearance`.
+
+    Examples
+    --------
+    A pin at the root of a disc in its place is free by Δr_rp − Δr_p, a compression of −6 µm on xi2015's:
+
+    >>> from tolalloc.reducers.cycloid.clearance import exact_clearance
+    >>> from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> design = load_reducer("rv40e_xi2015")
+    >>> profile = ToothProfile(stage=design.cycloid_stage, modification=design.modification)
+    >>> round(-1e6 * float(exact_clearance([profile], np.zeros(1))[0, 0]), 3)
+    -6.0
     """
     centre = complex(q[0], q[1])
     crank = np.angle(centre)

@@ -65,7 +65,7 @@ class Searches(NamedTuple):
     new_q: Float[np.ndarray, "lane 2 retained"]
 
 
-def make_searches(retained: int) -> Searches:
+def _make_searches(retained: int) -> Searches:
     """Return lanes without a search."""
     return Searches(
         np.full(WIDTH, -1),
@@ -81,7 +81,7 @@ def make_searches(retained: int) -> Searches:
     )
 
 
-def make_peaks(found: Int[np.ndarray, "3 peak"]) -> Peaks:
+def _make_peaks(found: Int[np.ndarray, "3 peak"]) -> Peaks:
     """Return peaks in the order of their angles, so that searches side by side read the same tables."""
     sample, side, coarse = found
     order = np.argsort(coarse, kind="stable")
@@ -96,7 +96,7 @@ def make_peaks(found: Int[np.ndarray, "3 peak"]) -> Peaks:
 
 
 @jit_in_place
-def begin(lane, peak, search, turn, peaks, own):
+def _begin(lane, peak, search, turn, peaks, own):
     """Let a lane search around a peak.
 
     The solved turn begins and ends one coarse angle outside, so that every angle has two neighbours of its own, also
@@ -112,16 +112,16 @@ def begin(lane, peak, search, turn, peaks, own):
 
 
 @jit_in_place
-def gain(left, centre, right):
+def _gain(left, centre, right):
     """Return how much a peak near ``centre`` may rise above it: the steeper flank carried on for one step."""
     return max(centre - left, centre - right)
 
 
 @jit_in_place
-def look_closer(lane, search, best, peaks, own):
+def _look_closer(lane, search, best, peaks, own):
     """Halve the step, or end the search where it is fine enough or cannot reach the sample's best any more."""
     peak, centre = own.peak[lane], own.height[lane, 1]
-    more = gain(own.height[lane, 0], centre, own.height[lane, 2])
+    more = _gain(own.height[lane, 0], centre, own.height[lane, 2])
     hopeful = centre + search.safety * more > best[peaks.sample[peak], peaks.side[peak]]
     if own.level[lane] < search.levels and hopeful:
         own.level[lane] += 1
@@ -159,7 +159,7 @@ def _move(lane, own):
 
 
 @jit_in_place
-def take(lane, rotation, status, ratio, search, best, peaks, own, found):
+def _take(lane, rotation, status, ratio, search, best, peaks, own, found):
     """Take in what was found where the lane looked."""
     peak, half = own.peak[lane], own.half[lane]
     sample = peaks.sample[peak]
@@ -174,7 +174,7 @@ def take(lane, rotation, status, ratio, search, best, peaks, own, found):
     own.half[lane] += 1
     if half == 1:
         _move(lane, own)
-        look_closer(lane, search, best, peaks, own)
+        _look_closer(lane, search, best, peaks, own)
 
 
 @jit_in_place
@@ -201,7 +201,7 @@ def _fill_all(alone, law, tables, layout, values, peaks, own, workspace):
 
 
 @jit_in_place
-def search_peaks(
+def _search_peaks(
     discs, alone, tables, layout, design, values, search, turn, best, peaks, own, memory, workspace, found
 ):
     """Search around all peaks, the lanes taking one after another.
@@ -212,9 +212,9 @@ def search_peaks(
     while True:
         for lane in range(WIDTH):
             while own.peak[lane] < 0 and waiting < peaks.coarse.size:
-                begin(lane, waiting, search, turn, peaks, own)
+                _begin(lane, waiting, search, turn, peaks, own)
                 workspace.node[lane, :] = -1
-                look_closer(lane, search, best, peaks, own)
+                _look_closer(lane, search, best, peaks, own)
                 waiting += 1
         together, careful = _fill_all(alone, design.law, tables, layout, values, peaks, own, workspace)
         if not together | careful:
@@ -232,13 +232,13 @@ def search_peaks(
                 rotation, status, ratio, _ = solve_anywhere(
                     position, tables, layout, face_width, values[sample], q, memory
                 )
-                take(lane, rotation, status, ratio, search, best, peaks, own, found)
+                _take(lane, rotation, status, ratio, search, best, peaks, own, found)
             elif (together >> lane) & 1:
                 rotation = workspace.base[lane]
                 for i in range(batch.q.shape[0]):
                     q[i] = batch.q[i, lane]
                     rotation += workspace.by_coordinate[i, lane] * q[i]
-                take(lane, rotation, CONVERGED, batch.ratio[lane], search, best, peaks, own, found)
+                _take(lane, rotation, CONVERGED, batch.ratio[lane], search, best, peaks, own, found)
 
 
 def _highest(turn: SolvedTurn, found: SolvedExtremes) -> Peaks:
@@ -246,7 +246,7 @@ def _highest(turn: SolvedTurn, found: SolvedExtremes) -> Peaks:
     sample = np.flatnonzero(found.status != NOT_FINITE)
     inside = turn.rotation[sample, 1:-1]
     coarse = np.concatenate([inside.argmax(axis=1), inside.argmin(axis=1)])
-    return make_peaks(np.stack([np.tile(sample, 2), np.repeat([0, 1], sample.size), coarse]))
+    return _make_peaks(np.stack([np.tile(sample, 2), np.repeat([0, 1], sample.size), coarse]))
 
 
 @jit
@@ -268,7 +268,7 @@ def _others(turn, search, best, highest, found):
                     sign * turn.rotation[s, i + 2],
                 )
                 peak = centre >= left and centre >= right and i != known[s, one]
-                if peak and centre + search.safety * gain(left, centre, right) > best[s, one]:
+                if peak and centre + search.safety * _gain(left, centre, right) > best[s, one]:
                     others[0, count], others[1, count], others[2, count] = s, one, i
                     count += 1
     return others[:, :count]
@@ -316,14 +316,14 @@ def refine(
     contacts, values = tables.contact_stiffness.shape[1], np.empty((errors.shape[0], layout.end))
     best, left_over = np.full((errors.shape[0], 2), -np.inf), np.zeros((errors.shape[0], 2))
     alone = _prepare(layout, mapped, errors, torque, tables.play_stiffness.shape[1], turn, values, found)
-    own, workspace = make_searches(turn.retained.shape[2]), make_workspace(layout, 3 * len(discs), contacts)
+    own, workspace = _make_searches(turn.retained.shape[2]), make_workspace(layout, 3 * len(discs), contacts)
     memory = make_memory(design.law, tables)
     given = (discs, alone, tables, layout, design, values, search, turn, best)
     highest = _highest(turn, found)
-    search_peaks(*given, highest, own, memory, workspace, found)
+    _search_peaks(*given, highest, own, memory, workspace, found)
     _keep_best(highest, best, left_over, found)
-    others = make_peaks(_others(turn, search, best, highest, found))
-    search_peaks(*given, others, own, memory, workspace, found)
+    others = _make_peaks(_others(turn, search, best, highest, found))
+    _search_peaks(*given, others, own, memory, workspace, found)
     _keep_best(others, best, left_over, found)
     found.left_over[:] = left_over.sum(axis=1)
 

@@ -91,6 +91,18 @@ def line_contact(stiffness, log_length, depth):
     The law of `tolalloc.reducers.cycloid.solvers.pins`: w − ln w = ln(λ/depth), F = c·depth/w with c twice the
     stiffness k, and dF/d(depth) = c/(w − 1). Quotients share their denominators: a division takes as long as ten
     products.
+
+    References
+    ----------
+    Hertz's line contact, theory page (30); polynomials and Halley's steps are an own derivation.
+
+    Examples
+    --------
+    The law itself, 5 µm at C = 2e8 N/m and λ = 10 mm [N]:
+
+    >>> from tolalloc.reducers.cycloid.solvers.pins import _logarithmic
+    >>> round(float(_logarithmic.py_func(2e8, np.log(0.01), 5e-6)[0]), 1)
+    202.2
     """
     one = spread(1.0)
     goal = subtract(log_length, logarithm(depth))
@@ -161,6 +173,19 @@ def pole_moves(disc, tables, rows, width, v):
 
     All contact normals of a disc pass through its pole, so two coordinates say what three do (theory page, equation
     (16)), in two thirds of the time.
+
+    (x − r_d·θ·sin β, y + r_d·θ·cos β), own derivation.
+
+    Examples
+    --------
+    What a pin feels of a disc's rotation is what it feels of its pole's movement:
+
+    >>> from tolalloc.reducers.equivalent.condensation import condense
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> found = condense(load_reducer("rv20e_liu2020"), (1,), np.zeros(1))
+    >>> by_disc, pole = found.contact_by_disc[0, 0], found.pole_by_rotation[0, 0]
+    >>> bool(np.allclose(by_disc[2], pole @ by_disc[:2]))
+    True
     """
     at = 3 * disc * width + v
     turn = load(rows, at + 2 * width)

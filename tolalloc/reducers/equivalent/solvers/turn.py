@@ -79,7 +79,15 @@ def _alone(s, angle, at, tables, layout, design, values, start, memory, turn):
 
 
 def batch_size(samples: int) -> int:
-    """Return how many samples go into a batch: whole fours of registers up to `BATCH`."""
+    """Return how many samples go into a batch: whole fours of registers up to `BATCH`.
+
+    Own derivation: 32·⌈n/(32·threads)⌉, 256 at most.
+
+    Examples
+    --------
+    >>> batch_size(1) == FOUR, batch_size(10**6) == BATCH
+    (True, True)
+    """
     share = FOUR * thread_count()
     return int(min(FOUR * max((samples + share - 1) // share, 1), BATCH))
 

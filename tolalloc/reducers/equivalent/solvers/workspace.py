@@ -41,7 +41,7 @@ class Nodes(NamedTuple):
 
 
 @jit
-def make_nodes(retained, contacts, elements):
+def _make_nodes(retained, contacts, elements):
     """Return two empty slots."""
     return Nodes(
         np.full(2, -1),
@@ -55,7 +55,16 @@ def make_nodes(retained, contacts, elements):
 
 @jit_in_place
 def interpolation(position):
-    """Return the first of four nodes around a position, and the weights of the cubic through them."""
+    """Return the first of four nodes around a position, and the weights of the cubic through them.
+
+    Lagrange's cubic through −1, 0, 1 and 2, own derivation; weights are 1 together, a cubic is exact.
+
+    Examples
+    --------
+    >>> first, weights = interpolation.py_func(10.5)
+    >>> first, [float(weight) for weight in weights]
+    (9, [-0.0625, 0.5625, 0.5625, -0.0625])
+    """
     x = position - np.floor(position)
     weights = (
         -x * (x - 1.0) * (x - 2.0) / 6.0,
@@ -67,7 +76,7 @@ def interpolation(position):
 
 
 @jit_within
-def blend(table, weights, out):
+def _blend(table, weights, out):
     """Set out to the weighted sum of the table's first four rows."""
     flat, own, size = table.reshape(table.size), out.reshape(out.size), out.size
     for i in range(size):
@@ -82,7 +91,7 @@ def _blend_levers(first, weights, tables, out):
     Between nodes, too, all normals of a disc pass through its pole.
     """
     discs, _, pins = out.shape
-    blend(tables.contact_by_disc[first : first + 4], weights, out)
+    _blend(tables.contact_by_disc[first : first + 4], weights, out)
     pole = tables.pole_by_rotation
     for d in range(discs):
         x, y = 0.0, 0.0
@@ -94,7 +103,7 @@ def _blend_levers(first, weights, tables, out):
 
 
 @jit_in_place
-def problem_between(position, tables, layout, face_width, values, nodes, own, carrier_by_retained):
+def _problem_between(position, tables, layout, face_width, values, nodes, own, carrier_by_retained):
     """Fill ``own`` with the problem between nodes, all tables interpolated; return the rotation at fixed discs."""
     first, weights = interpolation(position)
     slot = first % 2
@@ -111,18 +120,18 @@ def problem_between(position, tables, layout, face_width, values, nodes, own, ca
                 nodes.play_offset[slot, node],
             )
     here = slice(first, first + 4)
-    blend(tables.stiffness[here], weights, own.stiffness)
-    blend(nodes.force[slot], weights, own.force)
+    _blend(tables.stiffness[here], weights, own.stiffness)
+    _blend(nodes.force[slot], weights, own.force)
     _blend_levers(first, weights, tables, own.by_disc)
-    blend(nodes.undisturbed[slot], weights, own.undisturbed)
-    blend(tables.contact_stiffness[here], weights, own.contact)
+    _blend(nodes.undisturbed[slot], weights, own.undisturbed)
+    _blend(tables.contact_stiffness[here], weights, own.contact)
     if own.law != LINEAR:
-        blend(tables.contact_log_length[here], weights, own.log_length)
-    blend(tables.play_by_retained[here], weights, own.play_by_retained)
-    blend(nodes.play_offset[slot], weights, own.play_offset)
-    blend(tables.play_stiffness[here], weights, own.play_stiffness)
-    blend(tables.carrier_by_retained[here], weights, carrier_by_retained)
-    blend(tables.turn[here], weights, nodes.turn)
+        _blend(tables.contact_log_length[here], weights, own.log_length)
+    _blend(tables.play_by_retained[here], weights, own.play_by_retained)
+    _blend(nodes.play_offset[slot], weights, own.play_offset)
+    _blend(tables.play_stiffness[here], weights, own.play_stiffness)
+    _blend(tables.carrier_by_retained[here], weights, carrier_by_retained)
+    _blend(tables.turn[here], weights, nodes.turn)
     sample_constants(own, nodes.turn, face_width, layout, values)
     rotation = 0.0
     for node in range(4):
@@ -134,7 +143,7 @@ def problem_between(position, tables, layout, face_width, values, nodes, own, ca
 def solve_between(position, tables, layout, face_width, values, q, memory):
     """Solve one sample between nodes from the start q; return rotation, status, residual, pins in contact."""
     own, work, nodes, carrier_by_retained = memory
-    rotation = problem_between(position, tables, layout, face_width, values, nodes, own, carrier_by_retained)
+    rotation = _problem_between(position, tables, layout, face_width, values, nodes, own, carrier_by_retained)
     status, ratio, touching = equilibrium(own, q, work)
     for i in range(q.size):
         rotation += carrier_by_retained[i] * q[i]
@@ -158,7 +167,7 @@ def make_memory(law, tables):
     return (
         make_problem(law, tables),
         make_work(retained, contacts, elements),
-        make_nodes(retained, contacts, elements),
+        _make_nodes(retained, contacts, elements),
         np.empty(retained),
     )
 
@@ -256,7 +265,7 @@ def _around(lane, position, tables, layout, values, workspace):
 
 
 @jit_within
-def _blend(table, first, weights, lane, out):
+def _blend_into_lane(table, first, weights, lane, out):
     """Set a lane's entries to the weighted sum of four rows of a table."""
     flat, size = table.reshape(table.size), out.shape[0]
     a, (w, x, y, z) = first * size, weights
@@ -334,14 +343,14 @@ def fill_lane(lane, position, start, side, law, tables, layout, values, workspac
         force = weights[0] * workspace.force[lane, slots[0], i] + weights[1] * workspace.force[lane, slots[1], i]
         force += weights[2] * workspace.force[lane, slots[2], i] + weights[3] * workspace.force[lane, slots[3], i]
         workspace.batch.force[i, lane] = force
-    _blend(tables.carrier_by_retained, first, weights, lane, workspace.by_coordinate)
-    _blend(tables.stiffness, first, weights, lane, here.stiffness.entries)
-    _blend(tables.pole_by_rotation, first, weights, lane, here.pole.entries)
+    _blend_into_lane(tables.carrier_by_retained, first, weights, lane, workspace.by_coordinate)
+    _blend_into_lane(tables.stiffness, first, weights, lane, here.stiffness.entries)
+    _blend_into_lane(tables.pole_by_rotation, first, weights, lane, here.pole.entries)
     _blend_slots(workspace.undisturbed[lane], slots, weights, workspace.depth)
-    blend(tables.contact_by_disc[around], weights, workspace.normal)
-    blend(tables.contact_stiffness[around], weights, workspace.stiffness)
+    _blend(tables.contact_by_disc[around], weights, workspace.normal)
+    _blend(tables.contact_stiffness[around], weights, workspace.stiffness)
     if law != LINEAR:
-        blend(tables.contact_log_length[around], weights, workspace.log_length)
+        _blend(tables.contact_log_length[around], weights, workspace.log_length)
     _take_near(lane, start, side, law, workspace)
 
 
