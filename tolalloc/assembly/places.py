@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from math import cos, gcd, pi, sin
 from typing import NamedTuple
 
+from tolalloc.reducers.family import RV
 from tolalloc.reducers.reducer.design import Reducer
 
 _WAVE = re.compile(r"(.*)\.(cos|sin)(\d+)")
@@ -120,7 +121,7 @@ def places_of(reducer: Reducer) -> tuple[Place, ...]:
     cranks, first = reducer.crank_count, reducer.first_stage
     gears = first.sun_teeth + first.planet_teeth
     alike = cranks // gcd(cranks, reducer.cycloid_stage.disc_teeth, gears)
-    fixed = ("pin.", "each_pin.", "carrier.assembly", "carrier.tilt", "carrier.clearance", "sun.assembly")
+    fixed = tuple(kind.name for kind in RV.sources.kinds if kind.fixed)
     housing = Place(
         name="housing",
         kind="housing",

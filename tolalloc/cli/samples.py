@@ -19,6 +19,7 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.table_file import DATA as TABLES
 from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE
 from tolalloc.reducers.choice import bind
+from tolalloc.reducers.family import RV
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import with_stiffness
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
@@ -249,7 +250,10 @@ class Samples:
 
 def _part_and_error(column: str) -> tuple[str, str]:
     """Return which measured part of a unit a column belongs to and what the parts table calls it; none of others."""
-    part, _, rest = column.partition(".")
-    if column == "pin.diameter" or column.startswith("carrier.assembly"):
+    kind = RV.sources.of_column(column)
+    if kind.first_stage or not kind.place:
+        return "", ""
+    if kind.fixed:
         return "housing", column
-    return (part, rest) if part.rstrip("0123456789") in ("housing", "carrier", "crank", "disc") else ("", "")
+    part, _, error = column.partition(".")
+    return part, error

@@ -76,6 +76,19 @@ class Feature(StrEnum):
         }[self]
 
 
+@dataclass(frozen=True)
+class Characteristic:
+    """What a drawing writes for a source, where its feature alone does not say it."""
+
+    name: str  # Such as ``parallelism``
+    assumed: str  # What is taken for granted by it, in words
+
+
+TILT = Characteristic("parallelism", "a tilt is drawn as parallelism of the axis over its length")
+ROTATION = Characteristic("position", "a rotation of a pattern is drawn as the position of its features")
+PHASE = Characteristic("position", "a phase of a journal is drawn as its position about the axis")
+
+
 def parsed_spectrum(text: str) -> tuple[Spectrum, int]:
     """Return a spectrum such as ``1:9.2 2:4.3 random:1.0/40`` and the number of its random teeth, or 0.
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from html import escape
 from math import ceil, floor
 from pathlib import Path
 
 from tolalloc.drawings.sources import Source
-from tolalloc.drawings.zones import Feature
+from tolalloc.drawings.zones import PHASE, ROTATION, TILT, Feature
 from tolalloc.reading.units import MICROMETRE, MILLIMETRE
+from tolalloc.reducers.family import RV
 
 SYMBOLS = {
     "position": "⌖",
@@ -33,21 +33,20 @@ STEP = 0.1 * MICROMETRE
 _ROUNDING = 1e-6
 """Part of a step that a zone may lack and still count as whole [-]."""
 
-_CHARACTERISTICS = (
-    (Feature.SIZE, "*.tilt", "parallelism", "a tilt is drawn as parallelism of the axis over its length"),
-    (Feature.POSITION, "*.tilt", "parallelism", "a tilt is drawn as parallelism of the axis over its length"),
-    (Feature.SIZE, "*.rotation", "position", "a rotation of a pattern is drawn as the position of its features"),
-    (Feature.SIZE, "*.phase", "position", "a phase of a journal is drawn as its position about the axis"),
-    (Feature.POSITION, "carrier.assembly", "coaxiality", "how far an assembly stands off is drawn as coaxiality"),
-    (Feature.POSITION, "sun.assembly", "coaxiality", "how far an assembly stands off is drawn as coaxiality"),
-    (Feature.POSITION, "sun.eccentricity", "coaxiality", "the eccentricity of a gear is drawn as its coaxiality"),
-    (Feature.POSITION, "planet*.eccentricity", "coaxiality", "the eccentricity of a gear is drawn as its coaxiality"),
-    (Feature.POSITION, "*", "position", ""),
-    (Feature.RUNOUT, "*", "circular run-out", ""),
-    (Feature.PITCH, "*", "cumulative pitch", ""),
-    (Feature.SIZE, "*", "size", ""),
-)
-"""Feature, name of the source, characteristic on the drawing, what of that is assumed; the first that fits counts."""
+_OF_FEATURE = {
+    Feature.POSITION: "position",
+    Feature.RUNOUT: "circular run-out",
+    Feature.PITCH: "cumulative pitch",
+    Feature.SIZE: "size",
+}
+"""Feature → its characteristic on the drawing, where nothing else is said of the source."""
+_OF_ANGLE = {
+    (Feature.SIZE, "tilt"): TILT,
+    (Feature.POSITION, "tilt"): TILT,
+    (Feature.SIZE, "rotation"): ROTATION,
+    (Feature.SIZE, "phase"): PHASE,
+}
+"""Feature and last part of the name of an angle that no reducer declares."""
 
 Lines = tuple[tuple[tuple[float, float], ...], ...]
 
@@ -103,11 +102,12 @@ class Frames(tuple[FeatureFrame, ...]):
 
 def _found(source: Source) -> tuple[str, str]:
     """Return the characteristic of a source, and what of it is assumed."""
-    return next(
-        (characteristic, assumed)
-        for feature, pattern, characteristic, assumed in _CHARACTERISTICS
-        if feature is source.feature and fnmatchcase(source.name, pattern)
-    )
+    kind = RV.sources.of(source.name)
+    if kind is None:
+        own = _OF_ANGLE.get((source.feature, source.name.rpartition(".")[2]))
+    else:
+        own = kind.characteristic if source.feature in (Feature.SIZE, Feature.POSITION) else None
+    return (own.name, own.assumed) if own else (_OF_FEATURE[source.feature], "")
 
 
 def written(length: float) -> str:

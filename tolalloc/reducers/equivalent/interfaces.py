@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float, Int
 
+from tolalloc.drawings.zones import PHASE, ROTATION, TILT, Characteristic
 from tolalloc.reducers.cycloid.loaded_contact import contact_stiffness
 from tolalloc.reducers.cycloid.tooth_profile import normals
 from tolalloc.reducers.equivalent.sources import ErrorSource, Nominal
@@ -35,10 +36,16 @@ class Interface:
     sources: tuple[ErrorSource, ...]
 
 
-def _clearance(element: str, *, neglected: str = "*.clearance", first_stage: bool = False) -> ErrorSource:
+_STANDS_OFF = Characteristic("coaxiality", "how far an assembly stands off is drawn as coaxiality")
+_ECCENTRIC = Characteristic("coaxiality", "the eccentricity of a gear is drawn as its coaxiality")
+
+
+def _clearance(
+    element: str, *, neglected: str = "*.clearance", first_stage: bool = False, fixed: bool = False
+) -> ErrorSource:
     """Return the deviations of the clearances of an interface's elements."""
     return ErrorSource(
-        name=f"{element}.clearance", place=element, neglected=neglected, fine=True, first_stage=first_stage
+        name=f"{element}.clearance", place=element, neglected=neglected, fine=True, first_stage=first_stage, fixed=fixed
     )
 
 
@@ -73,7 +80,12 @@ def sun_support(at: Positions) -> SpringGroup:
 
 
 SUN_SUPPORT = Interface(
-    rows=sun_support, sources=(ErrorSource(name="sun.assembly", shape="vector", place="sun", first_stage=True),)
+    rows=sun_support,
+    sources=(
+        ErrorSource(
+            name="sun.assembly", fixed=True, characteristic=_STANDS_OFF, shape="vector", place="sun", first_stage=True
+        ),
+    ),
 )
 
 
@@ -149,9 +161,15 @@ def gear_mesh(at: Positions) -> SpringGroup:
 GEAR_MESH = Interface(
     rows=gear_mesh,
     sources=(
-        ErrorSource(name="sun.eccentricity", shape="vector", place="sun", first_stage=True),
+        ErrorSource(name="sun.eccentricity", characteristic=_ECCENTRIC, shape="vector", place="sun", first_stage=True),
         ErrorSource(name="sun.pitch", shape="waves", place="sun.teeth", neglected="sun.pitch", first_stage=True),
-        ErrorSource(name="planet{i}.eccentricity", shape="vector", place="planet{i}", first_stage=True),
+        ErrorSource(
+            name="planet{i}.eccentricity",
+            characteristic=_ECCENTRIC,
+            shape="vector",
+            place="planet{i}",
+            first_stage=True,
+        ),
         ErrorSource(
             name="planet{i}.pitch", shape="waves", place="planet{i}.teeth", neglected="planet*.pitch", first_stage=True
         ),
@@ -236,10 +254,28 @@ CRANK_DISC = Interface(
     sources=(
         ErrorSource(name="crank{i}.journal{j}.eccentricity", shape="vector", place="crank{i}.journal{j}"),
         ErrorSource(name="disc{j}.bore{i}.position", shape="vector", place="disc{j}.bore{i}"),
-        ErrorSource(name="crank{i}.journal{j}.phase", place="crank{i}.journal{j}", neglected="*.phase", fine=True),
-        ErrorSource(name="disc{j}.bores.rotation", place="disc{j}.bores", neglected="*.rotation", fine=True),
         ErrorSource(
-            name="crank{i}.tilt", shape="vector", mirror="kept", place="crank{i}", neglected="*.tilt", fine=True
+            name="crank{i}.journal{j}.phase",
+            place="crank{i}.journal{j}",
+            neglected="*.phase",
+            characteristic=PHASE,
+            fine=True,
+        ),
+        ErrorSource(
+            name="disc{j}.bores.rotation",
+            place="disc{j}.bores",
+            neglected="*.rotation",
+            characteristic=ROTATION,
+            fine=True,
+        ),
+        ErrorSource(
+            name="crank{i}.tilt",
+            shape="vector",
+            mirror="kept",
+            place="crank{i}",
+            neglected="*.tilt",
+            characteristic=TILT,
+            fine=True,
         ),
         ErrorSource(
             name="disc{j}.bore{i}.tilt",
@@ -247,9 +283,19 @@ CRANK_DISC = Interface(
             mirror="kept",
             place="disc{j}.bore{i}",
             neglected="*.tilt",
+            characteristic=TILT,
             fine=True,
         ),
-        ErrorSource(name="carrier.tilt", shape="vector", mirror="kept", place="carrier", neglected="*.tilt", fine=True),
+        ErrorSource(
+            name="carrier.tilt",
+            fixed=True,
+            shape="vector",
+            mirror="kept",
+            place="carrier",
+            neglected="*.tilt",
+            characteristic=TILT,
+            fine=True,
+        ),
         _clearance("crank{i}.journal{j}"),
     ),
 )
@@ -341,7 +387,10 @@ def carrier_support(at: Positions) -> SpringGroup:
 
 CARRIER_SUPPORT = Interface(
     rows=carrier_support,
-    sources=(ErrorSource(name="carrier.assembly", shape="vector", place="carrier"), _clearance("carrier")),
+    sources=(
+        ErrorSource(name="carrier.assembly", fixed=True, characteristic=_STANDS_OFF, shape="vector", place="carrier"),
+        _clearance("carrier", fixed=True),
+    ),
 )
 
 
@@ -494,7 +543,9 @@ def _of_tooth(kind: Literal["pitch", "runout"]) -> tuple[ErrorSource, ...]:
 
 
 PIN_SOURCES = (
-    ErrorSource(name="pin.diameter", place="pins", nominal=Nominal(said="twice its pin radius", of=_pin_diameter)),
+    ErrorSource(
+        name="pin.diameter", fixed=True, place="pins", nominal=Nominal(said="twice its pin radius", of=_pin_diameter)
+    ),
     ErrorSource(
         name="housing.groove.radius", place="housing.grooves", nominal=Nominal(said="its pin radius", of=_pin_radius)
     ),
@@ -510,6 +561,7 @@ PIN_SOURCES = (
     ErrorSource(name="housing.pitch", shape="waves", place="housing.pins"),
     ErrorSource(
         name="each_pin.diameter",
+        fixed=True,
         each="pin",
         place="pins",
         neglected="each_pin.*",
@@ -518,6 +570,7 @@ PIN_SOURCES = (
     ),
     ErrorSource(
         name="each_pin.groove",
+        fixed=True,
         each="pin",
         place="housing.grooves",
         neglected="each_pin.*",
@@ -526,6 +579,7 @@ PIN_SOURCES = (
     ),
     ErrorSource(
         name="each_pin.position",
+        fixed=True,
         shape="vector",
         mirror="kept",
         each="pin",
@@ -535,7 +589,15 @@ PIN_SOURCES = (
     ),
     *_of_tooth("pitch"),
     *_of_tooth("runout"),
-    ErrorSource(name="disc{j}.tilt", shape="vector", mirror="kept", place="disc{j}", neglected="*.tilt", fine=True),
+    ErrorSource(
+        name="disc{j}.tilt",
+        shape="vector",
+        mirror="kept",
+        place="disc{j}",
+        neglected="*.tilt",
+        characteristic=TILT,
+        fine=True,
+    ),
 )
 """What the contact of pins and teeth declares."""
 

@@ -13,6 +13,7 @@ from functools import cached_property, lru_cache
 from typing import Literal
 
 from tolalloc.drawings.sources import is_angular
+from tolalloc.drawings.zones import Characteristic
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.reducers.reducer.design import Reducer
 
@@ -58,6 +59,10 @@ class ErrorSource:
         Whether the first stage has it, whose errors the ratio divides.
     nominal
         Nominal size, if there is one.
+    characteristic
+        What a drawing writes for it, if its feature alone does not say it.
+    fixed
+        Whether it stands fixed in the housing, so that it is mounted and measured with it.
     """
 
     name: str
@@ -71,6 +76,8 @@ class ErrorSource:
     fine: bool = False
     first_stage: bool = False
     nominal: Nominal | None = None
+    characteristic: Characteristic | None = None
+    fixed: bool = False
 
     @property
     def angular(self) -> bool:
