@@ -1,8 +1,7 @@
 """What the commands of a golden case said and wrote: prose as one text, numbers as one record.
 
 ``python -m tests.golden.record NAME …`` makes golden files anew, all of them unless named; ``--check`` compares
-instead,
-to the last bit.
+instead, to the last bit.
 """
 
 from __future__ import annotations
@@ -11,8 +10,10 @@ import csv
 import difflib
 import json
 import re
+import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -21,6 +22,8 @@ import pandas as pd
 from tests.golden.cases import LONGER, SMALL, Case, shipped
 from tests.studies.command import ROOT, tolalloc
 
+Run = Callable[..., subprocess.CompletedProcess[str]]
+Look = Callable[[subprocess.CompletedProcess[str], Path], None]
 FOLDER = Path(__file__).parent
 STUDIES = sorted(path.stem for path in (ROOT / "studies").glob("*.py"))
 CASES = {case.name: case for case in (*SMALL, *LONGER, *map(shipped, STUDIES))}
@@ -73,23 +76,24 @@ def prose_of(page: Path) -> str:
     return "\n".join(line for line in lines if line)
 
 
-def recorded(case: Case) -> tuple[str, dict[str, object]]:
+def recorded(case: Case, run: Run = tolalloc, look: Look = lambda *_: None) -> tuple[str, dict[str, object]]:
     """Run a case in an empty folder and return its prose and its numbers.
 
-    Tables of a terminal are wrapped by the length of the paths in them, so the folder's name has one length everywhere.
+    What runs a command is this process unless another way is given; what is to be looked at is given the last command's
+    result and the folder before that is gone. Tables of a terminal are wrapped by the length of the paths in them, so the folder's name has one length everywhere.
     """
     place = "/tmp" if Path("/tmp").is_dir() else None
     with tempfile.TemporaryDirectory(dir=place) as made:
-        return _recorded(case, Path(made))
+        return _recorded(case, Path(made), run, look)
 
 
-def _recorded(case: Case, folder: Path) -> tuple[str, dict[str, object]]:
+def _recorded(case: Case, folder: Path, run: Run, look: Look) -> tuple[str, dict[str, object]]:
     for name, text in case.files.items():
         (folder / name).write_text(text, encoding="utf-8")
     prose, numbers = "", dict[str, object]()
     for at, typed in enumerate(case.commands, start=1):
         before = set(folder.rglob("*"))
-        done = tolalloc(*(f"{folder}/{word[1:]}" if word.startswith("@") else word for word in typed.split()))
+        done = run(*(f"{folder}/{word[1:]}" if word.startswith("@") else word for word in typed.split()))
         said = f"$ tolalloc {typed}\n{done.stdout}"
         prose += said + (f"{done.stderr}" if done.returncode else "") + f"exit {done.returncode}\n"
         for path in sorted(set(folder.rglob("*")) - before):
@@ -109,6 +113,7 @@ def _recorded(case: Case, folder: Path) -> tuple[str, dict[str, object]]:
                 prose += f"--- {name}\n{path.read_text(encoding='utf-8')}\n"
             else:
                 prose += f"--- {name}\n"
+    look(done, folder)
     return steady(prose, folder), json.loads(steady(json.dumps(numbers, ensure_ascii=False), folder))
 
 

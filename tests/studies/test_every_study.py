@@ -9,8 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.golden.cases import SHIPPED
 from tests.studies.command import ROOT, process, refused
 from tests.studies.paper import can_print, lost
+from tests.studies.test_golden import require_golden
 from tolalloc.reports import pdf
 
 STUDIES = sorted((ROOT / "studies").glob("*.py"))
@@ -62,16 +64,18 @@ SAYS: dict[str, Callable[[subprocess.CompletedProcess[str], Path], None]] = {
 @pytest.mark.slow
 @pytest.mark.parametrize("script", STUDIES, ids=lambda path: path.stem)
 def test_a_study_runs_and_writes_its_report(script, tmp_path):
-    folder = tmp_path / "run"
-    result = process("run", script, "--quick", "--out", folder)
-    assert result.returncode == 0, result.stderr
-    page = (folder / "report.html").read_text(encoding="utf-8")
-    assert page
-    for paper in pdf.PAPERS if can_print() else ():
-        assert not lost(folder / "report.html", tmp_path, paper)
-    summary = (folder / "summary.json").read_text(encoding="utf-8")
-    assert page.count("<h2>") >= (3 if script.stem in SECTIONED else 0)
-    assert script.stem not in SECTIONED or "nan" not in summary.lower()
-    json.loads(summary, parse_constant=_no_number)
-    if script.stem in SAYS:
-        SAYS[script.stem](result, folder)
+    def look(result: subprocess.CompletedProcess[str], made: Path) -> None:
+        folder = made / "run"
+        assert result.returncode == 0, result.stderr
+        page = (folder / "report.html").read_text(encoding="utf-8")
+        assert page
+        for paper in pdf.PAPERS if can_print() else ():
+            assert not lost(folder / "report.html", tmp_path, paper)
+        summary = (folder / "summary.json").read_text(encoding="utf-8")
+        assert page.count("<h2>") >= (3 if script.stem in SECTIONED else 0)
+        assert script.stem not in SECTIONED or "nan" not in summary.lower()
+        json.loads(summary, parse_constant=_no_number)
+        if script.stem in SAYS:
+            SAYS[script.stem](result, folder)
+
+    require_golden(SHIPPED.format(script.stem), process, look)

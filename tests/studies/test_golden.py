@@ -1,6 +1,7 @@
 """What commands say and write is what it was, word for word; numbers as far as processors agree.
 
-``python -m tests.golden.record --check`` compares to the last bit on the machine that made the files.
+``python -m tests.golden.record --check`` compares to the last bit on the machine that made the files. The shipped
+studies are compared in `test_every_study`, where they run.
 """
 
 from __future__ import annotations
@@ -11,11 +12,11 @@ from math import isclose
 
 import pytest
 
-from tests.golden.cases import SMALL
-from tests.golden.record import CASES, kept, recorded
+from tests.golden.cases import LONGER, SMALL
+from tests.golden.record import CASES, Look, Run, kept, recorded
+from tests.studies.command import tolalloc
 
 NUMBER = re.compile(r"(?<![\w.])[-−+]?\d[\d,]*(?:\.\d+)?(?:[eE][-+]?\d+)?")
-DEFAULT = [case.name for case in SMALL]
 
 
 def value(text: str) -> float:
@@ -35,11 +36,17 @@ def require_alike(before: str, now: str, relative: float) -> None:
     assert not [pair for pair in pairs if not alike(*pair, relative)]
 
 
-@pytest.mark.parametrize(
-    "name", [name if name in DEFAULT else pytest.param(name, marks=pytest.mark.slow) for name in CASES]
-)
-def test_a_command_says_and_writes_what_it_did(name):
-    prose, numbers = recorded(CASES[name])
+def require_golden(name: str, run: Run = tolalloc, look: Look = lambda *_: None) -> None:
+    """Assert that the commands of a case say and write what its golden files hold."""
+    prose, numbers = recorded(CASES[name], run, look)
     before, known = kept(name)
     require_alike(before, prose, 1e-3)
     require_alike(json.dumps(known, indent=1), json.dumps(numbers, indent=1), 1e-6)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [*(case.name for case in SMALL), *(pytest.param(case.name, marks=pytest.mark.slow) for case in LONGER)],
+)
+def test_a_command_says_and_writes_what_it_did(name):
+    require_golden(name)
