@@ -79,8 +79,9 @@ def prose_of(page: Path) -> str:
 def recorded(case: Case, run: Run = tolalloc, look: Look = lambda *_: None) -> tuple[str, dict[str, object]]:
     """Run a case in an empty folder and return its prose and its numbers.
 
-    What runs a command is this process unless another way is given; what is to be looked at is given the last command's
-    result and the folder before that is gone. Tables of a terminal are wrapped by the length of the paths in them, so the folder's name has one length everywhere.
+    What runs a command is this process unless another way is given; what is to be looked at is given the last
+    command's result and the folder before that is gone. Tables of a terminal are wrapped by the length of the paths in
+    them, so the folder's name has one length everywhere.
     """
     place = "/tmp" if Path("/tmp").is_dir() else None
     with tempfile.TemporaryDirectory(dir=place) as made:
