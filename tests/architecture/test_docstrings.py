@@ -156,9 +156,7 @@ COMPUTES_NOTHING = {
 }
 """Function → what it does instead of computing."""
 
-NOT_YET: tuple[str, ...] = (
-
-)
+NOT_YET: tuple[str, ...] = ()
 """Functions that compute and do not say so yet; nothing is added here."""
 
 

@@ -12,6 +12,7 @@ import pytest
 
 import tolalloc as ta
 from tolalloc.allocation.space.effort import QUICK_ALLOCATION
+from tolalloc.reports.portrait import portrait_of
 
 ROOT = Path(__file__).parents[2]
 CASES = json.loads((ROOT / "tests" / "validation" / "allocation.json").read_text(encoding="utf-8"))["problems"]
@@ -187,5 +188,5 @@ def test_inputs_without_a_nominal_size_are_named():
     row = {"plus": 0.1, "minus": -0.1, "unit": "mm", "min": 0.02, "max": 0.5, "cost": 3.0}
     gap = ta.model(lambda housing, shaft: housing - shaft, inputs=("housing", "shaft"), outputs=("gap [mm]",))
     drawing = ta.Drawing.of_rows([{"id": "housing", "nominal": 20.0, **row}, {"id": "shaft", **row}])
-    (said,) = gap.bound(drawing.errors, "study").assumptions
+    (said,) = portrait_of(gap.bound(drawing.errors, "study")).assumptions
     assert said == "no nominal size on the drawing, taken as deviations from 0: shaft"

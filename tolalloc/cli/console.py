@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from rich.progress import TaskID
 
-    from tolalloc.reports.answer import Answer as Told
     from tolalloc.running.progress import Progress
     from tolalloc.study.answer import Answer
 
@@ -216,7 +215,7 @@ def _cell(value: object) -> str:
     return str(value)
 
 
-def tell(answer: Answer[Any] | Told, as_json: bool, *tables: tuple[pd.DataFrame, str]) -> None:
+def tell(answer: Answer[Any], as_json: bool, *tables: tuple[pd.DataFrame, str]) -> None:
     """Print an answer: its summary for a program; titled tables, its sentences and its warnings for a person."""
     if as_json:
         print_json(answer.summary)
@@ -229,7 +228,7 @@ def tell(answer: Answer[Any] | Told, as_json: bool, *tables: tuple[pd.DataFrame,
         typer.secho(warning, fg="yellow")
 
 
-def write_report(answer: Answer[Any] | Told, out: Path | None) -> None:
+def write_report(answer: Answer[Any], out: Path | None) -> None:
     """Write the report on an answer into a folder, if one was asked for."""
     if out:
         note(f"Report: {answer.save(out) / 'report.html'}")

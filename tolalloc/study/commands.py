@@ -16,7 +16,6 @@ from jaxtyping import Float
 
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, TolallocError
-from tolalloc.reports.answer import Answer as Told
 from tolalloc.reports.finished_run import FinishedRun, Member, common_currency, read_run
 from tolalloc.reports.header import Header
 from tolalloc.reports.tellers.check import Checked, CheckedTime
@@ -114,7 +113,7 @@ def whatif(
     *,
     units: int = 1024,
     progress: Progress | None = None,
-) -> Answer[Any] | Told:
+) -> Answer[Any]:
     """Tell what other zones do to cost, yield and quantiles: both drawings on the same random units.
 
     Parameters
