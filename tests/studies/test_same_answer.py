@@ -72,6 +72,55 @@ def test_simulate():
     assert answer.result.ratio == pytest.approx(81, rel=1e-5)
 
 
+@pytest.fixture(scope="module")
+def mine(tmp_path_factory):
+    """Return the files of a new folder: a bench, a unit, an assembly, parts and their reducer."""
+    folder = tmp_path_factory.mktemp("same") / "mine"
+    done = tolalloc("new", folder, "--like", "rv40e", "--cranks", 3, "--with", "all")
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.mark.slow
+def test_identify(mine):
+    names = ["crank_disc_bearing=1e8:1e9", "carrier_bearing"]
+    typed = f"--parameter {names[0]} --parameter {names[1]} --reducer {mine / 'reducer.toml'}"
+    answer = ta.identify(mine / "bench.toml", reducer=str(mine / "reducer.toml"), parameters=names)
+    done = tolalloc("identify", mine / "bench.toml", *typed.split(), "--json")
+    assert done.returncode == 0, done.stderr
+    assert _plain(answer.summary) == _plain(json.loads(done.stdout))
+    assert [item.parameter.symbol for item in answer.result.estimates] == ["K_pd", "K_ca"]
+
+
+def test_identify_from_the_catalogue(tmp_path):
+    files = [tmp_path / f"{name}.stiffness.toml" for name in ("scripted", "typed")]
+    answer = ta.identify(reducer="rv20e", catalogue=True, write_to=files[0])
+    done = tolalloc("identify", "--catalogue", "--reducer", "rv20e", "--write", files[1], "--json")
+    assert done.returncode == 0, done.stderr
+    assert _plain(answer.summary) == _plain(json.loads(done.stdout))
+    assert files[0].read_bytes() == files[1].read_bytes()
+    assert 1.0 < answer.result.factor < 1.5
+
+
+@pytest.mark.slow
+def test_diagnose(mine):
+    answer = same(
+        "diagnose", mine / "unit7.csv", reducer=str(mine / "reducer.toml"), tolerances=str(mine / "zones.csv")
+    )
+    assert answer.result.diagnosis.named == ("housing.pitch",)
+
+
+def test_assemble(mine):
+    answer = same("assemble", str(mine / "chain.toml"), measured=mine / "angles.csv", precision=5)
+    assert answer.result.measured.name == "angles"
+
+
+@pytest.mark.slow
+def test_mount(mine):
+    answer = same("mount", mine / "parts.csv", reducer=str(mine / "reducer.toml"), starts=1)
+    assert answer.result.found.after.mean() <= answer.result.chance.mean
+
+
 @pytest.mark.parametrize(
     ("word", "given", "said"),
     [
@@ -85,6 +134,24 @@ def test_simulate():
         ("simulate", {"torque": 5}, "ta.simulate: torque is 5.0; allowed is -1670 N·m to below 0"),
         ("simulate", {"speed": 0}, "ta.simulate: speed is 0.0; allowed is a number above 0."),
         ("costs", {"shop": 3}, "ta.costs: shop is 3; allowed is a path."),
+        (
+            "identify",
+            {"data": "bench.toml", "parameters": "K_pd"},
+            "ta.identify: parameters is 'K_pd'; allowed is a list",
+        ),
+        (
+            "identify",
+            {"data": "bench.toml", "parameters": ["bias=5"]},
+            "ta.identify: parameters is 'bias=5'; allowed is",
+        ),
+        (
+            "identify",
+            {"data": "bench.toml", "priors": ["bias"]},
+            "ta.identify: priors is 'bias'; allowed is NAME=NUMBER",
+        ),
+        ("diagnose", {"curve": "unit7.csv", "noise": 0}, "ta.diagnose: noise is 0.0; allowed is above 0 up to 60."),
+        ("mount", {"parts": "parts.csv", "starts": 0}, "ta.mount: starts is 0; allowed is 1 to 64."),
+        ("assemble", {"chain": "bx40e", "precision": -1}, "ta.assemble: precision is -1.0; allowed is 0 to 1e+06."),
     ],
 )
 def test_a_refusal_names_the_argument(word, given, said):
