@@ -336,7 +336,7 @@ def random_plan(seed: int) -> AssemblyPlan:
         chain=DatumFlowChain(datum="KC0", parts=parts),
         steps=tuple(steps),
         tolerances=generator.uniform(5, 60, (len(names), 3)) * ARCSECOND,
-        precision=float(generator.uniform(0.5, 20)),
+        state_weight=float(generator.uniform(0.5, 20)),
         weights=generator.uniform(0.2, 3, len(names)),
         measurement_noise=2 * ARCSECOND,
         adjustment_noise=1 * ARCSECOND,

@@ -17,7 +17,7 @@ from tolalloc.assembly.mounting import best_mounting, random_mounting
 from tolalloc.assembly.orientations import OrientationResponse
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.stock import PartStock, drawn_parts
-from tolalloc.assembly.tolerances import AngularAllocation, allocate_angles, best_precision
+from tolalloc.assembly.tolerances import AngularAllocation, allocate_angles, best_state_weight
 from tolalloc.assembly.trajectory import foreseen
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawings.seeds import SeedTree
@@ -160,11 +160,11 @@ def priced_section(plan: AssemblyPlan) -> tuple[Section, str]:
     if plan.requirements is None:
         raise ValueError("the plan states no costs")
     priced = replace(plan, requirements=replace(plan.requirements, effort_price=EFFORT_PRICE))
-    found, at_ten = best_precision(priced), allocate_angles(priced, 10.0)
+    found, at_ten = best_state_weight(priced), allocate_angles(priced, 10.0)
     best = found.best
     sentence = (
         f"Once effort costs {EFFORT_PRICE * ARCSECOND**2:g} cost units per arcsec², the cheapest precision is "
-        f"Q = {best.gains.precision:.3f} with {best.total:.4f} cost units in all; Q = 10 costs {at_ten.total:.2f}."
+        f"Q = {best.gains.state_weight:.3f} with {best.total:.4f} cost units in all; Q = 10 costs {at_ten.total:.2f}."
     )
     curves = {"tolerances": found.cost, "effort": found.effort_cost, "together": found.total}
     return (
@@ -178,10 +178,10 @@ def priced_section(plan: AssemblyPlan) -> tuple[Section, str]:
                     x_label="precision Q [-]",
                     y_label="cost [cost units]",
                     series=tuple(
-                        Series(label=label, kind="line", x=list(found.precisions), y=list(values))
+                        Series(label=label, kind="line", x=list(found.state_weights), y=list(values))
                         for label, values in curves.items()
                     ),
-                    vertical=((best.gains.precision, "cheapest"),),
+                    vertical=((best.gains.state_weight, "cheapest"),),
                     logarithmic_x=True,
                 ),
             ),
@@ -227,7 +227,7 @@ def _row(name: str, allocation: AngularAllocation) -> dict[str, Any]:
 def genetic_section(plan: AssemblyPlan, seeds: int) -> tuple[Section, str]:
     """Return what zhang2025's genetic algorithm ends above the certified cost."""
     rows = []
-    for precision in (0.0, plan.precision):
+    for precision in (0.0, plan.state_weight):
         certified = allocate_angles(plan, precision)
         runs = [genetic_allocation(plan, certified, SEEDS.child("genetic", str(seed))) for seed in range(seeds)]
         excess = np.array([run.total / certified.total - 1 for run in runs]) * 100
@@ -245,7 +245,7 @@ def genetic_section(plan: AssemblyPlan, seeds: int) -> tuple[Section, str]:
     last = rows[-1]
     sentence = (
         f"zhang2025's genetic algorithm (100 designs, 300 generations) ends {last['least excess [%]']:.2f}…"
-        f"{last['largest excess [%]']:.2f} % above the certified cost at Q = {plan.precision:g} over {seeds} seeds."
+        f"{last['largest excess [%]']:.2f} % above the certified cost at Q = {plan.state_weight:g} over {seeds} seeds."
     )
     return (
         Section(

@@ -12,7 +12,7 @@ import pytest
 
 from tolalloc.assembly.chain import DatumFlowChain, Part
 from tolalloc.assembly.control import kalman_filter, regulator
-from tolalloc.assembly.gains import final_errors, norms, precision_sweep
+from tolalloc.assembly.gains import final_errors, norms, state_weight_sweep
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.steps import Choice, Efforts, state_space, steps_in_order
 from tolalloc.assembly.trajectory import foreseen
@@ -39,7 +39,7 @@ def bx40e(adjust: Choice) -> AssemblyPlan:
         chain=BX40E,
         steps=steps_in_order(BX40E, adjust, "current", Efforts()),
         tolerances=np.full((4, 3), 30 * ARCSECOND),
-        precision=10.0,
+        state_weight=10.0,
         weights=np.ones(4),
         measurement_noise=2 * ARCSECOND,
         adjustment_noise=1 * ARCSECOND,
@@ -88,7 +88,7 @@ def test_expected_cost_total_and_what_noise_leaves_of_it():
     found = final_errors(plan.space, regulator(plan.space, plan.final_weight()), kalman, *noise)
     squares = float(np.vdot(plan.final_weight(), found.covariance(plan.variances)))
     assert (squares + found.expected_effort(plan.variances)) / arcsec2 == pytest.approx(1779.784224, abs=5e-7)
-    sweep = precision_sweep(plan, np.array([0.0, 1.0, 5.0, 10.0]))
+    sweep = state_weight_sweep(plan, np.array([0.0, 1.0, 5.0, 10.0]))
     assert sweep.total[-1] / ARCSECOND == pytest.approx(9.7064918, abs=5e-8)
     assert (10.0 * sweep.total[-1] ** 2 + sweep.effort[-1]) / arcsec2 == pytest.approx(1779.784224, abs=5e-7)
     assert sweep.noise_floor / ARCSECOND == pytest.approx(9.3220359, abs=5e-8)

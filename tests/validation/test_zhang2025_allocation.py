@@ -16,7 +16,7 @@ from tests.validation_manual import shown
 from tolalloc.assembly.control import kalman_filter, regulator
 from tolalloc.assembly.files import load_plan
 from tolalloc.assembly.gains import Gains, final_errors, tuned_gains
-from tolalloc.assembly.tolerances import allocate_angles, allocated, best_precision, retuned_allocation
+from tolalloc.assembly.tolerances import allocate_angles, allocated, best_state_weight, retuned_allocation
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reading.units import ARCSECOND
 
@@ -51,7 +51,7 @@ def missing_though_nothing_is_turned() -> Gains:
     still = regulator(PLAN.space, PLAN.final_weight(0.0))
     kalman = kalman_filter(PLAN.space, PLAN.variances, *noise, PLAN.name)
     errors = final_errors(PLAN.space, still, kalman, *noise)
-    return Gains(precision=0.0, regulator=still, kalman=kalman, adjustment_noise=noise[1], errors=errors)
+    return Gains(state_weight=0.0, regulator=still, kalman=kalman, adjustment_noise=noise[1], errors=errors)
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def test_one_limit_has_a_closed_form():
             scale=asked.scale[:2],
         ),
     )
-    found = allocate_angles(plan, precision=0.0)
+    found = allocate_angles(plan, state_weight=0.0)
     cost = (asked.factor[:2] / found.tolerances)[kept].sum()
     # The cost is flat at its least, so a gap of 1e-12 leaves the tolerances known to its root.
     expected = [12.78063689, 12.78063689, 11.16491472, 11.16491472]
@@ -130,9 +130,9 @@ def test_filters_tuned_again_save_another_quarter():
 
 @pytest.mark.slow
 def test_priced_effort_has_a_best_precision():
-    found = best_precision(PRICED)
+    found = best_state_weight(PRICED)
     assert found.interior
-    assert found.best.gains.precision == pytest.approx(3.035, abs=5.1e-4)
+    assert found.best.gains.state_weight == pytest.approx(3.035, abs=5.1e-4)
     assert found.best.total == pytest.approx(49.1616, abs=5.1e-5)
     assert found.best.gap <= 1e-9
     assert allocate_angles(PRICED, 10.0).total == pytest.approx(53.56, abs=5.1e-3)

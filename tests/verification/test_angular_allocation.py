@@ -11,7 +11,7 @@ from scipy.stats import norm
 
 from studies.published.zhang2025_genetic import genetic_allocation
 from tolalloc.assembly.files import load_plan
-from tolalloc.assembly.tolerances import allocate_angles, best_precision, retuned_allocation, verify_angles
+from tolalloc.assembly.tolerances import allocate_angles, best_state_weight, retuned_allocation, verify_angles
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import ARCSECOND
@@ -125,12 +125,12 @@ def test_a_limit_below_the_noise_is_refused_by_name():
         InputError, match=r"of the tilt of KC4 may be 14 arcsec, but .* the noise alone makes 23\.6\d arcsec; measure"
     ):
         allocate_angles(replace(PLAN, measurement_noise=8 * ARCSECOND))
-    allocate_angles(replace(PLAN, measurement_noise=8 * ARCSECOND), precision=0.0)
+    allocate_angles(replace(PLAN, measurement_noise=8 * ARCSECOND), state_weight=0.0)
 
 
 def test_a_limit_below_the_smallest_tolerances_is_refused_by_name():
     with pytest.raises(InputError, match=r"tilt of KC4 .* smallest tolerances of 20 arcsec make .* allow smaller"):
-        allocate_angles(asking(smallest=20 * ARCSECOND), precision=0.0)
+        allocate_angles(asking(smallest=20 * ARCSECOND), state_weight=0.0)
 
 
 @pytest.mark.parametrize("precision", [-1.0, np.inf, np.nan])
@@ -180,37 +180,37 @@ def test_a_filter_for_the_allocated_tolerances_need_not_be_the_cheapest():
 
 @pytest.mark.slow
 def test_best_precision_beats_the_curve_and_its_own_neighbours():
-    found = best_precision(PRICED, lowest=0.5, highest=20.0, points=12)
+    found = best_state_weight(PRICED, lowest=0.5, highest=20.0, points=12)
     assert found.interior
     assert found.best.total <= found.total.min()
     assert found.best.gap <= 1e-9
     for factor in (0.999, 1.001):
-        assert allocate_angles(PRICED, factor * found.best.gains.precision).total > found.best.total
+        assert allocate_angles(PRICED, factor * found.best.gains.state_weight).total > found.best.total
 
 
 @pytest.mark.slow
 def test_precisions_at_which_no_tolerances_keep_the_limits_have_no_cost():
     noisy = replace(PRICED, measurement_noise=4.5 * ARCSECOND)
-    found = best_precision(noisy, lowest=0.1, highest=100.0, points=9)
+    found = best_state_weight(noisy, lowest=0.1, highest=100.0, points=9)
     assert np.isnan(found.total[-1])
     assert np.isfinite(found.total[0])
     assert found.best.total <= np.nanmin(found.total)
     assert not found.interior
     with pytest.raises(InputError, match="keep the limits"):
-        best_precision(noisy, lowest=50.0, highest=100.0, points=3)
+        best_state_weight(noisy, lowest=50.0, highest=100.0, points=3)
 
 
 @pytest.mark.parametrize("arguments", [(0.0, 1.0, 5), (2.0, 1.0, 5), (1.0, 2.0, 2)])
 def test_a_range_that_is_none_is_refused(arguments):
     with pytest.raises(InputError, match="range and points"):
-        best_precision(PLAN, *arguments)
+        best_state_weight(PLAN, *arguments)
 
 
 @pytest.mark.slow
 def test_effort_without_a_price_asks_for_the_end_of_a_range_of_low_precisions():
-    found = best_precision(PLAN, lowest=0.1, highest=2.0, points=6)
+    found = best_state_weight(PLAN, lowest=0.1, highest=2.0, points=6)
     assert not found.interior
-    assert found.best.gains.precision == pytest.approx(2, rel=1e-5)
+    assert found.best.gains.state_weight == pytest.approx(2, rel=1e-5)
 
 
 @pytest.mark.slow

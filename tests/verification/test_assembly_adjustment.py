@@ -13,7 +13,7 @@ from tests.random_cases import random_plan, seeds
 from tolalloc.assembly.chain import DatumFlowChain, Part
 from tolalloc.assembly.control import KalmanFilter, Regulator, kalman_filter, limiting_regulator, regulator
 from tolalloc.assembly.files import load_plan
-from tolalloc.assembly.gains import FinalErrors, final_errors, norms, precision_sweep, tuned_gains
+from tolalloc.assembly.gains import FinalErrors, final_errors, norms, state_weight_sweep, tuned_gains
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.steps import AssemblyStep, Efforts, StateSpace, steps_in_order
 from tolalloc.assembly.trajectory import Trajectory, foreseen, simulated
@@ -355,7 +355,7 @@ def test_readings_without_noise_that_tell_something_new_are_the_limit_of_little_
 def test_a_sweep_falls_to_the_floor_and_says_where_it_stops_paying(seed):
     plan = replace(random_plan(seed), weights=np.ones(len(random_plan(seed).weights)))
     precisions = np.concatenate([np.arange(0.0, 31.0), [1e9]])
-    sweep = precision_sweep(plan, precisions)
+    sweep = state_weight_sweep(plan, precisions)
     assert (np.diff(sweep.total) < 0).all()
     assert (np.diff(sweep.effort) > 0).all()
     assert (np.diff(precisions * sweep.total**2 + sweep.effort) > 0).all()
@@ -365,7 +365,7 @@ def test_a_sweep_falls_to_the_floor_and_says_where_it_stops_paying(seed):
     np.testing.assert_allclose(sweep.next_unit[:30], 1 - sweep.total[1:31] / sweep.total[:30], rtol=0, atol=1e-13)
     stop = sweep.diminished(share=0.02)
     assert sweep.next_unit[int(stop)] < 0.02 <= sweep.next_unit[int(stop) - 1]
-    assert precision_sweep(plan, precisions[:2]).diminished(share=1e-6) is None
+    assert state_weight_sweep(plan, precisions[:2]).diminished(share=1e-6) is None
 
 
 def test_a_sweep_is_the_same_in_every_unit_of_angle():
@@ -373,7 +373,7 @@ def test_a_sweep_is_the_same_in_every_unit_of_angle():
     other = replace(
         plan, tolerances=scale * plan.tolerances, measurement_noise=scale * NOISE[0], adjustment_noise=scale * NOISE[1]
     )
-    one, same = (precision_sweep(each, np.array([0.0, 3.0, 10.0])) for each in (plan, other))
+    one, same = (state_weight_sweep(each, np.array([0.0, 3.0, 10.0])) for each in (plan, other))
     np.testing.assert_allclose(same.total, scale * one.total, rtol=1e-11)
     np.testing.assert_allclose(same.noise_floor, scale * one.noise_floor, rtol=1e-11)
     np.testing.assert_allclose(same.next_unit, one.next_unit, rtol=0, atol=1e-12)
@@ -387,7 +387,7 @@ def test_exact_readings_and_adjustments_leave_nothing_at_the_floor():
         measurement_noise=0.0,
         adjustment_noise=0.0,
     )
-    sweep = precision_sweep(plan, np.array([0.0, 10.0]))
+    sweep = state_weight_sweep(plan, np.array([0.0, 10.0]))
     assert sweep.noise_floor < 1e-12 * sweep.total[0]
 
 

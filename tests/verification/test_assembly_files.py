@@ -90,7 +90,7 @@ def test_the_shipped_chain_is_the_instance_that_its_assumptions_state(bx40e):
     ]
     np.testing.assert_allclose([part.turned[2] for part in bx40e.chain.parts], [0, 0, np.pi, np.pi])
     np.testing.assert_allclose(bx40e.tolerances, 30 * ARCSECOND)
-    assert (bx40e.precision, bx40e.weights.tolist()) == (10.0, [1.0] * 4)
+    assert (bx40e.state_weight, bx40e.weights.tolist()) == (10.0, [1.0] * 4)
     assert bx40e.measurement_noise == pytest.approx(2 * ARCSECOND)
     assert bx40e.adjustment_noise == pytest.approx(ARCSECOND)
     assert bx40e.steps[2] == AssemblyStep(
@@ -148,7 +148,7 @@ def test_every_number_of_the_shipped_reducer_is_marked_as_an_assumption():
 def test_what_is_left_out_takes_its_default(tmp_path):
     plan = load(tmp_path)
     assert (plan.reducer, plan.requirements, plan.assumptions) == ("", None, ())
-    assert (plan.measurement_noise, plan.adjustment_noise, plan.precision) == (0.0, 0.0, 2.0)
+    assert (plan.measurement_noise, plan.adjustment_noise, plan.state_weight) == (0.0, 0.0, 2.0)
     np.testing.assert_allclose(plan.tolerances, ARCSECOND * np.array([[30, 20, 0], [10, 10, 10]]))
     np.testing.assert_allclose(plan.chain.parts[1].turned, [0, 0, 90 * DEGREE])
     np.testing.assert_allclose(plan.chain.parts[1].position, [0, 0, 250 * MILLIMETRE])

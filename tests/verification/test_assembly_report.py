@@ -151,7 +151,7 @@ def effect(samples: int) -> TransmissionEffect:
     return TransmissionEffect(
         reducer=load_reducer("bx40e"),
         test_torque=-1.0,
-        precisions=np.array([0.0, 5.0]),
+        state_weights=np.array([0.0, 5.0]),
         outputs=outputs,
         perfect=np.full(len(outputs), 0.8),
         values=values,
@@ -168,7 +168,7 @@ def said(results: AssemblyResult) -> str:
 
 @pytest.mark.slow
 def test_the_norm_of_measured_parts_is_said_before_and_after(measured):
-    before, after = measured.measured.norms[[0, tables.at_precision(measured)]] / ARCSECOND
+    before, after = measured.measured.norms[[0, tables.at_state_weight(measured)]] / ARCSECOND
     assert np.linalg.norm(measured.measured.unadjusted) / ARCSECOND == pytest.approx(before)
     assert np.linalg.norm(measured.measured.adjusted) / ARCSECOND == pytest.approx(after)
     assert f"takes the norm of all final angles from {before:.2f}″ to {after:.2f}″" in said(measured)
@@ -181,7 +181,7 @@ def test_a_weighted_norm_is_called_so(plan):
 
 @pytest.mark.slow
 def test_what_is_to_be_expected_is_said_with_the_noise(expected):
-    sweep, at = expected.sweep, tables.at_precision(expected)
+    sweep, at = expected.sweep, tables.at_state_weight(expected)
     before, after, floor = (value / ARCSECOND for value in (sweep.total[0], sweep.total[at], sweep.noise_floor))
     sentence = answer(expected).sentences[0]
     assert f"leave {before:.2f}″ rms of all final angles unadjusted, {after:.2f}″ adjusted" in sentence
@@ -244,9 +244,9 @@ def test_the_gain_of_a_tuned_filter_is_said_with_the_reach_of_its_proof(expected
 
 def test_the_share_of_random_assemblies_within_all_limits_is_said(expected):
     share = expected.tolerances.verification.share
-    best = expected.tolerances.verified.gains.precision
+    best = expected.tolerances.verified.gains.state_weight
     which = f"the tolerances for the best precision of {best:.4g}"
-    assert expected.tolerances.verified is expected.tolerances.by_precision.best
+    assert expected.tolerances.verified is expected.tolerances.by_state_weight.best
     assert f"Of 2000 random assemblies with {which}, {share.estimate:.2%} are" in said(expected)
 
 
@@ -279,8 +279,8 @@ def test_steps_that_turn_parts_that_are_not_there_are_warned_of(expected, plan):
 
 @pytest.mark.slow
 def test_the_best_precision_is_said_only_where_effort_has_a_price(expected, plan):
-    best = expected.tolerances.by_precision.best
-    assert f"a precision of {best.gains.precision:.4g}" in said(expected)
+    best = expected.tolerances.by_state_weight.best
+    assert f"a precision of {best.gains.state_weight:.4g}" in said(expected)
     assert "best precision" in set(tolerance_tables.certificate_table(plan, expected.tolerances)["allocation"])
     free = run(replace(plan, requirements=replace(plan.requirements, effort_price=0.0)))
     assert "With effort priced" not in said(free)
@@ -345,12 +345,12 @@ def test_turning_as_listed_gives_what_is_said_to_be_left(measured):
 def test_expected_turns_have_the_effort_that_is_expected(expected):
     turned = tables.turns(expected).reshape(3, -1) / 3
     effort = (expected.plan.space.effort * turned**2).sum()
-    assert effort == pytest.approx(expected.sweep.effort[tables.at_precision(expected)])
+    assert effort == pytest.approx(expected.sweep.effort[tables.at_state_weight(expected)])
 
 
 def test_the_last_step_leaves_what_the_sweep_says(expected):
     tilt, rotation = tables.tilt_and_rotation(expected.expected[-1, 1])
-    at = tables.at_precision(expected)
+    at = tables.at_state_weight(expected)
     np.testing.assert_allclose(tilt, expected.sweep.tilt[at])
     np.testing.assert_allclose(rotation, expected.sweep.rotation[at])
 
@@ -430,7 +430,7 @@ def test_an_output_that_falls_is_not_warned_of(measured):
 
 
 def test_turning_fewer_parts_is_advised_only_where_it_leaves_less(expected):
-    total = expected.sweep.total[tables.at_precision(expected)]
+    total = expected.sweep.total[tables.at_state_weight(expected)]
     better, worse = (warnings(replace(expected, fewer=float(factor * total))) for factor in (0.5, 1.5))
     shown = f"leaves {total / 2 / ARCSECOND:.2f}″ rms instead of {total / ARCSECOND:.2f}″: every further adjustment "
     assert f"Turning at every step only the part just mounted {shown}misses by 1″ itself." in better
@@ -452,7 +452,7 @@ def test_what_a_larger_precision_buys_is_said_of_the_sweep_itself(expected):
     total[3] = ARCSECOND
     rising = replace(expected, sweep=replace(sweep, total=total))
     assert falls not in text(rising, heading)
-    assert f"Q = {sweep.precisions[3]:g} leaves least of all angles together, 1.00″ rms" in text(rising, heading)
+    assert f"Q = {sweep.state_weights[3]:g} leaves least of all angles together, 1.00″ rms" in text(rising, heading)
     assert "None of 6 tilts and rotations are larger than unadjusted at Q = 5." in text(expected, heading)
 
 

@@ -10,17 +10,17 @@ from jaxtyping import Float
 
 from tolalloc.assembly.control import regulator
 from tolalloc.assembly.files import load_errors, load_plan
-from tolalloc.assembly.gains import Gains, PrecisionSweep, expected_angles, norms, precision_sweep, tuned_gains
+from tolalloc.assembly.gains import Gains, StateWeightSweep, expected_angles, norms, state_weight_sweep, tuned_gains
 from tolalloc.assembly.orientations import TransmissionEffect, transmission_effect
-from tolalloc.assembly.plan import LARGEST_PRECISION, AssemblyPlan
+from tolalloc.assembly.plan import LARGEST_STATE_WEIGHT, AssemblyPlan
 from tolalloc.assembly.tolerances import (
     AngularAllocation,
     AngularVerification,
-    PrecisionCost,
     RetunedAllocation,
+    StateWeightCost,
     allocate_angles,
     angular_limits,
-    best_precision,
+    best_state_weight,
     retuned_allocation,
     verify_angles,
 )
@@ -55,7 +55,7 @@ SWEPT = (
 """Precisions over which the expected errors are drawn [-]."""
 SHOWN = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0)
 """Precisions at which the transmission is solved; zhang2025 shows some of them [-]."""
-TRIED = np.geomspace(0.01, LARGEST_PRECISION, 161)
+TRIED = np.geomspace(0.01, LARGEST_STATE_WEIGHT, 161)
 """Precisions among which one that keeps all limits is looked for [-]."""
 
 
@@ -80,7 +80,7 @@ class AdjustedParts:
     unadjusted: Float[np.ndarray, "part 3"]  # Final state if nothing is turned [rad]
     exact: Float[np.ndarray, "part 3"]  # The same by finite rotations [rad]
     missed: Float[np.ndarray, "part 3"]  # Standard deviation of what the listed turns miss in the end [rad]
-    norms: Float[np.ndarray, " precision"]  # Weighted norm of the final errors over the precisions of the sweep [rad]
+    norms: Float[np.ndarray, " state_weight"]  # Weighted norm of the final errors over the sweep [rad]
     # Smallest precision tried at which they keep all limits; none if none of them does, or nothing is limited [-]
     keeping: float | None
 
@@ -104,7 +104,7 @@ class AngularTolerances:
     retuned: RetunedAllocation  # With the filter tuned again to what was allocated
     verified: AngularAllocation  # The cheapest of them: with priced effort that at the best precision
     verification: AngularVerification  # Assemblies at random with it
-    by_precision: PrecisionCost  # Costs over the precision, effort included
+    by_state_weight: StateWeightCost  # Costs over the precision, effort included
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,7 +113,7 @@ class AssemblyResult:
 
     plan: AssemblyPlan  # What was asked
     gains: Gains  # What is turned at every step, per angle, and what that leaves
-    sweep: PrecisionSweep  # What is to be expected over the precision
+    sweep: StateWeightSweep  # What is to be expected over the precision
     # Standard deviation of every angle after each step, step by step: with the part as mounted, and as adjusted [rad]
     expected: Float[np.ndarray, "step 2 state"]
     # Root of the sum of the variances of all final angles if every step turned the part that it mounts alone; none if
@@ -139,11 +139,11 @@ def prepare_assembly(
         The argument, or the file, row, field and value that are not allowed.
     """
     require_seed("assembly", seed)
-    if precision is not None and not 0 <= precision <= LARGEST_PRECISION:
-        raise InputError.of_argument("assembly", "precision", precision, f"0 to {LARGEST_PRECISION:g}")
+    if precision is not None and not 0 <= precision <= LARGEST_STATE_WEIGHT:
+        raise InputError.of_argument("assembly", "precision", precision, f"0 to {LARGEST_STATE_WEIGHT:g}")
     plan = load_plan(chain)
     if precision is not None:
-        plan = replace(plan, precision=precision)
+        plan = replace(plan, state_weight=precision)
     if measured is None:
         return AssemblyRequest(plan=plan, seed=seed)
     return AssemblyRequest(plan=plan, name=measured.stem, errors=load_errors(measured, plan), seed=seed)
@@ -161,15 +161,15 @@ def assemble(request: AssemblyRequest, record: RunRecord) -> AssemblyResult:
     """
     plan, seeds = request.plan, SeedTree(request.seed).child("assembly")
     with record.stage("adjustment"):
-        gains = tuned_gains(plan, plan.precision, plan.tolerances)
-        swept = np.array(sorted({*SWEPT, plan.precision}))
-        sweep, expected = precision_sweep(plan, swept), expected_angles(plan, gains)
+        gains = tuned_gains(plan, plan.state_weight, plan.tolerances)
+        swept = np.array(sorted({*SWEPT, plan.state_weight}))
+        sweep, expected = state_weight_sweep(plan, swept), expected_angles(plan, gains)
         fewer = _fewer(plan)
         measured = None if request.errors is None else _measured(plan, request.name, request.errors, swept)
     with record.stage("tolerances"):
         tolerances, unreachable = _tolerances(plan, seeds.child("verification"), request.assemblies)
     with record.stage("transmission"):
-        shown = np.array(sorted({*SHOWN, plan.precision}))
+        shown = np.array(sorted({*SHOWN, plan.state_weight}))
         transmission = None
         if plan.reducer:
             transmission = transmission_effect(plan, request.errors, shown, seeds.child("transmission"), record.observe)
@@ -187,7 +187,10 @@ def assemble(request: AssemblyRequest, record: RunRecord) -> AssemblyResult:
 
 
 def _measured(
-    plan: AssemblyPlan, name: str, errors: Float[np.ndarray, "part 3"], precisions: Float[np.ndarray, " precision"]
+    plan: AssemblyPlan,
+    name: str,
+    errors: Float[np.ndarray, "part 3"],
+    state_weights: Float[np.ndarray, " state_weight"],
 ) -> AdjustedParts:
     sequence = foreseen(plan.space, regulator(plan.space, plan.final_weight()), errors.ravel())
     turned = plan.space.adjusting * (sequence.adjustments != 0)[:, np.newaxis]
@@ -199,7 +202,7 @@ def _measured(
         missed=plan.adjustment_noise * np.sqrt((turned**2).sum(axis=(0, 2))).reshape(-1, 3),
         unadjusted=(plan.chain.transform @ errors.ravel()).reshape(-1, 3),
         exact=plan.chain.finite(errors),
-        norms=norms(plan, errors.ravel(), precisions),
+        norms=norms(plan, errors.ravel(), state_weights),
         keeping=_smallest_keeping(plan, errors),
     )
 
@@ -209,10 +212,10 @@ def _smallest_keeping(plan: AssemblyPlan, errors: Float[np.ndarray, "part 3"]) -
     if plan.requirements is None:
         return None
     limits = angular_limits(plan)
-    for precision in TRIED:
-        final = foreseen(plan.space, regulator(plan.space, plan.final_weight(float(precision))), errors.ravel())
+    for state_weight in TRIED:
+        final = foreseen(plan.space, regulator(plan.space, plan.final_weight(float(state_weight))), errors.ravel())
         if (limits.counted @ final.adjusted[-1] ** 2 <= limits.values**2).all():
-            return float(precision)
+            return float(state_weight)
     return None
 
 
@@ -221,7 +224,7 @@ def _fewer(plan: AssemblyPlan) -> float | None:
     fewer = plan.turning_fewer
     if [step.adjust for step in fewer.steps] == [step.adjust for step in plan.steps]:
         return None
-    gains = tuned_gains(fewer, fewer.precision, fewer.tolerances)
+    gains = tuned_gains(fewer, fewer.state_weight, fewer.tolerances)
     return float(np.sqrt(np.trace(gains.errors.covariance(fewer.variances))))
 
 
@@ -230,18 +233,18 @@ def _tolerances(plan: AssemblyPlan, seeds: SeedTree, assemblies: int) -> tuple[A
     if plan.requirements is None:
         return None, ""
     try:
-        retuned, by_precision = retuned_allocation(plan), best_precision(plan)
+        retuned, by_state_weight = retuned_allocation(plan), best_state_weight(plan)
     except InputError as error:  # who wants to know what to turn must not be kept from it
         return None, str(error)
     # Without a price on effort the best precision is the end of the range, which nobody asked for.
-    verified = by_precision.best if plan.requirements.effort_price > 0 else retuned.best
+    verified = by_state_weight.best if plan.requirements.effort_price > 0 else retuned.best
     found = AngularTolerances(
         adjusted=retuned.allocations[0],
         unadjusted=_without_adjusting(plan),
         retuned=retuned,
         verified=verified,
         verification=verify_angles(plan, verified, seeds, assemblies),
-        by_precision=by_precision,
+        by_state_weight=by_state_weight,
     )
     return found, ""
 

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from tolalloc.assembly.chain import DatumFlowChain, Part
-from tolalloc.assembly.plan import LARGEST_PRECISION, AngularRequirements, AssemblyPlan
+from tolalloc.assembly.plan import LARGEST_STATE_WEIGHT, AngularRequirements, AssemblyPlan
 from tolalloc.assembly.steps import AssemblyStep, Choice, Efforts, Positive, check_steps, steps_in_order
 from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
@@ -151,7 +151,7 @@ class ChainRecord(Record):
     assumptions: tuple[str, ...] = ()
     datum: Name
     reducer: str = ""
-    precision: Annotated[float, Field(ge=0, le=LARGEST_PRECISION)]
+    precision: Annotated[float, Field(ge=0, le=LARGEST_STATE_WEIGHT)]
     adjust: Choice | None = None
     measure: Literal["current", "mounted"] | None = None
     effort: Efforts | None = None
@@ -196,7 +196,7 @@ def load_plan(name: str | Path) -> AssemblyPlan:
         chain=chain,
         steps=_steps(record, chain, path),
         tolerances=ARCSECOND * np.array([part.tolerance_arcsec for part in parts]),
-        precision=record.precision,
+        state_weight=record.precision,
         weights=np.array([part.weight for part in parts]),
         measurement_noise=record.noise.measurement_arcsec * ARCSECOND,
         adjustment_noise=record.noise.adjustment_arcsec * ARCSECOND,

@@ -78,14 +78,14 @@ def final_errors(
 class Gains:
     """Gains of regulator and filter, fixed while tolerances are allocated."""
 
-    precision: float  # Q, weight of the final errors against the effort [-]
+    state_weight: float  # Q, weight of the final errors against the effort [-]
     regulator: Regulator  # The adjustments
     kalman: KalmanFilter  # The estimator
     adjustment_noise: float  # Standard deviation of what an adjustment misses; 0 where nothing is turned [rad]
     errors: FinalErrors  # What parts and noise leave with these gains
 
 
-def tuned_gains(plan: AssemblyPlan, precision: float, tolerances: Float[np.ndarray, "part 3"]) -> Gains:
+def tuned_gains(plan: AssemblyPlan, state_weight: float, tolerances: Float[np.ndarray, "part 3"]) -> Gains:
     """Return the gains at a precision Q whose filter expects parts of given tolerances [rad].
 
     Raises
@@ -93,14 +93,14 @@ def tuned_gains(plan: AssemblyPlan, precision: float, tolerances: Float[np.ndarr
     InputError
         A precision that is not 0 or above, or a reading without noise that is known before.
     """
-    if not 0 <= precision < np.inf:
-        raise InputError.at(plan.name, "precision", precision, "0 or above")
+    if not 0 <= state_weight < np.inf:
+        raise InputError.at(plan.name, "precision", state_weight, "0 or above")
     # At a precision of 0 nothing is turned, and what is not turned misses nothing.
-    noise = (plan.measurement_noise, plan.adjustment_noise if precision > 0 else 0.0)
-    adjusting = regulator(plan.space, plan.final_weight(precision))
+    noise = (plan.measurement_noise, plan.adjustment_noise if state_weight > 0 else 0.0)
+    adjusting = regulator(plan.space, plan.final_weight(state_weight))
     kalman = kalman_filter(plan.space, (tolerances / 3).ravel() ** 2, *noise, plan.name)
     return Gains(
-        precision=precision,
+        state_weight=state_weight,
         regulator=adjusting,
         kalman=kalman,
         adjustment_noise=noise[1],
@@ -127,25 +127,27 @@ def expected_angles(plan: AssemblyPlan, gains: Gains) -> Float[np.ndarray, "step
 
 
 @dataclass(frozen=True, kw_only=True)
-class PrecisionSweep:
+class StateWeightSweep:
     """Final errors and effort over the precision weight."""
 
-    precisions: Float[np.ndarray, " precision"]  # Q [-]
-    total: Float[np.ndarray, " precision"]  # Root of the sum of the variances of all final angles [rad]
-    tilt: Float[np.ndarray, "precision part"]  # Standard deviation of every part's final tilt, x and y together [rad]
-    rotation: Float[np.ndarray, "precision part"]  # The same of its rotation about the datum's axis [rad]
-    effort: Float[np.ndarray, " precision"]  # Expected Σ uᵀRu [rad²]
-    next_unit: Float[np.ndarray, " precision"]  # Share of the total that another unit of Q takes off [-]
+    state_weights: Float[np.ndarray, " state_weight"]  # Q [-]
+    total: Float[np.ndarray, " state_weight"]  # Root of the sum of the variances of all final angles [rad]
+    tilt: Float[
+        np.ndarray, "state_weight part"
+    ]  # Standard deviation of every part's final tilt, x and y together [rad]
+    rotation: Float[np.ndarray, "state_weight part"]  # The same of its rotation about the datum's axis [rad]
+    effort: Float[np.ndarray, " state_weight"]  # Expected Σ uᵀRu [rad²]
+    next_unit: Float[np.ndarray, " state_weight"]  # Share of the total that another unit of Q takes off [-]
     noise_floor: float  # Total that is left however large Q is [rad]
 
     def diminished(self, share: float = 0.01) -> float | None:
         """Return the smallest Q from which on another unit takes off less than a share of the total, if reached [-]."""
         worth = np.flatnonzero(self.next_unit >= share)
         first = worth[-1] + 1 if worth.size else 0
-        return float(self.precisions[first]) if first < len(self.precisions) else None
+        return float(self.state_weights[first]) if first < len(self.state_weights) else None
 
 
-def precision_sweep(plan: AssemblyPlan, precisions: Float[np.ndarray, " precision"]) -> PrecisionSweep:
+def state_weight_sweep(plan: AssemblyPlan, state_weights: Float[np.ndarray, " state_weight"]) -> StateWeightSweep:
     """Return what is to be expected of an assembly over the precision weight, ascending [-].
 
     Raises
@@ -161,18 +163,18 @@ def precision_sweep(plan: AssemblyPlan, precisions: Float[np.ndarray, " precisio
     kalman = kalman_filter(plan.space, plan.variances, *noise, plan.name)
     limit = final_errors(plan.space, limiting_regulator(plan.space, plan.final_weight(1.0)), kalman, *noise)
 
-    def at(precision: float) -> FinalErrors:
-        return tuned_gains(plan, float(precision), plan.tolerances).errors
+    def at(state_weight: float) -> FinalErrors:
+        return tuned_gains(plan, float(state_weight), plan.tolerances).errors
 
     def angles(found: FinalErrors) -> Float[np.ndarray, "part 3"]:
         return np.diag(found.covariance(plan.variances)).reshape(-1, 3)
 
-    maps = [at(precision) for precision in precisions]
+    maps = [at(state_weight) for state_weight in state_weights]
     variances = np.array([angles(each) for each in maps])
-    following = np.array([angles(at(precision + 1)) for precision in precisions])
+    following = np.array([angles(at(state_weight + 1)) for state_weight in state_weights])
     total, next_total = (np.sqrt(each.sum(axis=(1, 2))) for each in (variances, following))
-    return PrecisionSweep(
-        precisions=precisions,
+    return StateWeightSweep(
+        state_weights=state_weights,
         total=total,
         tilt=np.sqrt(variances[..., 0] + variances[..., 1]),
         rotation=np.sqrt(variances[..., 2]),
@@ -183,8 +185,8 @@ def precision_sweep(plan: AssemblyPlan, precisions: Float[np.ndarray, " precisio
 
 
 def norms(
-    plan: AssemblyPlan, errors: Float[np.ndarray, "*samples error"], precisions: Float[np.ndarray, " precision"]
-) -> Float[np.ndarray, "precision *samples"]:
+    plan: AssemblyPlan, errors: Float[np.ndarray, "*samples error"], state_weights: Float[np.ndarray, " state_weight"]
+) -> Float[np.ndarray, "state_weight *samples"]:
     """Return the weighted norm of the final errors of parts that are measured beforehand, over the precision weight.
 
     Notes
@@ -195,8 +197,8 @@ def norms(
     """
     root = np.sqrt(np.diag(plan.final_weight(1.0)))
     found = list[Float[np.ndarray, "*samples"]]()
-    for precision in precisions:
-        adjustments = regulator(plan.space, plan.final_weight(float(precision)))
+    for state_weight in state_weights:
+        adjustments = regulator(plan.space, plan.final_weight(float(state_weight)))
         final = foreseen(plan.space, adjustments, errors).adjusted[..., -1, :]
         found.append(np.linalg.norm(root * final, axis=-1))
     return np.array(found)

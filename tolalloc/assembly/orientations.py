@@ -125,11 +125,11 @@ class TransmissionEffect:
 
     reducer: Reducer  # The reducer that the parts belong to
     test_torque: float  # Torque of the transmission error that is not said to be at rated torque [N·m]
-    precisions: Float[np.ndarray, " precision"]  # Q [-]
+    state_weights: Float[np.ndarray, " state_weight"]  # Q [-]
     outputs: tuple[str, ...]  # Names of the outputs, units in them
     perfect: Float[np.ndarray, " output"]  # Outputs without any angular error [as the names say]
     # Outputs of the same assemblies at every precision; one assembly where the parts are measured [as the names say]
-    values: Float[np.ndarray, "precision sample output"]
+    values: Float[np.ndarray, "state_weight sample output"]
     good: Bool[np.ndarray, " sample"]  # Which assemblies have all outputs at every precision
     perfect_curves: TransmissionCurves  # One output turn without any angular error, at rated torque
     curves: TransmissionCurves  # One output turn of the first good assembly at every precision, at rated torque
@@ -214,7 +214,7 @@ def _disc_tilts(discs: int) -> tuple[str, ...]:
 def transmission_effect(
     plan: AssemblyPlan,
     errors: Float[np.ndarray, "part 3"] | None,
-    precisions: Float[np.ndarray, " precision"],
+    state_weights: Float[np.ndarray, " state_weight"],
     seeds: SeedTree,
     observe: Observer,
 ) -> TransmissionEffect:
@@ -226,7 +226,7 @@ def transmission_effect(
         The assembly; it names a reducer.
     errors
         Measured errors of the parts; unless given, parts are drawn from the plan's tolerances [rad].
-    precisions
+    state_weights
         Q [-].
     seeds
         Node of the seed tree.
@@ -244,7 +244,7 @@ def transmission_effect(
     torque = reducer.load.test_torque
     model = EquivalentModel(at_torque(reducer, torque))
     response = OrientationResponse(model=model, chain=plan.chain, torque=torque, observe=observe)
-    final = _final_angles(plan, errors, precisions, seeds)
+    final = _final_angles(plan, errors, state_weights, seeds)
     perfect = response(np.zeros((1, final.shape[2])))
     found = response(final.reshape(-1, final.shape[2]))
     good = np.asarray(found.good.reshape(final.shape[:2]).all(axis=0))
@@ -259,7 +259,7 @@ def transmission_effect(
     return TransmissionEffect(
         reducer=reducer,
         test_torque=torque,
-        precisions=precisions,
+        state_weights=state_weights,
         outputs=response.outputs,
         perfect=perfect.values[0],
         values=found.values.reshape(*final.shape[:2], -1),
@@ -273,15 +273,15 @@ def transmission_effect(
 def _final_angles(
     plan: AssemblyPlan,
     errors: Float[np.ndarray, "part 3"] | None,
-    precisions: Float[np.ndarray, " precision"],
+    state_weights: Float[np.ndarray, " state_weight"],
     seeds: SeedTree,
-) -> Float[np.ndarray, "precision sample state"]:
+) -> Float[np.ndarray, "state_weight sample state"]:
     """Return final angles of the measured parts, or of the same random assemblies at every precision [rad]."""
     space = plan.space
     if errors is not None:
         own = errors.ravel()[np.newaxis]
-        weights = (plan.final_weight(float(precision)) for precision in precisions)
+        weights = (plan.final_weight(float(state_weight)) for state_weight in state_weights)
         return np.array([foreseen(space, regulator(space, weight), own).adjusted[:, -1] for weight in weights])
     standard = seeds.generator().standard_normal((_DRAWS, random_numbers(space)))
-    gains = (tuned_gains(plan, float(precision), plan.tolerances) for precision in precisions)
+    gains = (tuned_gains(plan, float(state_weight), plan.tolerances) for state_weight in state_weights)
     return np.array([assembled(plan, own, plan.tolerances, standard).adjusted[:, -1] for own in gains])

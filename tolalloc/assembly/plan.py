@@ -11,7 +11,7 @@ from jaxtyping import Float
 from tolalloc.assembly.chain import DatumFlowChain
 from tolalloc.assembly.steps import AssemblyStep, StateSpace, state_space
 
-LARGEST_PRECISION = 1e6
+LARGEST_STATE_WEIGHT = 1e6
 """Largest precision that may be asked for: far beyond, gains lose their digits [-]."""
 
 
@@ -43,7 +43,7 @@ class AssemblyPlan:
     steps: tuple[AssemblyStep, ...]  # The steps
     # Angular tolerance of every part about its own axes, ±, three standard deviations [rad]
     tolerances: Float[np.ndarray, "part 3"]
-    precision: float  # Q, weight of the final errors against the effort [-]
+    state_weight: float  # Q, weight of the final errors against the effort [-]
     weights: Float[np.ndarray, " part"]  # Further weight of every part's final errors [-]
     # Standard deviation of one reading, and of what an adjustment misses, per axis and step [rad]
     measurement_noise: float
@@ -62,9 +62,9 @@ class AssemblyPlan:
         """Variance of every part error [rad²]."""
         return np.asarray((self.tolerances / 3).ravel() ** 2)
 
-    def final_weight(self, precision: float | None = None) -> Float[np.ndarray, "state state"]:
+    def final_weight(self, state_weight: float | None = None) -> Float[np.ndarray, "state state"]:
         """Return the weight matrix of the final errors, Q(N), at a precision in place of the plan's own [-]."""
-        own = self.precision if precision is None else precision
+        own = self.state_weight if state_weight is None else state_weight
         return np.diag(own * np.repeat(self.weights, 3))
 
     @property

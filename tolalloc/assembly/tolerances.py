@@ -188,7 +188,7 @@ def allocated(plan: AssemblyPlan, gains: Gains) -> AngularAllocation | None:
     )
 
 
-def allocate_angles(plan: AssemblyPlan, precision: float | None = None) -> AngularAllocation:
+def allocate_angles(plan: AssemblyPlan, state_weight: float | None = None) -> AngularAllocation:
     """Return the cheapest tolerances, at the plan's precision or another Q [-], with the filter that expects its own.
 
     Raises
@@ -196,7 +196,7 @@ def allocate_angles(plan: AssemblyPlan, precision: float | None = None) -> Angul
     InputError
         The plan states no requirements, or no tolerances keep its limits.
     """
-    gains = tuned_gains(plan, plan.precision if precision is None else precision, plan.tolerances)
+    gains = tuned_gains(plan, plan.state_weight if state_weight is None else state_weight, plan.tolerances)
     found = allocated(plan, gains)
     if found is None:
         raise _refusal(plan, gains)
@@ -217,7 +217,7 @@ def _refusal(plan: AssemblyPlan, gains: Gains) -> InputError:
     remedy = "measure or adjust better, expect smaller errors" if too_noisy else "allow smaller tolerances"
     return InputError(
         f"{plan.name}: three standard deviations of the {limits.names[at]} may be {limit:g} arcsec, but at a precision "
-        f"of {gains.precision:g}, with a filter that expects the stated tolerances, {made}; {remedy}, try another "
+        f"of {gains.state_weight:g}, with a filter that expects the stated tolerances, {made}; {remedy}, try another "
         "precision, or widen the limit."
     )
 
@@ -274,7 +274,7 @@ def _final(
 
 _TOLERANCES_SETTLED = 1e-8
 """Relative change of all tolerances below which they count as settled [-]."""
-_PRECISION_SETTLED = 1e-6
+_STATE_WEIGHT_SETTLED = 1e-6
 """Step of the precision's logarithm with which the search for the best one ends [-]."""
 
 
@@ -313,7 +313,7 @@ def retuned_allocation(plan: AssemblyPlan, most_filters: int = 100) -> RetunedAl
     found = [allocate_angles(plan)]
     while len(found) < most_filters:
         last = found[-1]
-        following = allocated(plan, tuned_gains(plan, last.gains.precision, last.tolerances))
+        following = allocated(plan, tuned_gains(plan, last.gains.state_weight, last.tolerances))
         if following is None:
             break
         found.append(following)
@@ -323,17 +323,17 @@ def retuned_allocation(plan: AssemblyPlan, most_filters: int = 100) -> RetunedAl
 
 
 @dataclass(frozen=True, kw_only=True)
-class PrecisionCost:
+class StateWeightCost:
     """Costs over the precision, and the allocation at the best one."""
 
-    precisions: Float[np.ndarray, " precision"]  # Q [-]
+    state_weights: Float[np.ndarray, " state_weight"]  # Q [-]
     # Cost of the tolerances; not a number where none keep the limits [cost units]
-    cost: Float[np.ndarray, " precision"]
-    effort_cost: Float[np.ndarray, " precision"]  # Price of the expected effort; likewise [cost units]
+    cost: Float[np.ndarray, " state_weight"]
+    effort_cost: Float[np.ndarray, " state_weight"]  # Price of the expected effort; likewise [cost units]
     best: AngularAllocation  # Allocation at the best precision
 
     @property
-    def total(self) -> Float[np.ndarray, " precision"]:
+    def total(self) -> Float[np.ndarray, " state_weight"]:
         """Cost of tolerances and effort [cost units]."""
         return np.asarray(self.cost + self.effort_cost)
 
@@ -341,10 +341,12 @@ class PrecisionCost:
     def interior(self) -> bool:
         """Whether the curve has points that cost more on both sides of its best one."""
         at = int(np.nanargmin(self.total))
-        return 0 < at < self.precisions.size - 1 and bool(np.isfinite(self.total[at - 1 : at + 2]).all())
+        return 0 < at < self.state_weights.size - 1 and bool(np.isfinite(self.total[at - 1 : at + 2]).all())
 
 
-def best_precision(plan: AssemblyPlan, lowest: float = 0.1, highest: float = 100.0, points: int = 41) -> PrecisionCost:
+def best_state_weight(
+    plan: AssemblyPlan, lowest: float = 0.1, highest: float = 100.0, points: int = 41
+) -> StateWeightCost:
     """Return what tolerances and effort cost over the precision, with the filter of the plan's tolerances.
 
     Parameters
@@ -371,8 +373,8 @@ def best_precision(plan: AssemblyPlan, lowest: float = 0.1, highest: float = 100
             (lowest, highest, points),
             "two numbers above 0, the smaller one first, and 3 points or more",
         )
-    precisions = np.geomspace(lowest, highest, points)
-    found = [_at(plan, float(precision)) for precision in precisions]
+    state_weights = np.geomspace(lowest, highest, points)
+    found = [_at(plan, float(state_weight)) for state_weight in state_weights]
     cost = np.array([np.nan if each is None else each.cost for each in found])
     effort_cost = np.array([np.nan if each is None else each.effort_cost for each in found])
     if np.isnan(cost).all():
@@ -380,23 +382,23 @@ def best_precision(plan: AssemblyPlan, lowest: float = 0.1, highest: float = 100
             plan.name, "range of the precision", (lowest, highest), "one where some tolerances keep the limits"
         )
     at = int(np.nanargmin(cost + effort_cost))
-    around = np.log(precisions[[max(at - 1, 0), min(at + 1, points - 1)]])
+    around = np.log(state_weights[[max(at - 1, 0), min(at + 1, points - 1)]])
     refined = minimize_scalar(
-        lambda q: _total(plan, exp(q)), bounds=around, method="bounded", options={"xatol": _PRECISION_SETTLED}
+        lambda q: _total(plan, exp(q)), bounds=around, method="bounded", options={"xatol": _STATE_WEIGHT_SETTLED}
     )
-    return PrecisionCost(
-        precisions=precisions,
+    return StateWeightCost(
+        state_weights=state_weights,
         cost=cost,
         effort_cost=effort_cost,
         best=min(filter(None, (found[at], _at(plan, exp(refined.x)))), key=lambda each: each.total),
     )
 
 
-def _at(plan: AssemblyPlan, precision: float) -> AngularAllocation | None:
-    return allocated(plan, tuned_gains(plan, precision, plan.tolerances))
+def _at(plan: AssemblyPlan, state_weight: float) -> AngularAllocation | None:
+    return allocated(plan, tuned_gains(plan, state_weight, plan.tolerances))
 
 
-def _total(plan: AssemblyPlan, precision: float) -> float:
+def _total(plan: AssemblyPlan, state_weight: float) -> float:
     """Return the least total at a precision, infinite where no tolerances keep the limits [cost units]."""
-    found = _at(plan, precision)
+    found = _at(plan, state_weight)
     return inf if found is None else found.total

@@ -18,7 +18,7 @@ from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.tellers import assembly_tables as tables
-from tolalloc.reports.tellers.assembly_tables import Characteristic, at_precision, has_limits, norm_of
+from tolalloc.reports.tellers.assembly_tables import Characteristic, at_state_weight, has_limits, norm_of
 from tolalloc.reports.tellers.assembly_tolerances import (
     certificate_table,
     cost_sentences,
@@ -66,7 +66,7 @@ class AssemblyTeller(Teller[AssemblyResult]):
             "subtitle",
             parts=len(plan.chain.names),
             datum=plan.chain.datum,
-            precision=plan.precision,
+            precision=plan.state_weight,
             which=measured.name if measured else _say("within"),
         )
 
@@ -78,20 +78,20 @@ class AssemblyTeller(Teller[AssemblyResult]):
         return (
             self._worth,
             self._diminishing,
-            *(transmission_sentences(effect, own.plan.precision) if effect else ()),
+            *(transmission_sentences(effect, own.plan.state_weight) if effect else ()),
             *(cost_sentences(own.plan, tolerances) if tolerances else ()),
         )
 
     @property
     def _worth(self) -> str:
         """What adjusting takes off all final angles, measured or to be expected."""
-        own, at = self.result, at_precision(self.result)
+        own, at = self.result, at_state_weight(self.result)
         if own.measured:
             before, after = own.measured.norms[[0, at]] / ARCSECOND
-            name, precision = own.measured.name, own.plan.precision
+            name, precision = own.measured.name, own.plan.state_weight
             return _say("norm", name=name, precision=precision, norm=norm_of(own), before=before, after=after)
         before, after, floor = np.array([own.sweep.total[0], own.sweep.total[at], own.sweep.noise_floor]) / ARCSECOND
-        return _say("expected", before=before, after=after, precision=own.plan.precision, floor=floor)
+        return _say("expected", before=before, after=after, precision=own.plan.state_weight, floor=floor)
 
     @property
     def _diminishing(self) -> str:
@@ -100,8 +100,8 @@ class AssemblyTeller(Teller[AssemblyResult]):
         found = sweep.diminished(LITTLE)
         floor = _say("floor", floor=sweep.noise_floor / ARCSECOND) if self.result.measured else ""
         if found is None:
-            return _say("not_diminished", largest=sweep.precisions[-1], share=sweep.next_unit[-1], floor=floor)
-        adding = sweep.precisions[(sweep.precisions >= found) & (sweep.next_unit < 0)]
+            return _say("not_diminished", largest=sweep.state_weights[-1], share=sweep.next_unit[-1], floor=floor)
+        adding = sweep.state_weights[(sweep.state_weights >= found) & (sweep.next_unit < 0)]
         adds = _say("adds", precision=adding[0]) if adding.size else ""
         return _say("diminished", found=found, little=LITTLE, adds=adds, floor=floor)
 
@@ -117,7 +117,7 @@ class AssemblyTeller(Teller[AssemblyResult]):
             *self._missed,
             *((_say("warn_larger", angles=", ".join(rose)),) if rose else ()),
             *self._fewer,
-            *(transmission_warnings(effect, own.plan.precision) if effect else ()),
+            *(transmission_warnings(effect, own.plan.state_weight) if effect else ()),
             *((_say("warn_unlimited"),) if unlimited else ()),
             *((_say("warn_unreachable", why=own.unreachable),) if own.unreachable else ()),
             *(tolerance_warnings(tolerances) if tolerances else ()),
@@ -177,7 +177,7 @@ class AssemblyTeller(Teller[AssemblyResult]):
     @property
     def _fewer(self) -> tuple[str, ...]:
         """Whether it is better to leave alone what was adjusted before."""
-        fewer, total = self.result.fewer, self.result.sweep.total[at_precision(self.result)]
+        fewer, total = self.result.fewer, self.result.sweep.total[at_state_weight(self.result)]
         if fewer is None or fewer >= total * (1 - _SAME):
             return ()
         noise = self.result.plan.adjustment_noise / ARCSECOND
@@ -202,7 +202,7 @@ class AssemblyTeller(Teller[AssemblyResult]):
     def sections(self) -> tuple[Section, ...]:
         """Steps, precision, transmission, tolerances, finite rotations."""
         own, effect, measured = self.result, self.result.transmission, self.result.measured
-        tolerances, precision = limited_tolerances(own), own.plan.precision
+        tolerances, precision = limited_tolerances(own), own.plan.state_weight
         return (
             self._steps,
             self._sweep,
@@ -261,7 +261,7 @@ class AssemblyTeller(Teller[AssemblyResult]):
             rose=len(rose) or "None",
             all=2 * len(own.plan.chain.names),
             are="is" if len(rose) == 1 else "are",
-            precision=own.plan.precision,
+            precision=own.plan.state_weight,
         )
         return Section(
             heading=_say("sweep_heading"),
@@ -277,7 +277,7 @@ class AssemblyTeller(Teller[AssemblyResult]):
         least = int(np.argmin(sweep.total))
         if (np.diff(sweep.total) <= 0).all() and sweep.total[least] < sweep.total[0]:
             return _say("bought", each=_say("each_less") if (np.diff(sweep.next_unit) <= 0).all() else "")
-        return _say("bought_least", precision=sweep.precisions[least], least=sweep.total[least] / ARCSECOND)
+        return _say("bought_least", precision=sweep.state_weights[least], least=sweep.total[least] / ARCSECOND)
 
     @cached_property
     def characteristics(self) -> pd.DataFrame:
@@ -332,15 +332,15 @@ class AssemblyTeller(Teller[AssemblyResult]):
         """What is left over the precision, and against the effort."""
         own, sweep = self.result, self.result.sweep
         total, floor = sweep.total / ARCSECOND, (sweep.noise_floor / ARCSECOND, "")
-        turned = sweep.precisions > 0
-        x = list(sweep.precisions[turned])
+        turned = sweep.state_weights > 0
+        x = list(sweep.state_weights[turned])
         series = [Series(label="to be expected of all angles, rms", kind="line", x=x, y=list(total[turned]))]
         if own.measured:
             name, norms = f"{norm_of(own)} of {own.measured.name}", own.measured.norms[turned] / ARCSECOND
             series.append(Series(label=name, kind="line", x=x, y=list(norms)))
-        asked = own.plan.precision
+        asked = own.plan.state_weight
         if asked > 0:  # 0 has no place on a logarithmic axis
-            at = total[at_precision(own)]
+            at = total[at_state_weight(own)]
             series.append(Series(label=f"at Q = {asked:g}", kind="points", x=[asked], y=[at]))
         effort = list(sweep.effort / ARCSECOND**2)
         return (
@@ -367,12 +367,12 @@ class AssemblyTeller(Teller[AssemblyResult]):
     def summary(self) -> dict[str, Any]:
         """The answer for a program, units in the names."""
         own, plan, sweep = self.result, self.result.plan, self.result.sweep
-        at, tolerances, effect = at_precision(own), limited_tolerances(own), own.transmission
+        at, tolerances, effect = at_state_weight(own), limited_tolerances(own), own.transmission
         return {
             "assembly": plan.name,
             "source": plan.source,
             "reducer": effect.reducer.name if effect else None,
-            "precision [-]": plan.precision,
+            "precision [-]": plan.state_weight,
             "seed": self.header.seed,
             "plan": plan_record(plan),
             "expected rms unadjusted [arcsec]": plain(sweep.total[0], ARCSECOND),
@@ -413,7 +413,7 @@ def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:
 
 
 def _measured_record(result: AssemblyResult, measured: AdjustedParts) -> dict[str, Any]:
-    before, after = plain(measured.norms[[0, at_precision(result)]], ARCSECOND)
+    before, after = plain(measured.norms[[0, at_state_weight(result)]], ARCSECOND)
     keeping = measured.keeping and plain(measured.keeping)
     return {
         "name": measured.name,
@@ -444,7 +444,7 @@ def _tolerances_record(plan: AssemblyPlan, tolerances: AngularTolerances) -> dic
         "lower bound adjusted [cost units]": plain(tolerances.adjusted.bound),
         "cost re-tuned [cost units]": plain(tolerances.retuned.best.total),
         "re-tuning settled": tolerances.retuned.settled,
-        "best precision [-]": plain(tolerances.by_precision.best.gains.precision) if is_priced(plan) else None,
+        "best precision [-]": plain(tolerances.by_state_weight.best.gains.state_weight) if is_priced(plan) else None,
         "verified": verified_name(plan, tolerances),
         "assemblies [-]": verified.assemblies,
         "within all limits [-]": verified.share.estimate,
@@ -464,7 +464,7 @@ def plan_record(plan: AssemblyPlan) -> dict[str, Any]:
         "source": plan.source,
         "reducer": plan.reducer or None,
         "datum": plan.chain.datum,
-        "precision [-]": plan.precision,
+        "precision [-]": plan.state_weight,
         "measurement noise, σ [arcsec]": plain(plan.measurement_noise, ARCSECOND),
         "adjustment noise, σ [arcsec]": plain(plan.adjustment_noise, ARCSECOND),
         "parts": [_part(plan, at) for at in range(len(plan.chain.parts))],

@@ -45,9 +45,9 @@ def of_rows(header: str, values: Float[np.ndarray, " row"] | Sequence[Any]) -> C
     return Column(header=header, value=lambda at: values[at])
 
 
-def at_precision(result: AssemblyResult) -> int:
+def at_state_weight(result: AssemblyResult) -> int:
     """Return where the plan's precision stands in the sweep; 0, nothing turned, stands first."""
-    return int(np.flatnonzero(result.sweep.precisions == result.plan.precision)[0])
+    return int(np.flatnonzero(result.sweep.state_weights == result.plan.state_weight)[0])
 
 
 def norm_of(result: AssemblyResult) -> str:
@@ -176,7 +176,7 @@ def sweep_table(result: AssemblyResult) -> pd.DataFrame:
     sweep, measured, names = result.sweep, result.measured, result.plan.chain.names
     norm = f"{norm_of(result)} of {measured.name} [arcsec]" if measured else ""
     columns = (
-        of_rows(PRECISION, sweep.precisions),
+        of_rows(PRECISION, sweep.state_weights),
         of_rows("all angles, rms [arcsec]", sweep.total / ARCSECOND),
         of_rows("another unit of Q takes off [%]", sweep.next_unit * 100),
         of_rows("effort [arcsec²]", sweep.effort / ARCSECOND**2),
@@ -187,7 +187,7 @@ def sweep_table(result: AssemblyResult) -> pd.DataFrame:
             for at, name in enumerate(names)
         ),
     )
-    return tabulated("sweep", columns, range(sweep.precisions.size))
+    return tabulated("sweep", columns, range(sweep.state_weights.size))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -266,7 +266,7 @@ def _finals(result: AssemblyResult) -> Float[np.ndarray, "3 characteristic"]:
         sweep, noise = result.sweep, 3 * np.sqrt(np.diag(result.gains.errors.noise_covariance))
         finals = 3 * np.concatenate([sweep.tilt, sweep.rotation], axis=1) / ARCSECOND
         alone = np.concatenate(tilt_and_rotation(noise)) / ARCSECOND
-        return np.stack([finals[0], finals[at_precision(result)], alone])
+        return np.stack([finals[0], finals[at_state_weight(result)], alone])
     before, after = (
         np.concatenate(tilt_and_rotation(each.ravel())) for each in (measured.unadjusted, measured.adjusted)
     )

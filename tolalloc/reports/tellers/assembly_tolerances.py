@@ -47,7 +47,7 @@ def allocations(plan: AssemblyPlan, tolerances: AngularTolerances) -> dict[str, 
     if is_retuned(tolerances):
         found["re-tuned"] = tolerances.retuned.best
     if is_priced(plan):
-        found["best precision"] = tolerances.by_precision.best
+        found["best precision"] = tolerances.by_state_weight.best
     return found
 
 
@@ -105,7 +105,7 @@ def limit_table(plan: AssemblyPlan, tolerances: AngularTolerances) -> pd.DataFra
 
 _CERTIFICATES: tuple[Column[tuple[str, AngularAllocation]], ...] = (
     Column(header="allocation", value=lambda row: row[0]),
-    Column(header=PRECISION, value=lambda row: row[1].gains.precision),
+    Column(header=PRECISION, value=lambda row: row[1].gains.state_weight),
     Column(header="tolerances [{cost}]", value=lambda row: row[1].cost),
     Column(header="effort [{cost}]", value=lambda row: row[1].effort_cost),
     Column(header="total [{cost}]", value=lambda row: row[1].total),
@@ -119,40 +119,40 @@ def certificate_table(plan: AssemblyPlan, tolerances: AngularTolerances) -> pd.D
     return tabulated("certificates", _CERTIFICATES, list(allocations(plan, tolerances).items()))
 
 
-def precision_table(tolerances: AngularTolerances) -> pd.DataFrame:
+def state_weight_table(tolerances: AngularTolerances) -> pd.DataFrame:
     """Return costs over the precision."""
-    found = tolerances.by_precision
+    found = tolerances.by_state_weight
     columns = (
-        of_rows(PRECISION, found.precisions),
+        of_rows(PRECISION, found.state_weights),
         of_rows("tolerances [{cost}]", found.cost),
         of_rows("effort [{cost}]", found.effort_cost),
         of_rows("total [{cost}]", found.total),
     )
-    return tabulated("cost by precision", columns, range(found.precisions.size))
+    return tabulated("cost by precision", columns, range(found.state_weights.size))
 
 
 def cost_sentences(plan: AssemblyPlan, tolerances: AngularTolerances) -> tuple[str, ...]:
     """Return what the cheapest tolerances cost, with and without adjusting."""
-    adjusted, best, found = tolerances.adjusted, tolerances.retuned.best, tolerances.by_precision
+    adjusted, best, found = tolerances.adjusted, tolerances.retuned.best, tolerances.by_state_weight
     without = (
         _say("no_tolerances_unadjusted")
         if isinstance(tolerances.unadjusted, str)
         else _say("cost_unadjusted", total=tolerances.unadjusted.total)
     )
-    share, verified = tolerances.verification.share, tolerances.verified.gains.precision
+    share, verified = tolerances.verification.share, tolerances.verified.gains.state_weight
     which = {"adjusted": "of_adjusted", "re-tuned": "of_retuned", "best precision": "of_best"}
     priced = _say(
         "cost_best" if found.interior else "cost_best_at_end",
-        best=found.best.gains.precision,
+        best=found.best.gains.state_weight,
         total=found.best.total,
         adjusted=adjusted.total,
-        precision=plan.precision,
+        precision=plan.state_weight,
     )
     return (
         _say(
             "cost_adjusted",
             total=adjusted.total,
-            precision=adjusted.gains.precision,
+            precision=adjusted.gains.state_weight,
             without=without,
             bound=adjusted.bound,
             gap=max(adjusted.gap, 0.0),
@@ -196,18 +196,18 @@ def tolerance_section(plan: AssemblyPlan, tolerances: AngularTolerances) -> Sect
             ("angular tolerances", tolerance_table(plan, tolerances)),
             ("limits", limit_table(plan, tolerances)),
             ("certificates", certificate_table(plan, tolerances)),
-            ("cost by precision", precision_table(tolerances)),
+            ("cost by precision", state_weight_table(tolerances)),
         ),
     )
 
 
 def _cost_figure(plan: AssemblyPlan, tolerances: AngularTolerances) -> Figure:
     """Return what tolerances and effort cost over the precision."""
-    found = tolerances.by_precision
+    found = tolerances.by_state_weight
     known = np.isfinite(found.total)
     costs = {"tolerances": found.cost, "effort": found.effort_cost, "both": found.total}
     priced, best = is_priced(plan), found.best
-    least = Series(label="least of both", kind="points", x=[best.gains.precision], y=[best.total])
+    least = Series(label="least of both", kind="points", x=[best.gains.state_weight], y=[best.total])
     return Figure(
         name="cost",
         title=_say("cost_figure"),
@@ -215,7 +215,7 @@ def _cost_figure(plan: AssemblyPlan, tolerances: AngularTolerances) -> Figure:
         y_label="cost [cost units]",
         series=(
             *(
-                Series(label=label, kind="line", x=list(found.precisions[known]), y=list(values[known]))
+                Series(label=label, kind="line", x=list(found.state_weights[known]), y=list(values[known]))
                 for label, values in costs.items()
                 if priced or label == "tolerances"
             ),

@@ -38,7 +38,7 @@ _EVERY = 4
 _say = Sentences("assembly")
 
 
-def answers(effect: TransmissionEffect, output: str) -> Float[np.ndarray, "precision good"]:
+def answers(effect: TransmissionEffect, output: str) -> Float[np.ndarray, "state_weight good"]:
     """Return an output of all assemblies that have an answer at every precision."""
     return effect.values[:, effect.good, effect.outputs.index(output)]
 
@@ -50,7 +50,7 @@ def perfect(effect: TransmissionEffect, output: str) -> float:
 
 def change(effect: TransmissionEffect, output: str, precision: float) -> tuple[float, float]:
     """Return an output unadjusted and at a solved precision [-], medians of random assemblies [as the name says]."""
-    at = int(np.flatnonzero(effect.precisions == precision)[0])
+    at = int(np.flatnonzero(effect.state_weights == precision)[0])
     before, after = np.median(answers(effect, output)[[0, at]], axis=1)
     return float(before), float(after)
 
@@ -69,7 +69,7 @@ def risen(effect: TransmissionEffect, precision: float) -> tuple[str, ...]:
 
 def value_table(effect: TransmissionEffect) -> pd.DataFrame:
     """Return every output over the precision, the median of random assemblies."""
-    names = ["perfect parts", *(f"{precision:g}" for precision in effect.precisions)]
+    names = ["perfect parts", *(f"{precision:g}" for precision in effect.state_weights)]
     columns = (
         of_rows(PRECISION, names),
         *(
@@ -83,14 +83,14 @@ def value_table(effect: TransmissionEffect) -> pd.DataFrame:
 def difference_table(effect: TransmissionEffect) -> pd.DataFrame:
     """Return by how much the outputs of that table are above those of perfect parts; a mean angle has no zero."""
 
-    def above(output: str) -> Float[np.ndarray, " precision"]:
+    def above(output: str) -> Float[np.ndarray, " state_weight"]:
         return np.asarray(100 * (np.median(answers(effect, output), axis=1) / perfect(effect, output) - 1))
 
     columns = (
-        of_rows(PRECISION, effect.precisions),
+        of_rows(PRECISION, effect.state_weights),
         *(of_rows(f"{output.split(' [')[0]}, above perfect parts [%]", above(output)) for output in _counted(effect)),
     )
-    return tabulated("above perfect parts", columns, range(effect.precisions.size))
+    return tabulated("above perfect parts", columns, range(effect.state_weights.size))
 
 
 def fallen_table(effect: TransmissionEffect) -> pd.DataFrame | None:
@@ -98,18 +98,18 @@ def fallen_table(effect: TransmissionEffect) -> pd.DataFrame | None:
     if effect.good.size == 1:
         return None
 
-    def smaller(output: str) -> Float[np.ndarray, " precision"]:
+    def smaller(output: str) -> Float[np.ndarray, " state_weight"]:
         values = answers(effect, output)
         return np.asarray(100 * (values[1:] < values[0]).mean(axis=1))
 
     columns = (
-        of_rows(PRECISION, effect.precisions[1:]),
+        of_rows(PRECISION, effect.state_weights[1:]),
         *(
             of_rows(f"{output.split(' [')[0]}, smaller than unadjusted [%]", smaller(output))
             for output in _counted(effect)
         ),
     )
-    return tabulated("smaller than unadjusted", columns, range(effect.precisions.size - 1))
+    return tabulated("smaller than unadjusted", columns, range(effect.state_weights.size - 1))
 
 
 def _counted(effect: TransmissionEffect) -> tuple[str, ...]:
@@ -119,7 +119,7 @@ def _counted(effect: TransmissionEffect) -> tuple[str, ...]:
 
 def transmission_sentences(effect: TransmissionEffect, precision: float) -> tuple[str, str]:
     """Return what adjusting gains: the line load, and outputs that need not follow the angles."""
-    at, single = int(np.flatnonzero(effect.precisions == precision)[0]), effect.good.size == 1
+    at, single = int(np.flatnonzero(effect.state_weights == precision)[0]), effect.good.size == 1
 
     def said(output: str) -> str:
         values, (before, after) = answers(effect, output), change(effect, output, precision)
@@ -169,7 +169,7 @@ def transmission_section(effect: TransmissionEffect, precision: float, *, measur
         ),
         figures=(
             *curve_figures(effect),
-            *precision_figures(effect),
+            *state_weight_figures(effect),
             pressure_map(effect, precision),
             deformation_figure(effect),
         ),
@@ -185,7 +185,7 @@ def curve_figures(effect: TransmissionEffect) -> tuple[Figure, Figure]:
     """Return transmission error and pin force of a disc over the carrier angle."""
     angle = effect.curves.carrier_angle
     shown = angle <= _CRANK_TURNS * 2 * np.pi / effect.reducer.cycloid_stage.disc_teeth
-    labels = ("perfect parts", *(f"Q = {precision:g}" for precision in effect.precisions))
+    labels = ("perfect parts", *(f"Q = {precision:g}" for precision in effect.state_weights))
     both = (effect.perfect_curves, effect.curves)
     force = np.concatenate([each.disc_force for each in both])
     error = np.concatenate([each.transmission_error for each in both]) / ARCSECOND
@@ -215,12 +215,12 @@ def curve_figures(effect: TransmissionEffect) -> tuple[Figure, Figure]:
     )
 
 
-def precision_figures(effect: TransmissionEffect) -> tuple[Figure, ...]:
+def state_weight_figures(effect: TransmissionEffect) -> tuple[Figure, ...]:
     """Return largest values over the precision."""
-    return tuple(_over_precision(effect, name, output) for name, output in DRAWN.items())
+    return tuple(_over_state_weight(effect, name, output) for name, output in DRAWN.items())
 
 
-def _over_precision(effect: TransmissionEffect, name: str, output: str) -> Figure:
+def _over_state_weight(effect: TransmissionEffect, name: str, output: str) -> Figure:
     values, many = answers(effect, output), effect.good.size > 1
     low, high = (list(edge) for edge in np.percentile(values, BAND, axis=1)) if many else ((), ())
     label = _say("band" if many else "single", low=BAND[0], high=BAND[1])
@@ -234,7 +234,7 @@ def _over_precision(effect: TransmissionEffect, name: str, output: str) -> Figur
             Series(
                 label=label,
                 kind="line",
-                x=list(effect.precisions),
+                x=list(effect.state_weights),
                 y=list(np.median(values, axis=1)),
                 low=low,
                 high=high,
@@ -248,7 +248,7 @@ def pressure_map(effect: TransmissionEffect, precision: float) -> HeatMap:
     """Return the pressure along the pins that carry, unadjusted above adjusted at a solved precision [-]."""
     chosen = [(0.0, effect.patterns[0])]
     if precision > 0:
-        chosen.append((precision, effect.patterns[int(np.flatnonzero(effect.precisions == precision)[0])]))
+        chosen.append((precision, effect.patterns[int(np.flatnonzero(effect.state_weights == precision)[0])]))
     rows = [(value, pattern, pin) for value, pattern in chosen for pin in np.flatnonzero(pattern.force)]
     first = effect.patterns[0]
     return HeatMap(
@@ -276,6 +276,6 @@ def deformation_figure(effect: TransmissionEffect) -> Figure:
                 x=(np.flatnonzero(pattern.force) + 1).tolist(),
                 y=list(pattern.deformation[pattern.force > 0] / MICROMETRE),
             )
-            for precision, pattern in zip(effect.precisions, effect.patterns, strict=True)
+            for precision, pattern in zip(effect.state_weights, effect.patterns, strict=True)
         ),
     )
