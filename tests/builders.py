@@ -27,6 +27,7 @@ from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import TolallocError
 from tolalloc.models.model import Evaluation
 from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reports.wording import number
 from tolalloc.study.prepared import Prepared
 
 
@@ -121,7 +122,7 @@ def says(prose: str | Iterable[str], sentence: str, **gaps: object) -> bool:
     for words, gap, form, _ in Formatter().parse(" ".join(tomllib.loads(text)[key].split())):
         pattern += re.escape(words)
         if gap is not None:
-            pattern += re.escape(format(gaps[gap], form or "")) if gap in gaps else ".*"
+            pattern += re.escape(number(gaps[gap], form or "")) if gap in gaps else ".*"
     return any(re.search(pattern, own) for own in ([prose] if isinstance(prose, str) else prose))
 
 

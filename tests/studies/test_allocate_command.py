@@ -17,6 +17,7 @@ from tolalloc.allocation.cost.process_costs import load_process_costs
 from tolalloc.cli.run import allocate
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import TolallocError
+from tolalloc.reports.wording import with_unit
 
 KEPT = ("housing.pitch", "housing.runout", "disc1.pitch", "disc2.pitch", "pin.diameter")
 PROCESSES = """sources,process,model,fixed [cost units],factor,min [µm],max [µm],note
@@ -261,13 +262,13 @@ def test_a_limit_out_of_reach_has_an_answer_with_what_blocks_and_by_how_much(tmp
     answer = json.loads(result.stdout)["allocation"]
     assert answer["met"] is False
     assert answer["blocking requirement"] == blocking
-    beyond = answer["beyond its limit by [unit of the output]"]
+    beyond = answer[f"beyond its limit by [{unit}]"]
     assert beyond > 0
     (said,) = [warning for warning in answer["warnings"] if warning.startswith("No design was verified")]
-    assert f"{beyond:.3g} {unit} beyond" in said
+    assert f"{with_unit(f'{beyond:.3g}', blocking)} beyond" in said
     assert all(math.isfinite(number) for number in numbers(answer))
     page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
-    assert "a tighter one costs" not in page
+    assert "tighter costs" not in page
 
 
 @pytest.mark.parametrize(

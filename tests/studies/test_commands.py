@@ -99,7 +99,7 @@ def test_check_says_what_is_read_and_that_the_drawing_cannot_be_built():
     result = tolalloc("check", STUDY)
     assert result.returncode == 0
     assert "is in order" not in result.stdout
-    assert "100.0%" in result.stdout.splitlines()[-1]
+    assert "100.0 %" in result.stdout.splitlines()[-1]
     assert "σ =" in result.stdout
     # Rows that say the same stand in one line, others do not; the zones of the shipped table cost what they add up to.
     (rows,) = (line for line in result.stdout.splitlines() if line.strip().startswith("disc*.pitch"))

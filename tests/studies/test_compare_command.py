@@ -118,7 +118,7 @@ def test_rankings_with_a_lower_limit_alone_are_compared(tmp_path):
     result = tolalloc("compare", *runs)
     assert result.returncode == 0, result.stderr
     said = " ".join(result.stdout.split())
-    assert "99.87%" in said and " 150 N·m/arcmin" in said
+    assert "99.87 %" in said and " 150 N·m/arcmin" in said
 
 
 def test_a_source_of_one_run_alone_is_shown(runs):

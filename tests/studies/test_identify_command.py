@@ -25,6 +25,7 @@ from tests.studies.bench_files import (
 )
 from tests.studies.command import refused, tolalloc
 from tolalloc.reducers.reducer.files import load_identified_stiffness
+from tolalloc.reports.wording import number
 
 
 @dataclass(frozen=True)
@@ -201,7 +202,7 @@ def test_weak_data_leave_the_stiffness_open_and_say_so(peak_to_peaks, tmp_path):
     result = identify(peak_to_peaks, "--out", report, "--write", file)
     assert result.returncode == 0, result.stderr
     low, high = START / 2, START * 2
-    assert f"{low:.4g}…{high:.4g} N/m" in result.stdout
+    assert f"{number(low, '.4g')} to {number(high, '.4g')} N/m" in result.stdout
     answer = json.loads((report / "summary.json").read_text(encoding="utf-8"))
     (found,) = answer["parameters"]
     assert found["identified"] is False

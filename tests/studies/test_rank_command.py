@@ -71,7 +71,7 @@ def test_the_report_is_complete(ranked):
         "Yield and capability",
         "What drives the units out of the limit",
         "How far each zone may open alone",
-        "Stand-ins for the model",
+        "Surrogates of the model",
         "From zone to distribution",
     ):
         assert heading in page

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.builders import says
 from tolalloc.assembly.adjustment import AssemblyRequest, AssemblyResult, assemble
 from tolalloc.assembly.files import load_plan
 from tolalloc.assembly.gains import assembled, tuned_gains
@@ -185,7 +186,7 @@ def test_what_is_to_be_expected_is_said_with_the_noise(expected):
     before, after, floor = (value / ARCSECOND for value in (sweep.total[0], sweep.total[at], sweep.noise_floor))
     sentence = answer(expected).sentences[0]
     assert f"leave {before:.2f}″ rms of all final angles unadjusted, {after:.2f}″ adjusted" in sentence
-    assert f"however large the precision, this plan leaves {floor:.2f}″" in sentence
+    assert f"however large Q, this plan leaves {floor:.2f}″" in sentence
     assert "noise" not in sentence
 
 
@@ -196,12 +197,12 @@ def text(results: AssemblyResult, heading: str) -> str:
 
 def test_where_another_unit_of_precision_buys_little_is_said(expected):
     found = expected.sweep.diminished()
-    assert f"From a precision of {found:g} on, another unit takes less than 1%" in said(expected)
+    assert says(said(expected), "assembly.diminished", found=found, little=0.01)
 
 
 def test_a_sweep_that_does_not_reach_diminishing_returns_says_so(expected):
     sweep = replace(expected.sweep, next_unit=np.full_like(expected.sweep.next_unit, 0.25))
-    assert "another unit still takes off 25.0%" in said(replace(expected, sweep=sweep))
+    assert says(said(replace(expected, sweep=sweep)), "assembly.not_diminished", share=0.25)
 
 
 @pytest.mark.slow
@@ -222,7 +223,7 @@ def test_random_assemblies_are_counted(expected):
 def test_costs_are_said_with_and_without_adjusting(expected):
     tolerances = expected.tolerances
     assert (
-        f"{tolerances.adjusted.total:.2f} cost units with adjusting at a precision of 5, "
+        f"{tolerances.adjusted.total:.2f} cost units with adjusting at Q = 5, "
         f"{tolerances.unadjusted.total:.2f} without adjusting"
     ) in said(expected)
 
@@ -238,22 +239,22 @@ def test_the_gain_of_a_tuned_filter_is_said_with_the_reach_of_its_proof(expected
     tolerances = expected.tolerances
     saving = 1 - tolerances.retuned.best.total / tolerances.adjusted.total
     assert saving > 0
-    assert f"brings them to {tolerances.retuned.best.total:.2f}, {saving:.1%} less." in said(expected)
+    assert says(said(expected), "assembly.cost_retuned", total=tolerances.retuned.best.total, less=saving)
     assert any("that no other filter allows cheaper ones is not proven" in warning for warning in warnings(expected))
 
 
 def test_the_share_of_random_assemblies_within_all_limits_is_said(expected):
     share = expected.tolerances.verification.share
     best = expected.tolerances.verified.gains.state_weight
-    which = f"the tolerances for the best precision of {best:.4g}"
+    which = f"the tolerances for the best state weight, Q = {best:.4g}"
     assert expected.tolerances.verified is expected.tolerances.by_state_weight.best
-    assert f"Of 2000 random assemblies with {which}, {share.estimate:.2%} are" in said(expected)
+    assert says(said(expected), "assembly.verified", assemblies=2000, which=which, share=share.estimate)
 
 
 @pytest.mark.slow
 def test_the_tolerances_of_the_tuned_filter_are_verified_where_effort_has_no_price(plan):
     free = run(replace(plan, requirements=replace(plan.requirements, effort_price=0.0)))
-    assert "random assemblies with the tolerances of the tuned filter at a precision of 5, " in said(free)
+    assert "random assemblies with the tolerances of the tuned filter at Q = 5, " in said(free)
     assert "verified, re-tuned, 3σ [arcsec]" in tolerance_tables.limit_table(free.plan, free.tolerances)
     assert "Verified is “re-tuned”." in text(free, "Angular tolerances")
 
@@ -261,8 +262,8 @@ def test_the_tolerances_of_the_tuned_filter_are_verified_where_effort_has_no_pri
 def test_a_filter_that_gains_nothing_when_tuned_has_no_row_and_no_column(expected):
     first = replace(expected.tolerances.retuned, allocations=(expected.tolerances.adjusted,))
     same = replace(expected, tolerances=replace(expected.tolerances, retuned=first, verified=first.best))
-    assert "Tuning the filter to what is allocated gains nothing here." in said(same)
-    assert "random assemblies with the tolerances for a precision of 5, " in said(same)
+    assert "Tuning the filter to the allocated tolerances gains nothing here." in said(same)
+    assert "random assemblies with the tolerances for Q = 5, " in said(same)
     document = answer(same).document
     assert "re-tuned" not in " ".join([*document.warnings, *document.answer])
     for _, frame in document.sections[-1].tables:
@@ -280,10 +281,10 @@ def test_steps_that_turn_parts_that_are_not_there_are_warned_of(expected, plan):
 @pytest.mark.slow
 def test_the_best_precision_is_said_only_where_effort_has_a_price(expected, plan):
     best = expected.tolerances.by_state_weight.best
-    assert f"a precision of {best.gains.state_weight:.4g}" in said(expected)
+    assert f"Q = {best.gains.state_weight:.4g}" in said(expected)
     assert "best precision" in set(tolerance_tables.certificate_table(plan, expected.tolerances)["allocation"])
     free = run(replace(plan, requirements=replace(plan.requirements, effort_price=0.0)))
-    assert "With effort priced" not in said(free)
+    assert "With a price for turning" not in said(free)
     assert "best precision" not in set(tolerance_tables.certificate_table(free.plan, free.tolerances)["allocation"])
 
 
@@ -404,9 +405,9 @@ def test_a_limit_is_in_doubt_where_what_the_turns_miss_reaches_beyond_it(measure
 def test_measured_parts_that_miss_limits_are_told_what_keeps_them(measured):
     asked = limited(measured, 0.01)
     keeping = replace(asked, measured=replace(asked.measured, keeping=446.68))
-    assert any("Turned as listed for a precision of 446.7, they keep them all." in each for each in warnings(keeping))
+    assert any("Turned as listed for Q = 446.7, they keep them all." in each for each in warnings(keeping))
     never = replace(asked, measured=replace(asked.measured, keeping=None))
-    assert any("No precision that was tried keeps them all." in each for each in warnings(never))
+    assert any("No state weight that was tried keeps them all." in each for each in warnings(never))
     assert summary(keeping)["measured"]["smallest precision tried that keeps all limits [-]"] == 446.68
 
 
@@ -438,7 +439,7 @@ def test_turning_fewer_parts_is_advised_only_where_it_leaves_less(expected):
 
 
 def test_what_a_larger_precision_buys_is_said_of_the_sweep_itself(expected):
-    falls, heading = "the larger Q, the smaller what is to be expected", "Precision against effort"
+    falls, heading = "a larger Q makes all expected angles together smaller", "State weight against effort"
     sweep = replace(
         expected.sweep,
         total=np.linspace(3, 2, expected.sweep.total.size) * ARCSECOND,
@@ -453,15 +454,15 @@ def test_what_a_larger_precision_buys_is_said_of_the_sweep_itself(expected):
     rising = replace(expected, sweep=replace(sweep, total=total))
     assert falls not in text(rising, heading)
     assert f"Q = {sweep.state_weights[3]:g} leaves least of all angles together, 1.00″ rms" in text(rising, heading)
-    assert "None of 6 tilts and rotations are larger than unadjusted at Q = 5." in text(expected, heading)
+    assert "At Q = 5, none of 6 tilts and rotations are larger than unadjusted." in text(expected, heading)
 
 
 def test_a_unit_of_precision_that_adds_is_not_said_to_take_off(expected):
     sweep = replace(expected.sweep, next_unit=np.full_like(expected.sweep.next_unit, -0.2))
     added = said(replace(expected, sweep=sweep))
-    assert "From a precision of 0 on, another unit takes less than 1% off" in added
-    assert "all final angles, and at 0 it adds to it." in added
-    assert "adds" not in said(replace(expected, sweep=replace(sweep, next_unit=-sweep.next_unit * 0.01)))
+    assert says(added, "assembly.diminished", found=0.0, little=0.01)
+    assert "and from Q = 0 on it increases them." in added
+    assert "increases them" not in said(replace(expected, sweep=replace(sweep, next_unit=-sweep.next_unit * 0.01)))
 
 
 @pytest.mark.slow
@@ -592,7 +593,7 @@ def test_a_report_without_reducer_and_limits_leaves_their_sections_out(plan):
     document = answer(run(replace(plan, requirements=None))).document
     assert [section.heading for section in document.sections] == [
         "How errors build up and are adjusted",
-        "Precision against effort",
+        "State weight against effort",
     ]
     assert "the base is rigid" in document.assumptions
 

@@ -61,8 +61,8 @@ def test_two_limits_have_a_quantile_each():
     above, below = found.result.quantile_changes  # 2 % of the units beyond either
     assert above.low < narrower < above.high < 0.0
     assert 0.0 < below.low < -narrower < below.high
-    assert [own.split("%")[0] for own in found.tables["changes"]["what"]][2:] == ["98", "2"]
-    for share in ("98%", "2%"):
+    assert [own.split(" %")[0] for own in found.tables["changes"]["what"]][2:] == ["98", "2"]
+    for share in ("98 %", "2 %"):
         assert says(found.sentences[1], "difference.quantile", share=share, output="gap")
 
 

@@ -60,7 +60,7 @@ def test_cases_keep_their_word():
 
 
 def test_a_slope_that_leads_away_fools_subset_simulation_and_is_noticed():
-    """Runs of few samples find the region that is a hundred times less likely; widened sampling finds the other."""
+    """Runs of few samples find the region that is a hundred times rarer; scaled-sigma sampling finds the other."""
     case = breitung(2)
     fooled = [
         (levels, seed)
@@ -109,7 +109,7 @@ def test_a_check_that_stops_is_a_caution():
     levels = subset_simulation(case, SeedTree(0), samples=1000, runs=3)
     found = judged(random_units(case, SeedTree(0), 1000), levels, SolveError("Too many failed."))
     assert found.estimate.probability == levels.probability
-    assert "not checked; widened sampling stopped: Too many failed" in found.verdict
+    assert "not checked; scaled-sigma sampling stopped: Too many failed" in found.verdict
     assert not found.estimate.trustworthy
 
 

@@ -107,7 +107,7 @@ def test_parts_per_million_by_two_methods(kind, limit, exact, seed):
     for item in found.estimates[1:]:
         assert abs(item.probability - exact) <= 3.5 * item.standard_error
         assert item.coefficient_of_variation < 0.25
-    assert found.verdict.startswith("Rely on it: subset simulation and widened sampling differ by")
+    assert found.verdict.startswith("Rely on it: subset simulation and scaled-sigma sampling differ by")
     assert (found.estimate.method, found.estimate.calls) == (METHOD, found.calls)
     assert abs(found.estimate.probability - exact) <= 3.5 * found.estimate.standard_error
     assert found.parts_per_million.low < found.parts_per_million.estimate < found.parts_per_million.high
@@ -130,7 +130,7 @@ def test_widened_sampling_states_its_own_spread():
 def test_limit_beyond_reach_leaves_the_upper_end_of_the_random_units():
     limit = limited(Sum, ErrorModel((source("s", distribution=Distribution.UNIFORM),)), 3.5)
     found = yield_at_limit(limit, units_of(limit, 0, 5000), samples=200, runs=2)
-    assert "neither subset simulation nor widened sampling met a failure" in found.verdict
+    assert "neither subset simulation nor scaled-sigma sampling met a failure" in found.verdict
     assert found.estimate.method == "Monte Carlo"
     assert found.interval.high == 1.0
     assert found.interval.low == proportion(5000, 0).low

@@ -150,6 +150,6 @@ def test_figures_show_as_many_pin_passes_as_asked():
 def test_the_document_names_its_load_and_engine():
     document = told(results()).document
     assert "525 rpm" in document.subtitle
-    assert "-572 N·m" in document.subtitle
+    assert "−572 N·m" in document.subtitle
     assert document.summary["in motion"]["engine"] == "newmark"
     assert [figure.name for figure in document.sections[1].figures][-1] == "contacts"

@@ -108,7 +108,7 @@ def _subset_run(counted: CountedLimitState, generator: np.random.Generator, samp
     return run_of(levels, chains, chains.values < 0, samples, caution)
 
 
-_SCALED = "Widened sampling"
+_SCALED = "Scaled-sigma sampling"
 _WIDER = 1.25
 _LARGEST_WIDTH = 8.0
 _SOUGHT_SHARE = 0.15
@@ -124,7 +124,7 @@ _FAILING = float(np.nextafter(0.0, -1.0))
 
 @dataclass(frozen=True, kw_only=True)
 class ScaledSigmaEstimate(ChainedEstimate):
-    """What widened sampling found, and what it can see of known failures."""
+    """What scaled-sigma sampling found, and what it can see of known failures."""
 
     seen_share: (
         float  # Share of the known failing states that fail at every width of the runs too, 1 if none is known [-]
@@ -139,7 +139,7 @@ def scaled_sigma_sampling(
     largest_failed_share: float = 0.01,
     known: Float[np.ndarray, "state variable"] | None = None,
 ) -> ScaledSigmaEstimate:
-    """Return the probability of failure from one or several independent runs of widened sampling.
+    """Return the probability of failure from one or several independent runs of scaled-sigma sampling.
 
     Parameters
     ----------

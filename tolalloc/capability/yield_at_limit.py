@@ -30,7 +30,7 @@ from tolalloc.capability.rare_failure import MOST_KNOWN, ScaledSigmaEstimate, sc
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 
-METHOD = "Subset simulation and widened sampling"
+METHOD = "Subset simulation and scaled-sigma sampling"
 FEWEST_BEYOND = 30
 """Random units beyond the limit from which they decide alone: chance does not halve or double so many [-]."""
 RARE = 1e-3
@@ -42,7 +42,7 @@ FACTOR_IN_DOUBT = 2.0
 _SMALLEST_CHANCE = 0.005
 """Chance of the count of random units below which it contradicts an estimate [-]."""
 _VAGUE = 0.5
-"""Coefficient of variation from which too small an estimate of widened sampling says nothing [-]."""
+"""Coefficient of variation from which too small an estimate of scaled-sigma sampling says nothing [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +81,7 @@ def agreement(
     seeds
         Node of the seed tree.
     samples, scaled
-        Samples of each level of subset simulation and of each width of widened sampling, multiples of 10 [-].
+        Samples of each level of subset simulation and of each width of scaled-sigma sampling, multiples of 10 [-].
     runs
         Independent runs of either method [-].
     largest_failed_share
@@ -131,13 +131,14 @@ def agreement(
 
 
 def judged(plain: RareFailure, levels: ChainedEstimate, scaled: ScaledSigmaEstimate | SolveError) -> Agreement:
-    """Return what three independent estimates agree on; widened sampling may have stopped with an error.
+    """Return what three independent estimates agree on; scaled-sigma sampling may have stopped with an error.
 
     Notes
     -----
-    Widened sampling sees a share q of subset simulation's failures. Where it found less, P_w/q up to P_s is compared;
-    half of that correction, in its logarithm, counts as its standard error. The mean is weighted by the inverse squares
-    of the coefficients of variation, and its error grows with the difference, as is usual for measured constants.
+    Scaled-sigma sampling sees a share q of subset simulation's failures. Where it found less, P_w/q up to P_s is
+    compared; half of that correction, in its logarithm, counts as its standard error. The mean is weighted by the
+    inverse squares of the coefficients of variation, and its error grows with the difference, as is usual for measured
+    constants.
     Beyond three standard errors of the difference the larger estimate stands, because what misses a region gives too
     little.
 
@@ -171,7 +172,7 @@ def judged(plain: RareFailure, levels: ChainedEstimate, scaled: ScaledSigmaEstim
         few = f"{plain.effective_samples:.0f} of them lie beyond the limit where other methods meet none"
         plain = replace(plain, cautions=plain.cautions + (few,) * bool(plain.probability))
         reliance = "Do not rely on the random units" if plain.cautions else "Rely on the random units alone"
-        said = "; ".join(("neither subset simulation nor widened sampling met a failure", *plain.cautions))
+        said = "; ".join(("neither subset simulation nor scaled-sigma sampling met a failure", *plain.cautions))
         return Agreement(estimate=plain, estimates=(plain, *methods), verdict=f"{reliance}: {said}.")
     common = _common(levels, scaled)
     doubts = common.doubts
@@ -211,31 +212,33 @@ class _Common:
 
 
 def _common(levels: ChainedEstimate, scaled: ScaledSigmaEstimate | SolveError) -> _Common:
-    """Return what subset simulation and widened sampling say together, unless neither met a failure."""
+    """Return what subset simulation and scaled-sigma sampling say together, unless neither met a failure."""
     alone = partial(_Common, probability=levels.probability, error=levels.standard_error)
     if isinstance(scaled, SolveError):
-        return alone(found="subset simulation is not checked", doubts=(f"widened sampling stopped: {scaled}"[:-1],))
+        return alone(
+            found="subset simulation is not checked", doubts=(f"scaled-sigma sampling stopped: {scaled}"[:-1],)
+        )
     seen = scaled.seen_share
     if not levels.probability:
         return _Common(
             probability=scaled.probability,
             error=scaled.standard_error,
-            found="widened sampling alone met failures",
+            found="scaled-sigma sampling alone met failures",
             doubts=("subset simulation met none",),
         )
     if scaled.probability < levels.probability and scaled.coefficient_of_variation > _VAGUE:
         if not any(run.levels[0].share for run in scaled.runs):
-            return alone(found="widened sampling met no failure at any width, so no other broad region")
-        found = f"widened sampling can see {seen:.0%} of the failures and says nothing definite"
+            return alone(found="scaled-sigma sampling met no failure at any width, so no other broad region")
+        found = f"scaled-sigma sampling can see {100 * seen:.0f} % of the failures and says nothing definite"
         return alone(found=found, doubts=("it lost failures on the way",) * (seen > 0.5))
-    # What widened sampling cannot see explains at most that it found less.
+    # What scaled-sigma sampling cannot see explains at most that it found less.
     explained = scaled.probability / seen if seen else np.inf
     corrected = max(scaled.probability, min(explained, levels.probability))
     own, chance = levels.coefficient_of_variation, (1 - seen) / max(seen * MOST_KNOWN, 1.0)
     halved = float(np.log(corrected / scaled.probability)) / 2
     other = float(np.sqrt(scaled.coefficient_of_variation**2 + chance + halved**2))
     apart = abs(float(np.log(levels.probability / corrected))) / float(np.hypot(own, other))
-    found = f"subset simulation and widened sampling differ by {apart:.1f} standard errors"
+    found = f"subset simulation and scaled-sigma sampling differ by {apart:.1f} standard errors"
     if apart > LARGEST_DIFFERENCE:
         larger = max(levels, scaled, key=lambda item: item.probability)
         half = abs(levels.probability - scaled.probability) / 2
@@ -317,7 +320,7 @@ def yield_at_limit(
         Random units whose first output is the limited one; they decide alone if 30 or more exceed the limit, units
         without an answer included.
     samples, scaled
-        Samples of each level of subset simulation and of each width of widened sampling, multiples of 10 [-].
+        Samples of each level of subset simulation and of each width of scaled-sigma sampling, multiples of 10 [-].
     runs
         Independent runs of either, two or more [-].
 

@@ -48,6 +48,8 @@ class Portrait(Generic[Own]):
 
     kind: ClassVar[str] = "model"
     """What a summary calls such a model."""
+    simulated: ClassVar[str] = "simulated units"
+    """What a sentence calls random units that the model solved."""
     settings_word: ClassVar[str] = "settings"
     """What a sentence calls all settings together."""
     uncertain_name: ClassVar[str] = "not known of the model"

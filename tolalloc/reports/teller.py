@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.header import Header
+from tolalloc.reports.wording import quantity, with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,7 +44,8 @@ class Teller(ABC, Generic[Result]):
     @property
     def subtitle(self) -> str:
         """Under which conditions it holds."""
-        return ", ".join(f"{name} {value:g}" for name, value in self.header.conditions.items() if name != "unit")
+        conditions = ((name, value) for name, value in self.header.conditions.items() if name != "unit")
+        return ", ".join(f"{quantity(name)} {with_unit(f'{value:g}', name)}" for name, value in conditions)
 
     @property
     @abstractmethod

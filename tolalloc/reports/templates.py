@@ -1,7 +1,7 @@
 """The sentences of reports: texts with named gaps in TOML files, which are mended without reading Python.
 
-A gap is written as Python's ``str.format`` has it, ``{share:.2%}``; which sentence is said, and what fills its gaps,
-is the teller's.
+A gap is written as Python's ``str.format`` has it, ``{share:.2%}``, and its number is said as `wording.number` says it;
+which sentence is said, and what fills its gaps, is the teller's.
 """
 
 from __future__ import annotations
@@ -12,6 +12,9 @@ from functools import lru_cache
 from importlib.resources import files
 from typing import Any
 
+from tolalloc.reports.wording import Spoken
+
+_SPOKEN = Spoken()
 _BLANKS = re.compile(r"[ \n]+")
 """Where a line of a text may be broken; a thin or a protected blank stays as it is."""
 
@@ -34,4 +37,4 @@ class Sentences:
 
     def __call__(self, key: str, /, **gaps: Any) -> str:
         """Return a sentence with its gaps filled; a key or gap that is missing is the teller's fault, a KeyError."""
-        return _texts(self._name)[key].format(**gaps)
+        return _SPOKEN.format(_texts(self._name)[key], **gaps)

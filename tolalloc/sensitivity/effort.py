@@ -104,7 +104,7 @@ class RankingEffort(NamedFields):
     level_units
         Units of a level of the subset simulation, for limits that are rarely exceeded [-].
     level_runs
-        Runs of it, and of the widened sampling that checks it [-].
+        Runs of it, and of the scaled-sigma sampling that checks it [-].
     widened_units
         Units of a width of that sampling [-].
     permutations

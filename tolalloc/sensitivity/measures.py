@@ -173,7 +173,7 @@ class Measures:
         )
 
     def choice(self, sample: MonteCarlo) -> Choice:
-        """Return which stand-in has earned its place on the first units of a sample."""
+        """Return which surrogate has earned its place on the first units of a sample."""
         columns, outputs = self.response.columns, self.response.outputs
         candidates: list[Candidate] = list(self.model.stand_ins()) if self.leading == self.model.outputs[0] else []
         if len(columns) <= _MOST_COLUMNS or not candidates:

@@ -125,7 +125,7 @@ class Difference(Question):
 
 @dataclass(frozen=True, kw_only=True)
 class Allocation(Question):
-    """The cheapest drawing that keeps every limit, verified on fresh units.
+    """The cheapest drawing that keeps every limit, verified on an independent sample.
 
     Parameters
     ----------

@@ -73,9 +73,9 @@ class AllocationEffort(NamedFields):
     Parameters
     ----------
     verification_units
-        Fresh units per design of a search [-].
+        Independent units per design of a search [-].
     confirmation_units
-        Largest number of fresh units that are solved to confirm a design in the end; the more, the nearer it lies to
+        Most independent units that are solved to confirm a design in the end; the more, the nearer it is to
         its limits [-].
     shared_units
         Common random units of the quantile surrogate [-].
@@ -90,7 +90,7 @@ class AllocationEffort(NamedFields):
     changed_costs
         Random corners of the box in which every cost is wrong [-].
     changed_stiffnesses, stiffness_units
-        Stiffnesses drawn from what is not known of them, and fresh units for each [-].
+        Stiffnesses drawn from what is not known of them, and independent units for each [-].
     share_blocks
         Blocks of the Sobol analysis at the zones of the drawing, a power of two [-].
     yields

@@ -234,7 +234,7 @@ class AtYield(NamedFields):
     @property
     def words(self) -> str:
         """What must be shown, in words."""
-        return f"{self.target:.2%} of units"
+        return f"{100 * self.target:.2f} % of units"
 
     def require_enough(self, units: int, confidence: float = CONFIDENCE) -> None:
         """Raise unless so many units can show it.

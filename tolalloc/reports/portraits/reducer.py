@@ -29,6 +29,7 @@ from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.portrait import Examination, Portrait, sections_of
 from tolalloc.reports.scene_record import scene_record
+from tolalloc.reports.wording import number
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,6 +59,7 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
     """What is said and shown of a reducer at the sources of a drawing."""
 
     kind = "reducer"
+    simulated = "simulated reducers"
     settings_word = "modification"
     uncertain_name = "identified stiffness"
 
@@ -176,8 +178,8 @@ def against_catalogue(reducer: Reducer, loop: HysteresisLoop, sample: int = -1) 
     wanted, largest = stated.torsional_rigidity * ARCMINUTE, stated.lost_motion / ARCMINUTE
     sentence = (
         f"Without part errors the torsional rigidity is {rigidity:.3g} N·m/arcmin where the catalogue states "
-        f"{wanted:.3g} ({100 * (rigidity / wanted - 1):+.0f} %), the lost motion {lost:.2g}′ where it allows "
-        f"{largest:.2g}′."
+        f"{wanted:.3g} ({number(100 * (rigidity / wanted - 1), '+.0f')} %), the lost motion {lost:.2g}′ where it "
+        f"allows {largest:.2g}′."
     )
     warnings = []
     if not 1 / FACTOR <= rigidity / wanted <= FACTOR:
@@ -217,21 +219,23 @@ def _examination(portrait: ReducerPortrait, figures: Mapping[str, float]) -> Exa
     model, count, solved = portrait.model, int(figures["units [-]"]), int(figures["units in equilibrium [-]"])
     stage, (flank, radial) = model.reducer.cycloid_stage, model.present_clearances
     if not solved:
-        none = f"None of {count} random units has an equilibrium without torque."
+        none = f"None of {count:,} simulated reducers has an equilibrium without torque."
         but = f"none of its units has an equilibrium: {_advice(model)}"
         sentences = (*model.mismatches, none, *portrait.remarks)
         return Examination(sentences, but, f"Cannot be built as drawn: {none}")
     counted = {name: figures[name] for name in _COUNTED}
     unsolved = "" if solved == count else f" ({count - solved} have no equilibrium)"
     cautions = portrait.cautions(np.array(model.present_clearances))
+    half, least = figures["median pin force without torque [N]"], figures["least radial clearance [µm]"]
     sentences = (
         *model.mismatches,
         f"Nominal clearance {flank:.3g} µm on the flank and {radial:.3g} µm at tip and root, which leave "
         f"{2 * flank * MICROMETRE / stage.disc_pitch_radius / ARCMINUTE:.2g}′ of free rotation.",
-        f"Of {count} random units {figures['share preloaded [-]']:.1%} are preloaded{unsolved}: without torque their "
-        f"pins press with more than the {model.rated_pin_force:.0f} N of the rated torque; half of all press with "
-        f"{figures['median pin force without torque [N]']:.2g} N or more.",
-        f"The radial clearance of a unit is {_true_minus(figures['least radial clearance [µm]'])} µm at least.",
+        f"Of {count:,} simulated reducers {number(figures['share preloaded [-]'], '.1%')} are preloaded"
+        f"{unsolved}: without torque their pins press with more than "
+        f"the {model.rated_pin_force:,.0f} N of the rated torque; half of all press with "
+        f"{float(f'{half:.2g}'):,g} N or more.",
+        f"The radial clearance of a unit is {number(least, '.2g')} µm at least.",
         *portrait.remarks,
         *cautions,
     )
@@ -239,7 +243,7 @@ def _examination(portrait: ReducerPortrait, figures: Mapping[str, float]) -> Exa
     if not reasons:
         return Examination(sentences, figures=counted)
     trust = " ".join(own for own in cautions if "not trust" in own)
-    fault = f"Cannot be built as drawn: of {count:,} random reducers {' and '.join(reasons)}. {trust}".strip()
+    fault = f"Cannot be built as drawn: of {count:,} simulated reducers {' and '.join(reasons)}. {trust}".strip()
     return Examination(sentences, f"of its units {' and '.join(reasons)}: {_advice(model)}", fault, counted)
 
 
@@ -249,15 +253,12 @@ def _reasons(model: ReducerModel, figures: Mapping[str, float]) -> list[str]:
     if (share := figures["share preloaded [-]"]) > allowed:
         by = "" if PRELOAD in model.own_limits else ", by stiffnesses that no dimensions support"
         force = figures["pin force of the rated torque [N]"]
-        found.append(f"{share:.1%} are preloaded (a pin presses with more than the {force:.0f} N of rated torque{by})")
+        more = f"a pin presses with more than the {force:,.0f} N of rated torque{by}"
+        found.append(f"{number(share, '.1%')} are preloaded ({more})")
     if (share := figures["share without radial clearance [-]"]) > allowed:
-        least = _true_minus(figures["least radial clearance [µm]"])
-        found.append(f"{share:.1%} have no radial clearance ({least} µm at worst)")
+        least = number(figures["least radial clearance [µm]"], ".2g")
+        found.append(f"{number(share, '.1%')} have no radial clearance ({least} µm at worst)")
     return found
-
-
-def _true_minus(number: float) -> str:
-    return f"{number:.2g}".replace("-", "−")
 
 
 def _advice(model: ReducerModel) -> str:
@@ -312,7 +313,7 @@ def _curves(model: ReducerModel, units: Units) -> dict[str, Equilibria]:
 def _curve_figure(curves: Mapping[str, Equilibria], torque: float) -> Figure:
     return Figure(
         name="transmission_error",
-        title=f"Transmission error over one output turn at {torque:g} N·m",
+        title=f"Transmission error over one output turn at {number(torque, 'g')} N·m",
         x_label="carrier angle [°]",
         y_label="transmission error, output side [arcsec]",
         series=tuple(

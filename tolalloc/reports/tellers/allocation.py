@@ -69,7 +69,7 @@ class AllocationTeller(Teller[AllocationResult]):
 
     @property
     def shown(self) -> tuple[str, ...]:
-        """What to write, its part in the variance and its cost."""
+        """What to write, its total-effect index and its cost."""
         return dimensions_table(self.result).shown(self.header.cost_unit)
 
     @cached_property
@@ -209,7 +209,9 @@ class AllocationTeller(Teller[AllocationResult]):
             f"{short(result.leading)} kept [{unit_of(result.leading)}]": chosen.quantile_bound,
             **self._costs,
             "blocking requirement": None if result.met else chosen.blocking.requirement.output,
-            "beyond its limit by [unit of the output]": None if result.met else -chosen.blocking.slack,
+            f"beyond its limit by [{unit_of(chosen.blocking.requirement.output)}]": None
+            if result.met
+            else -chosen.blocking.slack,
             "cannot be built because": examined.fault or None,
             **examined.figures,
             **portrait.amounts(chosen.settings),

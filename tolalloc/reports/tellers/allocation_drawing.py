@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.result import AllocationResult
+from tolalloc.allocation.space.requirement import AtYield
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.table_file import setting_line
 from tolalloc.drawings.tolerance_table import table_frame
@@ -89,7 +90,7 @@ def dimensions_table(result: AllocationResult) -> Table[_Dimension]:
         Column(header="process before", value=lambda row: before.value(row[1][0]), nothing="as today"),
         Column(header="process", value=lambda row: after.value(row[1][0]), nothing="as today", terminal=6),
         Column(
-            header="part in the variance (total index) [%]",
+            header="total-effect index [%]",
             value=lambda row: parts.get(row[1][0][0].group or row[1][0][0].name, np.nan),
             terminal=3,
         ),
@@ -186,11 +187,12 @@ def effects_figure(result: AllocationResult) -> tuple[Figure, ...]:
         for name, members in result.dimensions.items()
     }
     order = sorted(effects, key=lambda name: -abs(effects[name]))
-    kept = with_unit(f"{result.chosen.quantile_bound:.4g}", result.leading)
+    kept, guarantee = with_unit(f"{result.chosen.quantile_bound:.4g}", result.leading), result.requirements[0].guarantee
+    key = "figure_effects" if isinstance(guarantee, AtYield) else "figure_effects_other"
     label, lengths = "effect with its sign, to first order", [effects[name] for name in order]
     figure = Figure(
         name="effects",
-        title=_say("figure_effects", step=_STEP, output=short(result.leading), kept=kept),
+        title=_say(key, step=_STEP, output=short(result.leading), kept=kept, target=getattr(guarantee, "target", None)),
         x_label=f"change of {result.leading}",
         series=(Series(label=label, kind="bars", x=order, y=lengths),),
         vertical=((0.0, ""),),

@@ -14,7 +14,7 @@ from tolalloc.reading.units import unit_of
 from tolalloc.reports.figure import Figure, HeatMap, Series
 from tolalloc.reports.tellers.allocation_sentences import designs
 from tolalloc.reports.templates import Sentences
-from tolalloc.reports.wording import quantity, short, with_unit
+from tolalloc.reports.wording import number, quantity, short, with_unit
 
 _say = Sentences("allocation")
 
@@ -44,7 +44,7 @@ def front_figure(result: AllocationResult, fronts: Fronts, cost_unit: str) -> Fi
     """Return cost against what is kept of the leading output."""
     limit, leading, guarantee = result.free.limit, result.leading, result.requirements[0].guarantee
     error = with_unit(f"{result.chosen.constraints[0].standard_error:.2g}", leading)
-    by = f" by {guarantee.target:.2%} of units" if isinstance(guarantee, AtYield) else ""
+    by = f" by {number(guarantee.target, '.2%')} of units" if isinstance(guarantee, AtYield) else ""
     searched, exact = fronts.searched, fronts.exact
     checked, knee = ~np.isnan(searched.on_kernel), searched.knee
     others = _say("figure_front_others") if len(result.requirements) > 1 else ""
@@ -61,9 +61,7 @@ def front_figure(result: AllocationResult, fronts: Fronts, cost_unit: str) -> Fi
             Series(
                 label=f"cheapest by the local models (±{error})", kind="line", x=list(exact.limits), y=list(exact.cost)
             ),
-            Series(
-                label="NSGA-II, as its stand-in tells", kind="line", x=list(searched.quantile), y=list(searched.cost)
-            ),
+            Series(label="NSGA-II, by its surrogate", kind="line", x=list(searched.quantile), y=list(searched.cost)),
             Series(
                 label="NSGA-II, solved on the kernel",
                 kind="points",

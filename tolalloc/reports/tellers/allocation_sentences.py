@@ -10,12 +10,11 @@ from tolalloc.allocation.search.candidates import ALONE
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
 from tolalloc.allocation.space.requirement import AtYield
 from tolalloc.allocation.verify.verification import VerifiedDesign
-from tolalloc.reading.units import unit_of
 from tolalloc.reports.feature_frame import callout_assumptions
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import Examination, portrait_of
 from tolalloc.reports.templates import Sentences
-from tolalloc.reports.wording import QUICK_RUN, quantity, short, with_unit
+from tolalloc.reports.wording import QUICK_RUN, number, quantity, short, with_unit
 from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
 
 _NOTHING = 1e-3
@@ -60,8 +59,10 @@ def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
             verdict=_say("verdict_met" if result.met else "verdict_missed"),
             share=achieved.estimate,
             units=achieved.units,
-            limits=_limits(result),
-            low=achieved.low,
+            simulated=portrait_of(result.model).simulated,
+            stay=_stay(result),
+            required=_required(result),
+            low=100 * achieved.low,
             high=achieved.high,
         )
     )
@@ -105,17 +106,27 @@ def amounts_convention(result: AllocationResult) -> tuple[str, ...]:
 
 
 def _signed(amount: float) -> str:
-    """Return an amount with a true minus sign."""
-    return f"{amount:.2f}".replace("-", "−")
+    """Return an amount as it is written."""
+    return number(amount, ".2f")
 
 
-def _limits(result: AllocationResult) -> str:
-    """Return the limits of the leading output."""
+def _stay(result: AllocationResult) -> str:
+    """Return what units that keep the limits of the leading output do."""
     limits, leading = result.requirements[0].limits, result.leading
     if limits.upper is None:
-        return _say("limit_lower", lower=with_unit(f"{limits.lower:g}", leading))
+        return _say("stay_lower", lower=with_unit(f"{limits.lower:g}", leading))
     upper = with_unit(f"{limits.upper:g}", leading)
-    return upper if limits.lower is None else _say("limit_both", lower=limits.lower, upper=upper)
+    key = "stay_upper" if limits.lower is None else "stay_both"
+    return _say(key, lower=limits.lower, upper=upper)
+
+
+def _required(result: AllocationResult) -> str:
+    """Return what was required of the leading output."""
+    guarantee, achieved = result.requirements[0].guarantee, result.chosen.achieved
+    if not isinstance(guarantee, AtYield):
+        return _say("required_other", words=guarantee.words)
+    near = result.met and achieved.estimate < guarantee.target <= achieved.high
+    return _say("required_near" if near else "required_yield", target=guarantee.target)
 
 
 def _against(cost: float, other: float) -> str:
@@ -128,18 +139,15 @@ def _against(cost: float, other: float) -> str:
 
 def _cost(result: AllocationResult, cost_unit: str) -> str:
     """Return what the drawing costs, and what proportional scaling does."""
-    chosen, alike = result.chosen, result.free.proportional
-    used = "" if alike.met else _say("cost_missed")
-    if alike.met and result.requirements[0].limits.lower is None:
-        unit = unit_of(result.leading).replace("arcsec", "arcsecond")
-        least = chosen.cost / (1 - result.least_saving)
-        used = _say("cost_used", against=_against(chosen.cost, least), unit=unit, least=least)
-    settings = (
-        f" {_say('cost_settings', word=portrait_of(result.model).settings_word)}" if result.space.settings else ""
-    )
-    against = _against(chosen.cost, alike.cost)
-    gaps = {"against": against, "settings": settings, "alike": alike.cost, "used": used}
-    return _say("cost", cost=chosen.cost, cost_unit=cost_unit, **gaps)
+    chosen, alike, before = result.chosen, result.free.proportional, result.free.baseline.cost
+    missed = "" if alike.met else f" {_say('cost_missed')}"
+    word, settings = portrait_of(result.model).settings_word, ""
+    if result.space.settings:
+        settings = _say("cost_settings_many" if word.endswith("s") else "cost_settings", word=word)
+    key = "cost_tighter" if alike.cost > before * (1 + _SAME_COST) else "cost_scaled"
+    said = _say(key, settings=settings, alike=alike.cost, missed=missed)
+    same = abs(chosen.cost / before - 1) < _SAME_COST
+    return _say("cost_same" if same else "cost", before=before, cost=chosen.cost, cost_unit=cost_unit, alike=said)
 
 
 def _solved(design: VerifiedDesign) -> tuple[str, ...]:
@@ -147,7 +155,7 @@ def _solved(design: VerifiedDesign) -> tuple[str, ...]:
     units = design.independent.units if design.independent else None
     if units is None or units.near.all():
         return ()
-    return (_say("solved", units=units.near.size, whatever=units.drawn.whatever),)
+    return (_say("solved", units=units.near.size, all=design.achieved.units, whatever=units.drawn.whatever),)
 
 
 def missed(design: VerifiedDesign) -> str:
@@ -156,11 +164,10 @@ def missed(design: VerifiedDesign) -> str:
     return _say(
         "missed" if np.isfinite(side.value) else "missed_unanswered",
         output=quantity(check.requirement.output),
-        limit=side.limit,
-        unit=unit_of(check.requirement.output),
+        limit=with_unit(f"{side.limit:g}", check.requirement.output),
         shown=check.requirement.guarantee.words,
-        value=side.value,
-        excess=side.excess,
+        value=with_unit(f"{side.value:.4g}", check.requirement.output),
+        excess=with_unit(f"{side.excess:.3g}", check.requirement.output),
     )
 
 
@@ -187,10 +194,16 @@ def _free(result: AllocationResult) -> tuple[str, ...]:
     if not found.chosen.met:
         return ()
     bound, cost, graded = found.lower_bound, found.chosen.cost, result.graded
-    gaps = {"bound": bound.cost, "cost": cost, "below": max(1 - bound.cost / cost, 0.0), "confidence": bound.confidence}
+    answer = _say("answer_free" if graded else "answer_drawing", cost=cost)
+    gaps = {
+        "bound": bound.cost,
+        "answer": answer,
+        "below": max(1 - bound.cost / cost, 0.0),
+        "confidence": bound.confidence,
+    }
     if bound.certified:
         return (_say("bound_certified", zones="free zones" if graded else "zones", **gaps),)
-    return (_say("bound_local", around="free zones" if graded else "drawing", **gaps),)
+    return (_say("bound_local", **gaps),)
 
 
 def _graded(result: AllocationResult) -> tuple[str, ...]:
@@ -218,7 +231,8 @@ def _modification(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
         return (_say("alone_missed", missed=missed(alone), word=word),)
     saving = 1 - joint.cost / alone.cost
     if saving < _SAME_COST:
-        return (_say("nothing_cheaper", word=word, cost=alone.cost),)
+        key = "nothing_cheaper_many" if word.endswith("s") else "nothing_cheaper"
+        return (_say(key, word=word, cost=alone.cost, cost_unit=cost_unit),)
     doubt = _say("saves_doubt") if max(result.fixed.gap, result.free.gap) > saving else ""
     gaps = {"saved": alone.cost - joint.cost, "share": saving, "alone": alone.cost, "doubt": doubt}
     return (_say("saves", word=word, cost_unit=cost_unit, **gaps),)
@@ -231,8 +245,12 @@ def _prices(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
         price = free.prices[side.stack.name]
         if price * abs(side.limit) > _NOTHING * free.chosen.cost:
             cost, per = limit_price(side, price)
-            gaps = {"output": quantity(side.stack.name), "limit": side.limit, "unit": unit_of(side.stack.name)}
-            said.append(_say("price", price=cost, cost_unit=cost_unit, per=per, **gaps))
+            gaps = {
+                "output": quantity(side.stack.name),
+                "limit": with_unit(f"{side.limit:g}", side.stack.name),
+                "step": with_unit("0.1" if per.startswith("0.1 ") else "1", side.stack.name),
+            }
+            said.append(_say("price", price=cost, cost_unit=cost_unit, **gaps))
     return tuple(said)
 
 
@@ -311,10 +329,15 @@ def quantiles(result: AllocationResult) -> tuple[str, ...]:
     for check in chosen.checks:
         kept, side, asked = unit_quantile(chosen, check), check.constraints[0], check.requirement
         if isinstance(asked.guarantee, AtYield) and np.isfinite(kept) and np.isfinite(side.value):
-            gaps = {"kept": kept, "value": side.value, "target": asked.guarantee.target, "units": chosen.joint.units}
-            names = {"output": quantity(asked.output), "unit": unit_of(asked.output)}
             key = "quantile_upper" if side.sign > 0 else "quantile_lower"
-            said.append(_say(key, confidence=chosen.confidence, **gaps, **names))
+            gaps = {
+                "output": quantity(asked.output),
+                "simulated": portrait_of(result.model).simulated,
+                "target": asked.guarantee.target,
+                "kept": with_unit(f"{kept:.4g}", asked.output),
+                "value": with_unit(f"{side.value:.4g}", asked.output),
+            }
+            said.append(_say(key, confidence=chosen.confidence, **gaps))
     return tuple(said)
 
 
@@ -327,6 +350,7 @@ def cheapest_settings(result: AllocationResult, cost_unit: str) -> tuple[str, ..
     if np.isfinite(trade.error):
         error = _say("trade_error", error=with_unit(f"{trade.error:.2g}", result.leading))
     settings = " and ".join(
-        f"{value:.3g} {unit_of(name)} {quantity(name)}" for name, value in zip(trade.names, trade.cheapest, strict=True)
+        f"{quantity(name)} {with_unit(f'{value:.3g}', name)}"
+        for name, value in zip(trade.names, trade.cheapest, strict=True)
     )
     return (_say("trade", settings=settings, cost=np.nanmin(trade.cost), cost_unit=cost_unit, error=error),)

@@ -33,20 +33,21 @@ def requirements_table(result: AllocationResult) -> Table[_Limited]:
         return limit_price(side, own if own * side.scale > solver_noise(result.free.optimum) else 0.0)
 
     def kept(label: str, design: VerifiedDesign) -> Column[_Limited]:
-        header = f"kept: {label} [unit of the output]"
+        header = f"kept: {label} [{unit}]"
         return Column(header=header, value=lambda row: design.constraints[row[0]].value)
 
+    unit = " or ".join(dict.fromkeys(unit_of(own.output) for own in result.requirements))
     columns: list[Column[_Limited]] = [
         Column(header="requirement", value=lambda row: row[2].requirement.output),
         Column(header="limit", value=_limit),
         Column(header="shown for", value=lambda row: row[2].requirement.guarantee.words),
         Column(
-            header="quantile of the units [unit of the output]",
+            header=f"quantile of the units [{unit}]",
             value=lambda row: unit_quantile(result.chosen, row[2]),
         ),
         *(kept(label, design) for label, design in designs(result).items()),
-        Column(header="slack [unit of the output]", value=lambda row: -row[1].excess),
-        Column(header="standard error of it [unit of the output]", value=lambda row: row[1].standard_error),
+        Column(header=f"slack [{unit}]", value=lambda row: -row[1].excess),
+        Column(header=f"standard error of it [{unit}]", value=lambda row: row[1].standard_error),
         Column(header="marginal price of the limit [{cost}]", value=lambda row: price(row)[0]),
         Column(header="for each", value=lambda row: price(row)[1]),
         Column(header="OK", value=lambda row: "yes" if row[1].excess <= 0 else "no"),

@@ -133,7 +133,7 @@ def _requirements(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
             {
                 "what": side.stack.name,
                 "limit": side.limit,
-                "verified on fresh units": side.value,
+                "independent verification sample": side.value,
                 "predicted for the zones": Formula(
                     f"=B{row}{'+' if upper else '-'}({load}+({number(rest)}))", predicted
                 ),

@@ -258,7 +258,7 @@ class AssemblyTeller(Teller[AssemblyResult]):
         said = _say(
             "section_sweep",
             bought=self._bought,
-            rose=len(rose) or "None",
+            rose=len(rose) or "none",
             all=2 * len(own.plan.chain.names),
             are="is" if len(rose) == 1 else "are",
             precision=own.plan.state_weight,

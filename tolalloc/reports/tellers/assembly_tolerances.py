@@ -16,6 +16,7 @@ from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.tellers.assembly_tables import PRECISION, has_limits, of_rows, tabulated
 from tolalloc.reports.templates import Sentences
+from tolalloc.reports.wording import number
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -166,8 +167,8 @@ def cost_sentences(plan: AssemblyPlan, tolerances: AngularTolerances) -> tuple[s
             assemblies=tolerances.verification.assemblies,
             which=_say(which[verified_name(plan, tolerances)], precision=verified),
             share=share.estimate,
-            low=share.low,
-            high=share.high,
+            low=number(100 * share.low, ".2f"),
+            high=number(100 * share.high, ".2f"),
         ),
     )
 

@@ -16,6 +16,7 @@ from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.templates import Sentences
+from tolalloc.reports.wording import alike
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -135,10 +136,11 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
         named = [row for row in self._gauged if row.named]
         likely = ", ".join(_say("one_likely", source=row.name, share=row.probability * 100) for row in named)
         first = named[0]
+        reading, low, high = alike(first.mean, first.low, first.high, figures=2)
         pairs = "; ".join(_say("pair", one=one, other=other) for one, other in found.twins)
         return (
             _say("likely", measured=measured, level=self.result.level, likely=likely),
-            _say("first", source=first.name, reading=first.mean, low=first.low, high=first.high, zone=first.zone),
+            _say("first", source=first.name, reading=reading, low=low, high=high, zone=first.zone),
             *((_say("twins", pairs=pairs),) if pairs else ()),
             *(
                 _say("groups", sources=", ".join(sources))

@@ -14,7 +14,7 @@ from tolalloc.reports.columns import Column, Table, own_words
 from tolalloc.reports.document import Section
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.templates import Sentences
-from tolalloc.reports.wording import short
+from tolalloc.reports.wording import alike, short, with_unit
 
 _BEYOND = 10
 """Units beyond a quantile below which its interval is too narrow [-]."""
@@ -60,10 +60,7 @@ class DifferenceTeller(Teller[DifferenceResult]):
                 "quantile",
                 share=_percent(share),
                 output=short(own.output),
-                unit=unit_of(own.output),
-                change=change.estimate,
-                low=change.low,
-                high=change.high,
+                **_with_interval(change, own.output),
             )
             for (own, share), change in zip(result.limited, result.quantile_changes, strict=True)
             if own is leading
@@ -129,6 +126,15 @@ class DifferenceTeller(Teller[DifferenceResult]):
         return Table(name="changed zones", columns=_ZONES, rows=rows)
 
 
+def _with_interval(change: Change, output: str) -> dict[str, str]:
+    """Return a change of an output and the ends of its interval, one rounding for all."""
+    numbers = alike(change.estimate, change.low, change.high)
+    return {
+        key: with_unit(said if said.startswith("−") else f"+{said}", output)
+        for key, said in zip(("change", "low", "high"), numbers, strict=True)
+    }
+
+
 def _in_percent(found: Change) -> Change:
     """Return the change of a share in percent."""
     return Change(estimate=100 * found.estimate, low=100 * found.low, high=100 * found.high)
@@ -136,7 +142,7 @@ def _in_percent(found: Change) -> Change:
 
 def _percent(share: float) -> str:
     """Return a share in percent, with as many digits as half of the usual rejects take."""
-    return f"{100 * share:.5g}%"
+    return f"{100 * share:.5g} %"
 
 
 TELLER = DifferenceTeller

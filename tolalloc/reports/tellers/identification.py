@@ -23,6 +23,7 @@ from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.templates import Sentences
+from tolalloc.reports.wording import number
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,7 +65,7 @@ def estimate_sentence(estimate: ParameterEstimate) -> str:
     if not estimate.identified:
         return _say("not_identified", symbol=item.symbol, interval=interval)
     key = "estimate_on_bound" if estimate.on_bound else "estimate"
-    return _say(key, symbol=item.symbol, value=_with_unit(item, f"{estimate.value:.4g}"), interval=interval)
+    return _say(key, symbol=item.symbol, value=_with_unit(item, number(estimate.value, ".4g")), interval=interval)
 
 
 def choice_name(choice: ParameterChoice) -> str:
@@ -76,14 +77,14 @@ def direction_sentence(direction: Direction, symbols: tuple[str, ...]) -> str:
     """Return a combination of parameters that the data know independently of the others, and how well."""
     largest = np.abs(direction.loading).max()
     parts = [
-        f"{share:+.2f}·{symbol}"
+        f"{number(share, '+.2f')}·{symbol}"
         for share, symbol in zip(direction.loading, symbols, strict=True)
         if abs(share) >= _SMALL * largest
     ]
     bounded = "open" if direction.deviation < direction.half_width else "open_to_bounds"
     return _say(
         "fixed" if direction.is_fixed else bounded,
-        combination=" ".join(parts).removeprefix("+").replace("-", "−"),
+        combination=" ".join(parts).removeprefix("+"),
         deviation=direction.deviation,
         half_width=direction.half_width,
     )
@@ -498,7 +499,7 @@ def _yes(so: bool) -> str:
 
 
 def _interval(ends: tuple[float, float]) -> str:
-    return f"{ends[0]:.4g}…{ends[1]:.4g}"
+    return " to ".join(number(end, ".4g") for end in ends)
 
 
 def _span(item: Parameter, interval: Float[np.ndarray, "2"]) -> str:

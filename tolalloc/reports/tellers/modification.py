@@ -54,7 +54,7 @@ class ModificationTeller(Teller[ModificationResult]):
         description, objective = self.result.problem.description, best.objective / MICROMETRE
         return (
             _say("amounts", equidistant=equidistant, shift=shift, description=description, objective=objective),
-            _say("file", equidistant=equidistant, shift=shift),
+            _say("file", equidistant=f"{equidistant:.4f}", shift=f"{shift:.4f}"),
             *self._contact.sentences,
         )
 

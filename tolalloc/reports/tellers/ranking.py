@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -17,8 +17,8 @@ from tolalloc.reports.portrait import Portrait, portrait_of
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.tellers import ranking_tables as tables
 from tolalloc.reports.templates import Sentences
-from tolalloc.reports.wording import QUICK_RUN, quantity, sign_of
-from tolalloc.sensitivity.ranking import Convergence
+from tolalloc.reports.wording import QUICK_RUN, alike, number, quantity, sign_of
+from tolalloc.sensitivity.ranking import Convergence, Neighbours
 from tolalloc.sensitivity.result import RankingResult
 from tolalloc.sensitivity.sobol import SobolIndices
 from tolalloc.sensitivity.surrogate.validation import Choice
@@ -30,8 +30,12 @@ _RARE = 1000.0
 """Units of a million from which a share is said in percent [-]."""
 _SLIGHT = 0.05
 """Share of a wave's variance below which a second source is not named for it [-]."""
+_NEGLIGIBLE = 1e-3
+"""End of an interval over the estimate below which it is 0 [-]."""
 _MOSTLY = 0.5
 """Share of a wave's variance from single sources above which they are named for it [-]."""
+_SURE = 0.995
+"""Confidence that would be rounded to certainty [-]."""
 _NAMED = 3
 """Sources that the answer names [-]."""
 _SHOWN = 24
@@ -125,8 +129,8 @@ class RankingTeller(Teller[RankingResult]):
         digits = ".1f" if float(np.ptp(self.result.sample.values)) > 1.0 else ".3g"
         read = self.result.one_sided.read(value)
         if self.result.limits[self.result.leading].width is None:
-            return f"{read:{digits}}{self._sign}"
-        return _say("value_beyond" if read > 0 else "value_inside", value=f"{abs(read):{digits}}", sign=self._sign)
+            return f"{number(read, digits)}{self._sign}"
+        return _say("value_beyond" if read > 0 else "value_inside", value=number(abs(read), digits), sign=self._sign)
 
     def _replicated(self) -> Iterator[str]:
         """Yield what a second seed made of the promised orders, if any was promised."""
@@ -161,7 +165,8 @@ class RankingTeller(Teller[RankingResult]):
                 sign=sign_of(self._wave_unit),
                 due=_say(due),
                 names=" and ".join(
-                    _say("order_name", source=found.sources[source], share=share[source]) for source in leading
+                    _say("order_name", source=found.sources[source], share=min(share[source], 1.0))
+                    for source in leading
                 ),
             )
 
@@ -173,6 +178,7 @@ class RankingTeller(Teller[RankingResult]):
         yield _say(
             "uncertain",
             names=" + ".join(source.name for source in effect.sources),
+            simulated=self._portrait.simulated,
             output=self._output,
             sigma=effect.sigma,
             sigma_of_mean=effect.sigma_of_mean,
@@ -193,6 +199,7 @@ class RankingTeller(Teller[RankingResult]):
             where=self._the_limits if found.is_limit else _say("worst_share", value=self._turned(found.threshold)),
             outside=found.outside,
             units=found.units,
+            simulated=self._portrait.simulated,
             source=found.sources[at],
             lift=found.lift[at],
             low=low,
@@ -204,13 +211,20 @@ class RankingTeller(Teller[RankingResult]):
         found = self.result.beyond
         share = found.parts_per_million
         allowed = (1 - self.result.target) * 1e6
-        key, scale = ("beyond_share", 1e4) if share.estimate >= _RARE else ("beyond_rare", 1.0)
+        if share.estimate >= _RARE:
+            key, scale = "beyond_share", 1e4
+            shown, low, high = alike(*(own / scale for own in (share.estimate, share.low, share.high)), most=100.0)
+        else:
+            key, scale = "beyond_rare", 1.0
+            least = share.low if share.low > _NEGLIGIBLE * share.estimate else 0.0
+            shown, low, high = number(share.estimate, ",.3g"), number(least, ",.3g"), number(share.high, ",.0f")
         return _say(
             key,
             limit=self._limits,
-            share=share.estimate / scale,
-            low=share.low / scale,
-            high=share.high / scale,
+            simulated=self._portrait.simulated,
+            share=shown,
+            low=low,
+            high=high,
             allowed=allowed / scale,
             verdict=found.verdict,
         )
@@ -226,7 +240,12 @@ class RankingTeller(Teller[RankingResult]):
             opening = _say(key, source=found.sources[at], factor=found.factor[at])
         else:
             opening = _say("opening_any" if found.meets else "opening_none")
-        return _say("kept", target=target, value=self._turned(quantile), opening=opening)
+        limits = self.result.limits[self.result.leading]
+        key = "kept_upper" if limits.lower is None else "kept_lower"
+        if limits.width is not None:
+            key = "kept_beyond" if self.result.one_sided.read(quantile) > 0 else "kept_inside"
+        gaps = {"target": target, "value": self._turned(quantile), "opening": opening}
+        return _say(key, simulated=self._portrait.simulated, **gaps)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
@@ -292,7 +311,7 @@ class RankingTeller(Teller[RankingResult]):
             tables=(
                 ("ranking", tables.ranking_table(result)),
                 *(((pairs.name, pairs.frame()),) if pairs.rows else ()),
-                ("growth", tables.convergence_table(result)),
+                ("convergence", tables.convergence_table(result)),
             ),
         )
         if result.dimensions is not None:
@@ -318,7 +337,7 @@ class RankingTeller(Teller[RankingResult]):
             tables=(("all requirements", tables.overall_table(result)),),
         )
         if result.orders is not None:
-            note = f"{self._portrait.spectra_note}; " if self._portrait.spectra_note else ""
+            note = f"{self._portrait.spectra_note}. " if self._portrait.spectra_note else ""
             yield Section(
                 heading=_say("orders_heading"),
                 paragraphs=(f"{note}{_say('orders', blocks=others)}",),
@@ -438,7 +457,7 @@ class RankingTeller(Teller[RankingResult]):
         indices = self.result.indices
         rows = indices.order[:_SHOWN]
         bars = (
-            ("total index", indices.total, indices.total_interval),
+            ("total-effect index", indices.total, indices.total_interval),
             ("first-order index", indices.first, indices.first_interval),
         )
         return Figure(
@@ -468,7 +487,7 @@ class RankingTeller(Teller[RankingResult]):
             title=_say("requirements_figure"),
             columns=[_broken(quantity(name)) for name in outputs],
             rows=[sobol.sources[at] for at in rows],
-            label="total Sobol index [-]",
+            label="total-effect index [-]",
             values=[[float(sobol.indices.total[sobol.position(name), at]) for name in outputs] for at in rows],
         )
 
@@ -481,7 +500,9 @@ class RankingTeller(Teller[RankingResult]):
         return HeatMap(
             name="orders",
             title=_say("orders_figure"),
-            columns=[f"{order}\n{own:.2g}{sign}" for order, own in zip(found.orders, found.deviation, strict=True)],
+            columns=[
+                f"{order}\n{number(own, '.2g')}{sign}" for order, own in zip(found.orders, found.deviation, strict=True)
+            ],
             rows=[found.sources[at] for at in rows],
             x_label=_say("orders_axis"),
             label="share of the wave's variance [-]",
@@ -551,20 +572,24 @@ class RankingTeller(Teller[RankingResult]):
 
 def _drivers(sobol: SobolIndices) -> Iterator[str]:
     """Yield who drives the leading output, and how sure each place is."""
-    interval, among = sobol.total_interval, sobol.among_first(min(_NAMED, len(sobol.sources)))
-    following = {pair.before: pair.probability for pair in sobol.neighbours}
+    low, high = np.clip(sobol.total_interval, 0.0, 1.0)
+    following = {pair.before: pair for pair in sobol.neighbours}
     for place, at in enumerate(sobol.order[:_NAMED], start=1):
         yield _say(
             "driver",
             place=place,
             source=sobol.sources[at],
-            total=sobol.total[at],
-            low=interval[0, at],
-            high=interval[1, at],
-            named=_NAMED,
-            among=among[at],
-            before=_say("driver_before", probability=following[at]) if at in following else "",
+            total=min(sobol.total[at], 1.0),
+            low=low[at],
+            high=high[at],
+            before=f" {_before(following[at], sobol.sources)}" if at in following else "",
         )
+
+
+def _before(pair: Neighbours, sources: Sequence[str]) -> str:
+    """Return how sure it is that a source ranks above the next one."""
+    key = "driver_surely" if pair.probability >= _SURE else "driver_before"
+    return _say(key, next=sources[pair.after], probability=pair.probability)
 
 
 def converged(found: Convergence) -> str:

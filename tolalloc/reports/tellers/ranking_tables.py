@@ -84,7 +84,7 @@ def sobol_table(sobol: SobolIndices) -> pd.DataFrame:
             "rank high 95 % [-]": rank[1],
             "P(among first 3) [%]": among * 100,
             "P(before the next) [%]": lambda at: following[at].probability * 100 if at in following else np.nan,
-            "more blocks to tell it from the next [-]": lambda at: _blocks(following.get(at)),
+            "more blocks needed to separate it from the next [-]": lambda at: _blocks(following.get(at)),
         },
         sobol.order,
     ).frame()
@@ -130,7 +130,7 @@ def ranked(sobol: SobolIndices) -> list[dict[str, Any]]:
 
 
 def dimensions_table(result: RankingResult, found: SobolIndices) -> pd.DataFrame:
-    """Return the dimensions of the drawing, largest part in the variance first, with what stands on the drawing."""
+    """Return the dimensions of the drawing, largest total-effect index first, with what stands on the drawing."""
     by_group: dict[str, list[Source]] = {}
     for source in result.errors.active:
         by_group.setdefault(source.group or source.name, []).append(source)
@@ -142,7 +142,7 @@ def dimensions_table(result: RankingResult, found: SobolIndices) -> pd.DataFrame
             "dimension": found.sources,
             "places [-]": lambda at: len(members[at]),
             "as written [mm]": lambda at: Frames(dict.fromkeys(map(callout, members[at]))),
-            "part in the variance (total index) [%]": found.total * 100,
+            "total-effect index [%]": found.total * 100,
             "low 5 % [%]": low,
             "high 95 % [%]": high,
             "alone (first-order index) [%]": np.maximum(found.first, 0.0) * 100,
@@ -194,7 +194,7 @@ def convergence_table(result: RankingResult) -> pd.DataFrame:
     """Return how the first places settled as the blocks grew."""
     names, history = result.sobol.sources, result.sobol.convergence.history
     return of_positions(
-        "growth",
+        "convergence",
         {
             "blocks [-]": [step.blocks for step in history],
             "first places": [", ".join(names[at] for at in step.first) for step in history],

@@ -1,1 +1,1 @@
-"""Fast stand-ins for a response, each with its error measured on answers it has not seen."""
+"""Fast surrogates of a response, each with its error measured on answers it has not seen."""

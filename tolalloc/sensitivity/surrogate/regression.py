@@ -160,7 +160,7 @@ Answers = Callable[[Float[np.ndarray, "sample variable"]], Float[np.ndarray, "sa
 
 @dataclass(frozen=True, kw_only=True)
 class BoxPolynomial:
-    """A fitted stand-in for a function with many outputs."""
+    """A fitted surrogate of a function with many outputs."""
 
     # The box [variable]
     lower: Float[np.ndarray, " variable"]
