@@ -66,7 +66,7 @@ def test_the_wheel_holds_what_it_needs_and_no_more(installed):
     needed = {
         "tolalloc/reports/page/chart.js",
         "tolalloc/reports/page/mechanism.js",
-        "tolalloc/reports/templates/document.html.j2",
+        "tolalloc/reports/page/document.html.j2",
         "tolalloc/cli/live/page/live.html",
         "tolalloc/reducers/reducer/presets/rv20e.reducer.toml",
         "tolalloc/drawings/data/rv20e_all_sources.tolerances.csv",

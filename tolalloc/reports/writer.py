@@ -212,7 +212,7 @@ def _write_page(document: Document, path: Path) -> None:
     for number, section in enumerate(sections, start=1):
         section["number"] = number
     page = Environment(
-        loader=PackageLoader("tolalloc.reports"), autoescape=True, trim_blocks=True, lstrip_blocks=True
+        loader=PackageLoader("tolalloc.reports", "page"), autoescape=True, trim_blocks=True, lstrip_blocks=True
     ).get_template("document.html.j2")
     headers = [str(header) for frame in document.tables.values() for header in frame.columns]
     texts = [*document.answer, *document.warnings, *(own.heading for own in document.sections), *headers]

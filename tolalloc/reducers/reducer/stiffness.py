@@ -4,7 +4,7 @@ The rows of liu2020's Table 2 for shaft, gears and bearings are in `tolalloc.red
 
 Table 2 of liu2020 row by row: the printed form under an honest name, and the sound reading where they differ.
 
-The pins' row, K_djk, has its scale C in `rv.reducer.stiffness.line_contact` and its sound reading along the tooth
+The pins' row, K_djk, has its scale C in `reducers.reducer.stiffness.line_contact` and its sound reading along the tooth
 in `tolalloc.reducers.cycloid.loaded_contact.pin_contact_table2`. The ledger of all rows is
 docs/reference/table-2.md.
 Arguments are in SI units: lengths m, forces N, Young's moduli Pa, angles rad; Poisson's ratios µ are 0 up to 0.5.

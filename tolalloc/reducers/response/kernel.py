@@ -189,7 +189,7 @@ class StiffnessResponse:
     """The kernel's peak-to-peak with stiffnesses as further columns, to first order in ln K."""
 
     kernel: KernelResponse  # The real model
-    # Fields of `rv.reducer.stiffness.Stiffness` that vary, in the order of their columns, which are the last
+    # Fields of `reducers.reducer.stiffness.Stiffness` that vary, in the order of their columns, which are the last
     stiffnesses: tuple[str, ...]
 
     @property
