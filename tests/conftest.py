@@ -5,6 +5,7 @@ import os
 import numpy as np
 import pytest
 
+import tests.shapes  # noqa: F401  # the full gate looks it up by its name
 from tests import builders
 from tests.compiled_first import compile_in_two_processes
 from tolalloc.reducers.equivalent.model import EquivalentModel
