@@ -29,17 +29,14 @@ def drawing(rows: dict[str, tuple[float, float, float]], **changed) -> ta.Drawin
 
 
 def allocated(function, rows, limit: ta.Limit, seed: int = 1, effort="quick", **changed):
-    return answered(function, rows, limit, seed, effort, **changed).result
-
-
-def answered(function, rows, limit: ta.Limit, seed: int = 1, effort="quick", **changed):
-    return ta.Study(
+    answer = ta.Study(
         ta.model(function, inputs=tuple(rows), outputs=(GAP,)),
         drawing(rows, **changed),
         limits={GAP: limit},
         questions=[ta.Allocation(front=False, what_if=False)],
         seed=seed,
     ).allocate(effort=effort)
+    return answer.result
 
 
 def cheapest_normal(costs: np.ndarray, loads: np.ndarray, budget: float) -> float:
@@ -63,12 +60,10 @@ def test_the_optimum_of_the_chain_is_what_is_worked_out_by_hand():
 @pytest.mark.parametrize("effort", ["quick", pytest.param("full", marks=pytest.mark.slow)])
 def test_the_bound_of_a_linear_function_lies_below_its_optimum_and_the_answer_at_it(effort):
     for seed in (1,) if effort == "quick" else range(1, 9):
-        answer = answered(chain, CHAIN, ta.Limit(lower=13.8, upper=14.2, show=ta.AtYield(0.9973)), seed, effort)
-        found = answer.result
+        found = allocated(chain, CHAIN, ta.Limit(lower=13.8, upper=14.2, show=ta.AtYield(0.9973)), seed, effort)
         assert found.met
         assert found.bound_is_certified
         assert OPTIMUM * 0.999 < found.bound <= OPTIMUM <= found.cost < OPTIMUM * 1.002
-        assert any(sentence.startswith("No drawing with zones inside their ranges") for sentence in answer.sentences)
 
 
 def test_a_function_of_single_numbers_has_the_same_bound_from_fewer_units():

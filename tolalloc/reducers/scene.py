@@ -436,8 +436,8 @@ def _magnification(reducer: Reducer, *states: States) -> float:
     Examples
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> none = np.zeros((1, 1))
-    >>> state = States(torque=1.0, force=none, gap=none + 20e-6, displacement=none, transmission_error=none[0])
+    >>> pins, none = np.zeros((1, 1, 1)), np.zeros((1, 1))
+    >>> state = States(torque=1.0, force=pins, gap=pins + 20e-6, displacement=none, transmission_error=none[0])
     >>> _magnification(load_reducer("rv20e_liu2020"), state)
     50.0
     """

@@ -54,9 +54,9 @@ def corrected(response: Response, evaluation: Evaluation, y: Float[np.ndarray, "
 
     Examples
     --------
-    >>> from types import SimpleNamespace
-    >>> said = SimpleNamespace(values=np.array([[1.0], [2.0], [3.0]]), good=np.array([True, True, True]))
-    >>> line = corrected(None, said, np.array([3.0, 5.0, 7.0]))
+    >>> from unittest.mock import Mock
+    >>> said = Evaluation(values=np.array([[1.0], [2.0], [3.0]]), status=np.zeros(3, np.uint8))
+    >>> line = corrected(Mock(spec=Response), said, np.array([3.0, 5.0, 7.0]))
     >>> round(line.offset, 9), round(line.factor, 9)
     (1.0, 2.0)
     """

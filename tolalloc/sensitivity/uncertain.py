@@ -73,15 +73,16 @@ def uncertain_effect(
     --------
     y = x·(1 + k) with σ(k) = 0.1 at x = 2:
 
-    >>> from types import SimpleNamespace
-    >>> from tolalloc.models.model import Evaluation
+    >>> from unittest.mock import Mock
+    >>> from tolalloc.models.model import Evaluation, Model
     >>> answer = lambda x, k: Evaluation(values=(x[:, :1] * k), status=np.zeros(len(x), np.uint8))
-    >>> model = SimpleNamespace(
+    >>> model = Mock(
+    ...     spec=Model,
     ...     uncertain=(CorrelatedSource(name="k", columns=("k",), covariance=np.array([[0.01]])),),
     ...     accuracy={},
     ...     reading=lambda _: lambda x: answer(x, 1.0),
     ...     with_uncertain=lambda _: lambda x: answer(x, 1.0 + x[:, 1:]),
-    ...     changed=lambda by: SimpleNamespace(reading=lambda _: lambda x: answer(x, 1.0 + by[0])),
+    ...     changed=lambda by: Mock(reading=lambda _: lambda x: answer(x, 1.0 + by[0])),
     ... )
     >>> round(uncertain_effect(model, "y [mm]", np.array([[2.0]]), SeedTree(1)).sigma, 6)
     0.2
@@ -119,15 +120,16 @@ def first_order_error(
     --------
     y = x·(1 + k) is linear in k, so nothing is left.
 
-    >>> from types import SimpleNamespace
-    >>> from tolalloc.models.model import Evaluation
+    >>> from unittest.mock import Mock
+    >>> from tolalloc.models.model import Evaluation, Model
     >>> answer = lambda x, k: Evaluation(values=(x[:, :1] * k), status=np.zeros(len(x), np.uint8))
-    >>> model = SimpleNamespace(
+    >>> model = Mock(
+    ...     spec=Model,
     ...     uncertain=(CorrelatedSource(name="k", columns=("k",), covariance=np.array([[0.01]])),),
     ...     accuracy={},
     ...     reading=lambda _: lambda x: answer(x, 1.0),
     ...     with_uncertain=lambda _: lambda x: answer(x, 1.0 + x[:, 1:]),
-    ...     changed=lambda by: SimpleNamespace(reading=lambda _: lambda x: answer(x, 1.0 + by[0])),
+    ...     changed=lambda by: Mock(reading=lambda _: lambda x: answer(x, 1.0 + by[0])),
     ... )
     >>> found = first_order_error(model, "y [mm]", np.array([[2.0]]), np.array([[0.1]]))
     >>> round(found.effect, 6), found.root_mean_square < 1e-12

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
+from numpy.typing import ArrayLike
 
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.files import read_toml, shipped_or_path, validated
@@ -341,10 +342,10 @@ class Zones(NamedTuple):
 
 
 def allocate(
-    factor: Sequence[float],
-    smallest: Sequence[float],
-    largest: Sequence[float],
-    limits: Sequence[float],
+    factor: ArrayLike,
+    smallest: ArrayLike,
+    largest: ArrayLike,
+    limits: ArrayLike,
     worst_case: Any = 0.0,
     root_sum_square: Any = 0.0,
     fixed: Any = 0.0,
@@ -392,14 +393,15 @@ def allocate(
     from tolalloc.allocation.search.process_choice import allocate as cheapest
     from tolalloc.allocation.space.problem import AllocationProblem, LeastInfeasible, PricedFeature, Stack
 
-    count, rows = len(factor), len(limits)
+    falling, budgets = np.asarray(factor, dtype=float), np.asarray(limits, dtype=float)
+    count, rows = len(falling), len(budgets)
     a, lower, upper = (np.broadcast_to(np.asarray(own, dtype=float), count) for own in (fixed, smallest, largest))
     worst, square = (
         np.broadcast_to(np.asarray(own, dtype=float), (rows, count)) for own in (worst_case, root_sum_square)
     )
     made = [
         Process(
-            name=f"{at + 1}", cost=Reciprocal(fixed=float(a[at]), factor=float(factor[at])), minimum=low, maximum=high
+            name=f"{at + 1}", cost=Reciprocal(fixed=float(a[at]), factor=float(falling[at])), minimum=low, maximum=high
         )
         for at, (low, high) in enumerate(zip(lower.tolist(), upper.tolist(), strict=True))
     ]
@@ -407,7 +409,7 @@ def allocate(
         features=tuple(PricedFeature(name=own.name, processes=(own,)) for own in made),
         stacks=tuple(
             Stack(name=f"{at + 1}", worst_case=worst[at], root_sum_square=square[at], budget=float(limit))
-            for at, limit in enumerate(limits)
+            for at, limit in enumerate(budgets)
         ),
     )
     found = cheapest(problem)

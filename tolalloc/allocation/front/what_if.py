@@ -194,7 +194,7 @@ def setting_trade(
     return SettingTrade(
         names=response.space.shared.names,
         values=values,
-        cost=cost.reshape([own.size for own in values]) + response.space.locked_cost,
+        cost=np.asarray(cost.reshape([own.size for own in values]) + response.space.locked_cost),
         error=float(np.sqrt(np.mean(left**2))) if left.size else np.nan,
     )
 
