@@ -178,7 +178,7 @@ def build(quick: bool) -> Document:
     """Return the report."""
     given, seeds = load_reducer("rv20e_liu2020"), SeedTree(2020)
     true = replace(given, stiffness=replace(given.stiffness, **TRUTH))
-    errors = ErrorModel(load_tolerance_table("rv20e_baseline"))
+    errors = ErrorModel(load_tolerance_table("rv20e_table4"))
     with shown_progress() as progress:
         first, methods = _peak_to_peaks(given, true, errors, seeds, quick, progress)
         second, again = _curves_and_loops(given, true, errors, seeds, quick, progress)

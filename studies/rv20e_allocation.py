@@ -13,7 +13,7 @@ study = ta.Study(
         radial_clearance=(5.0, 20.0),
         unit="table4",
     ),
-    ta.drawing("rv20e_baseline"),
+    ta.drawing("rv20e_table4"),
     limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0, show=ta.AtYield(target=0.9973))},
     questions=[ta.Ranking(), ta.Allocation(fixed_first=False, what_if=False)],
     name="rv20e_allocation",

@@ -7,7 +7,7 @@ import tolalloc as ta
 
 study = ta.Study(
     ta.reducer("rv20e_liu2020", stiffness="rv20e_table6", flank_clearance=(1.0, 5.0), radial_clearance=(5.0, 20.0)),
-    ta.drawing("rv20e_baseline", costs="rv20e"),
+    ta.drawing("rv20e_table4", costs="rv20e"),
     limits={
         ta.PEAK_TO_PEAK: ta.Limit(upper=60.0, show=ta.AtYield(target=0.9973)),
         ta.LOST_MOTION: ta.Limit(upper=0.5, show=ta.AtCpk(target=1.33)),

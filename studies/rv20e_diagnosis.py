@@ -28,7 +28,7 @@ READINGS = 1440
 """Readings of one output turn [-]."""
 NOISE = Noise()
 SEEDS = SeedTree(1).child("diagnosis")
-DRAWN, ERRORS = ta.reducer("rv20e_liu2020"), ta.drawing("rv20e_baseline").errors
+DRAWN, ERRORS = ta.reducer("rv20e_liu2020"), ta.drawing("rv20e_table4").errors
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -57,7 +57,7 @@ def prepared(
     }
     study = ta.Study(
         model=ta.reducer(**chosen),
-        drawing=ta.drawing(**{"table": "rv20e_baseline", **(drawing or {})}),
+        drawing=ta.drawing(**{"table": "rv20e_table4", **(drawing or {})}),
         limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)} if limits is None else limits,
         **{"name": "test", **changes},
     )
@@ -75,7 +75,7 @@ def verifier_of(
 
 def baseline_errors() -> ErrorModel:
     """Return the sources of the shipped baseline table as the columns that they move."""
-    return ErrorModel(load_tolerance_table("rv20e_baseline"))
+    return ErrorModel(load_tolerance_table("rv20e_table4"))
 
 
 def source(name: str, feature: Feature = Feature.SIZE, zone: float = 6.0, **changes: Any) -> Source:

@@ -207,7 +207,7 @@ def random_rv20e(generator: np.random.Generator) -> Reducer:
 
 def random_sources(generator: np.random.Generator, reducer: Reducer) -> tuple[Source, ...]:
     """Return the sources of the shipped table for as many cranks and discs, at other zones, ranges, costs, groups."""
-    shipped = {own.name: own for own in load_tolerance_table("rv20e_baseline", "generic")}
+    shipped = {own.name: own for own in load_tolerance_table("rv20e_table4", "generic")}
     found, of_group = dict[str, Source](), dict[str, tuple[float, bool, bool]]()
     for own in shipped.values():
         for crank in range(1, reducer.crank_count + 1) if re.search(r"(crank|bore|planet)1", own.name) else (0,):

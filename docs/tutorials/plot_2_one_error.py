@@ -25,7 +25,7 @@ from tolalloc.study.prepared import Prepared
 
 study = ta.Study(
     ta.reducer("rv20e_liu2020"),
-    ta.drawing("rv20e_baseline"),
+    ta.drawing("rv20e_table4"),
     limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)},
     questions=[ta.Allocation()],
 )

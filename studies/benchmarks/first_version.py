@@ -72,7 +72,7 @@ def write_units(count: int, file: Path) -> None:
     from tolalloc.study.prepared import Prepared
 
     study = ta.Study(
-        ta.reducer("rv20e_liu2020"), ta.drawing("rv20e_baseline"), limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)}
+        ta.reducer("rv20e_liu2020"), ta.drawing("rv20e_table4"), limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)}
     )
     prepared = Prepared(study=study)
     kernel = prepared.model.kernel

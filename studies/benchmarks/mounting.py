@@ -45,7 +45,7 @@ Figures = dict[str, list[float]]
 
 def prepared() -> tuple[ErrorModel, KernelResponse]:
     """Return the sources and the kernel, compiled and with its tables made."""
-    errors, model = ErrorModel(load_tolerance_table("rv20e_baseline")), EquivalentModel(load_reducer("rv20e_liu2020"))
+    errors, model = ErrorModel(load_tolerance_table("rv20e_table4")), EquivalentModel(load_reducer("rv20e_liu2020"))
     still = {name: 0.0 for name in model.columns if name not in errors.columns}
     fixed = still | model.reducer.modification.deviations
     torque = model.reducer.load.test_torque

@@ -119,7 +119,7 @@ def share_of_a_study() -> dict[str, float]:
 
     study = ta.Study(
         ta.reducer("rv20e_liu2020"),
-        ta.drawing("rv20e_baseline"),
+        ta.drawing("rv20e_table4"),
         limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)},
         questions=[ta.Ranking()],
         name="speed",

@@ -259,7 +259,7 @@ def genetic_section(plan: AssemblyPlan, seeds: int) -> tuple[Section, str]:
 
 def mounting_section(sets: int) -> tuple[Section, str]:
     """Return what choosing the mounting of measured parts is worth, over random sets of parts of an RV-20E."""
-    errors = ta.drawing("rv20e_baseline").errors
+    errors = ta.drawing("rv20e_table4").errors
     kernel = ta.reducer("rv20e_liu2020").bound(errors, "zhang2025_assembly").kernel
     rows = [_mounted(kernel, errors, units, sets) for units in SETS_OF]
     table = pd.DataFrame(rows)

@@ -25,7 +25,7 @@ PRESET = f"""import tolalloc as ta
 study = ta.Study(
     ta.reducer("rv20e_liu2020", flank_clearance=(1.0, 5.0), radial_clearance=(5.0, 20.0), unit="table4",
         stiffness="rv20e_table6"),
-    ta.drawing("rv20e_baseline"),
+    ta.drawing("rv20e_table4"),
     limits={{ta.PEAK_TO_PEAK: ta.Limit(upper=60.0, show=ta.AtYield(target=0.95)), ta.LOST_MOTION: ta.Limit(upper=2.0,
         show=ta.AtYield(target=0.95))}},
     questions=[ta.Ranking(), ta.Allocation(grades=True), ta.Difference(zones={{"pin.diameter": 3, "disc1.*": 8}})],

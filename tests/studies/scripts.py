@@ -37,7 +37,7 @@ def study_script(
     script.write_text(
         f"{imports}\nimport tolalloc as ta\n"
         f"study = ta.Study(ta.reducer(**{ {**BASELINE, **(reducer or {})}!r}), "
-        f"ta.drawing(**{ {'table': 'rv20e_baseline', **(drawing or {})}!r}), limits={limits}, {values}, {written})\n",
+        f"ta.drawing(**{ {'table': 'rv20e_table4', **(drawing or {})}!r}), limits={limits}, {values}, {written})\n",
         encoding="utf-8",
     )
     return script

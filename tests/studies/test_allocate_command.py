@@ -71,7 +71,7 @@ def script_with(path: Path, effort: str = f"ta.Effort(allocation={SMALL})", **te
 
 
 def few_sources(path: Path, **columns: str) -> Path:
-    table = pd.read_csv(ROOT / "tolalloc/drawings/data/rv20e_baseline.tolerances.csv", dtype=str, keep_default_na=False)
+    table = pd.read_csv(ROOT / "tolalloc/drawings/data/rv20e_table4.tolerances.csv", dtype=str, keep_default_na=False)
     kept = table[table["id"].isin(KEPT)].assign(**columns)
     kept.to_csv(path / "few.csv", index=False)
     return path / "few.csv"
@@ -402,7 +402,7 @@ SHOP = "process,tolerance,unit,cost\n"
     ],
 )
 def test_process_cost_tables_are_refused_in_one_sentence(tmp_path, table, shop, words):
-    sources = load_tolerance_table("rv20e_baseline")
+    sources = load_tolerance_table("rv20e_table4")
     (tmp_path / "costs.csv").write_text(table, encoding="utf-8")
     if shop:
         (tmp_path / "shop.csv").write_text(shop, encoding="utf-8")
@@ -417,7 +417,7 @@ def test_process_cost_tables_are_refused_in_one_sentence(tmp_path, table, shop, 
 def test_a_table_saved_by_a_spreadsheet_is_read(tmp_path):
     text = (HEAD + ROW).replace(",", ";")
     (tmp_path / "costs.csv").write_text(text, encoding="utf-8-sig")
-    found = load_process_costs(tmp_path / "costs.csv", load_tolerance_table("rv20e_baseline"))
+    found = load_process_costs(tmp_path / "costs.csv", load_tolerance_table("rv20e_table4"))
     assert [process.name for process in found["housing.pitch"]] == ["ground"]
 
 

@@ -54,7 +54,7 @@ def run_folder(tmp_path_factory) -> Path:
 
 
 def table_with(tmp_path: Path, change) -> str:
-    frame = pd.read_csv(DATA / "rv20e_baseline.tolerances.csv", dtype=str, keep_default_na=False)
+    frame = pd.read_csv(DATA / "rv20e_table4.tolerances.csv", dtype=str, keep_default_na=False)
     path = tmp_path / "table.csv"
     change(frame).to_csv(path, index=False)
     return str(path)
@@ -105,7 +105,7 @@ def test_check_says_what_is_read_and_that_the_drawing_cannot_be_built():
     (rows,) = (line for line in result.stdout.splitlines() if line.strip().startswith("disc*.pitch"))
     assert "2 rows" in rows and ": 23.3 µm" in rows
     assert any(line.strip().startswith("disc1.bore1.position: 4 µm") for line in result.stdout.splitlines())
-    table = load_tolerance_table("rv20e_baseline")
+    table = load_tolerance_table("rv20e_table4")
     cost = sum(source.cost for source in table if source.zone > 0)
     assert f" {cost:.2f} cost units" in result.stdout
     (flank,) = (line for line in result.stdout.splitlines() if line.strip().startswith("flank clearance: 1.04 µm;"))
@@ -190,7 +190,7 @@ def test_an_identified_stiffness_is_a_source_of_the_ranking_alone(run_folder):
 
 @pytest.mark.slow
 def test_allocation_has_the_layout_of_the_tolerance_table(run_folder):
-    before, after = load_tolerance_table("rv20e_baseline"), load_tolerance_table(run_folder / "allocation.csv")
+    before, after = load_tolerance_table("rv20e_table4"), load_tolerance_table(run_folder / "allocation.csv")
     assert [source.name for source in after] == [source.name for source in before]
     for old, new in zip(before, after, strict=True):
         assert new.columns == old.columns
@@ -310,14 +310,14 @@ def test_every_preset_turns(reducer):
 
 def test_a_truncated_workbook_is_refused(tmp_path):
     path = tmp_path / "table.xlsx"
-    pd.read_csv(DATA / "rv20e_baseline.tolerances.csv").to_excel(path, index=False)
+    pd.read_csv(DATA / "rv20e_table4.tolerances.csv").to_excel(path, index=False)
     assert tolalloc("check", study_script(tmp_path, drawing={"table": str(path)})).returncode == 0
     path.write_bytes(path.read_bytes()[:2000])
     refused(tolalloc("check", study_script(tmp_path, drawing={"table": str(path)})), "table.xlsx", "truncated")
 
 
 def test_a_truncated_table_is_refused(tmp_path):
-    text = (DATA / "rv20e_baseline.tolerances.csv").read_text(encoding="utf-8")
+    text = (DATA / "rv20e_table4.tolerances.csv").read_text(encoding="utf-8")
     (tmp_path / "table.csv").write_text(text[: int(len(text) * 0.7)].rsplit(",", 9)[0], encoding="utf-8")
     refused(
         tolalloc("check", study_script(tmp_path, drawing={"table": str(tmp_path / "table.csv")})),

@@ -31,7 +31,7 @@ class Bench:
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory) -> Bench:
     path = tmp_path_factory.mktemp("bench")
-    table = pd.read_csv(ROOT / "tolalloc/drawings/data/rv20e_baseline.tolerances.csv", dtype=str, keep_default_na=False)
+    table = pd.read_csv(ROOT / "tolalloc/drawings/data/rv20e_table4.tolerances.csv", dtype=str, keep_default_na=False)
     varied = ("housing.pitch", "disc1.pitch", "disc2.pitch", "pin.diameter")
     still = ~table["id"].isin(varied)
     for column in ("plus [unit]", "minus [unit]"):
@@ -95,7 +95,7 @@ def test_a_curve_that_no_such_errors_make_is_not_diagnosed(bench, tmp_path):
         (["--level", "1"], ["--level", "0.5 up to but not 1"]),
         (["--discrepancy", "-1"], ["--discrepancy", "0 to 60"]),
         (["--torque", "9999"], ["torque", "9999"]),
-        (["--tolerances", "nope"], ["nope", "rv20e_baseline"]),
+        (["--tolerances", "nope"], ["nope", "rv20e_table4"]),
         (["--correlations", "nope.csv"], ["nope.csv"]),
         (["--seed", "-1"], ["seed", "-1"]),
     ],
@@ -111,7 +111,7 @@ def test_bad_options_are_refused_in_one_sentence(bench, tmp_path, options, words
 
 def test_a_sheet_of_the_workbook_may_be_named(bench, tmp_path):
     workbook = tmp_path / "zones.xlsx"
-    table = table_frame(load_tolerance_table("rv20e_baseline"))
+    table = table_frame(load_tolerance_table("rv20e_table4"))
     write_sheets({"Rev A": table.assign(id="twice"), "Rev B": table}, workbook)
     words = {
         "Rev A": "twice",

@@ -15,6 +15,7 @@ from tolalloc.assembly.files import load_errors, load_plan
 from tolalloc.bench.measurements import load_measurements
 from tolalloc.cli.main import EXAMPLES, app
 from tolalloc.cli.samples import FACTOR, STIFFER
+from tolalloc.cli.start import modification_of
 from tolalloc.drawings.drawing import load_drawing
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.model import EquivalentModel
@@ -170,11 +171,16 @@ def test_what_is_missing_is_asked_on_a_terminal_alone(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("preset", RV.new.presets)
-def test_a_preset_that_is_not_changed_is_the_preset_under_another_name(tmp_path, preset):
+def test_a_preset_that_is_not_changed_is_the_preset_with_the_modification_of_the_drawing(tmp_path, preset):
     from dataclasses import replace
 
     tolalloc("new", tmp_path / "mine", "--like", preset)
-    assert replace(load_reducer(tmp_path / "mine" / "reducer.toml"), name="") == replace(load_reducer(preset), name="")
+    made, own = load_reducer(tmp_path / "mine" / "reducer.toml"), load_reducer(preset)
+    drawn = modification_of(own)
+    assert (made.modification.equidistant, made.modification.shift) == pytest.approx((drawn.equidistant, drawn.shift))
+    like = replace(made, name=own.name, modification=own.modification, assumptions=own.assumptions)
+    assert like == own
+    assert set(own.assumptions) < set(made.assumptions)
 
 
 @pytest.mark.slow

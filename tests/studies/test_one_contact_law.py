@@ -61,7 +61,7 @@ def test_modify_says_what_contact_says_of_the_reducer_that_it_writes(overloaded,
 
 
 def test_run_limits_the_force_that_contact_says(overloaded, contact):
-    model = ta.reducer(overloaded).bound(ta.drawing("rv20e_baseline").errors, "test")
+    model = ta.reducer(overloaded).bound(ta.drawing("rv20e_table4").errors, "test")
     output = "largest pin force, rated torque [N]"
     found = model.reading((output,))(np.zeros((1, len(model.columns))))
     assert found.values[0, 0] == pytest.approx(contact["bearings yielding"]["largest pin force [N]"], rel=0.01)

@@ -21,7 +21,7 @@ LIMITS = {ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)}
 
 
 def prepared(reducer: str, **changes: object) -> Prepared:
-    return Prepared(study=ta.Study(ta.reducer(reducer), ta.drawing("rv20e_baseline"), **{"limits": LIMITS, **changes}))
+    return Prepared(study=ta.Study(ta.reducer(reducer), ta.drawing("rv20e_table4"), **{"limits": LIMITS, **changes}))
 
 
 def test_no_pin_may_press_harder_without_torque_than_the_rated_torque_makes_it():
@@ -82,7 +82,7 @@ def test_the_last_sentence_of_a_check_says_that_units_are_preloaded_and_what_fre
 
 def test_a_verdict_says_that_units_are_preloaded_by_printed_stiffnesses_too():
     def verdict(reducer: ReducerChoice, scale: float) -> str:
-        asked = Prepared(study=ta.Study(reducer, ta.drawing("rv20e_baseline"), limits=LIMITS))
+        asked = Prepared(study=ta.Study(reducer, ta.drawing("rv20e_table4"), limits=LIMITS))
         errors, uniform = asked.errors, np.random.default_rng(5).uniform(size=(200, len(asked.errors.columns)))
         counted = asked.model.examined(errors.deviations(errors.standard_values(uniform), scale * errors.zones))
         return portrait_of(asked.model).examination(counted).but

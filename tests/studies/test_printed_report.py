@@ -194,4 +194,4 @@ def test_the_title_block_says_what_the_study_states_and_nothing_else(tmp_path):
 @pytest.mark.parametrize("block", [{"number": "1"}, {"revision": 2}, {"author": "x" * 61}, "B"])
 def test_a_title_block_that_cannot_be_meant_is_refused(block):
     with pytest.raises(InputError, match="title_block"):
-        ta.Study(ta.reducer("rv20e_liu2020"), ta.drawing("rv20e_baseline"), limits=LIMITS, title_block=block)
+        ta.Study(ta.reducer("rv20e_liu2020"), ta.drawing("rv20e_table4"), limits=LIMITS, title_block=block)

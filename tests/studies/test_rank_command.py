@@ -41,7 +41,7 @@ def script_with(path: Path, limits: str = LIMIT, **drawing: object) -> Path:
 
 
 def few_sources(path: Path) -> Path:
-    table = pd.read_csv(ROOT / "tolalloc/drawings/data/rv20e_baseline.tolerances.csv", dtype=str, keep_default_na=False)
+    table = pd.read_csv(ROOT / "tolalloc/drawings/data/rv20e_table4.tolerances.csv", dtype=str, keep_default_na=False)
     kept = ("housing.pitch", "housing.runout", "disc1.pitch", "disc2.pitch", "pin.diameter", "housing.groove.radius")
     table[table["id"].isin(kept)].to_csv(path / "few.csv", index=False)
     return path / "few.csv"

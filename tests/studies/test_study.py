@@ -41,7 +41,7 @@ def nothing(quick: bool):
     ("field", "value"),
     [
         ("model", ta.reducer("rv20e_liu2020")),
-        ("drawing", ta.drawing("rv20e_baseline")),
+        ("drawing", ta.drawing("rv20e_table4")),
         ("limits", LIMITS),
         ("seed", 2),
         ("largest_failed_share", 0.02),
@@ -56,7 +56,7 @@ def test_a_field_that_no_question_reads_is_refused_by_name(field, value):
 
 def test_what_a_user_writes_can_be_copied_and_pickled():
     limits = {ta.PEAK_TO_PEAK: ta.Limit(upper=60.0, show=ta.AtYield(target=0.99))}
-    study = ta.Study(ta.reducer("rv20e"), ta.drawing("rv20e_baseline"), limits=limits, questions=[ta.Ranking()])
+    study = ta.Study(ta.reducer("rv20e"), ta.drawing("rv20e_table4"), limits=limits, questions=[ta.Ranking()])
     for found in (copy.copy(study), copy.deepcopy(study), pickle.loads(pickle.dumps(study))):
         assert (found.limits, found.questions, found.seed) == (limits, (ta.Ranking(),), 1)
         assert Prepared(study=found).digest == Prepared(study=study).digest
@@ -85,10 +85,10 @@ def test_a_value_without_its_name_is_refused():
 
 
 def test_a_study_a_reducer_and_a_drawing_say_in_a_line_what_they_are():
-    study = ta.Study(ta.reducer("rv20e_liu2020", stiffness="rv20e_table6"), ta.drawing("rv20e_baseline"), limits=LIMITS)
-    assert repr(study).startswith("Study('study': RV-20E at rv20e_baseline; limits: peak-to-peak")
+    study = ta.Study(ta.reducer("rv20e_liu2020", stiffness="rv20e_table6"), ta.drawing("rv20e_table4"), limits=LIMITS)
+    assert repr(study).startswith("Study('study': RV-20E at rv20e_table4; limits: peak-to-peak")
     assert repr(study.model) == "<reducer RV-20E: 2 cranks, 2 discs, stiffness of liu2020, Table 6>"
-    assert repr(study.drawing) == "<drawing rv20e_baseline: 23 sources>"
+    assert repr(study.drawing) == "<drawing rv20e_table4: 23 sources>"
     assert ta.__version__
 
 
@@ -131,7 +131,7 @@ def test_a_script_finds_its_modules_and_files_beside_it_from_any_folder(tmp_path
     script, elsewhere = tmp_path / "mine" / "own_study.py", tmp_path / "elsewhere"
     (tmp_path / "mine" / "tables").mkdir(parents=True)
     elsewhere.mkdir()
-    table = ta.drawing("rv20e_baseline").to_csv(script.parent / "tables" / "own.csv")
+    table = ta.drawing("rv20e_table4").to_csv(script.parent / "tables" / "own.csv")
     (script.parent / "own_helper_of_a_study.py").write_text("TABLE = 'tables/own.csv'\nUPPER = 55.0\n")
     script.write_text(
         "import tolalloc as ta\nfrom own_helper_of_a_study import TABLE, UPPER\n"
@@ -196,8 +196,8 @@ SETTING = {"name": "h [mm]", "value": 2, "lower": 1, "upper": 3, "step": 0.1}
     ("made", "words"),
     [
         (lambda: ta.Study("rv20e_liu2020"), "model is 'rv20e_liu2020'; allowed is ta.reducer"),
-        (lambda: ta.Study(MODEL, "rv20e_baseline"), "drawing is 'rv20e_baseline'; allowed is ta.drawing"),
-        (lambda: ta.Study(ta.drawing("rv20e_baseline"), MODEL), "model is <drawing rv20e_baseline: 23 sources>"),
+        (lambda: ta.Study(MODEL, "rv20e_table4"), "drawing is 'rv20e_table4'; allowed is ta.drawing"),
+        (lambda: ta.Study(ta.drawing("rv20e_table4"), MODEL), "model is <drawing rv20e_table4: 23 sources>"),
         (lambda: ta.Study(limits=[60]), "limits is .60.; allowed is a dictionary"),
         (lambda: ta.Study(limits={"y [mm]": 60}), r"limits\['y \[mm\]'\] is 60; allowed is ta.Limit"),
         (lambda: ta.Study(questions=[ta.Ranking]), "questions is .*; allowed is ta.Ranking"),

@@ -69,7 +69,7 @@ def test_the_wheel_holds_what_it_needs_and_no_more(installed):
         "tolalloc/reports/page/document.html.j2",
         "tolalloc/cli/live/page/live.html",
         "tolalloc/reducers/reducer/presets/rv20e.reducer.toml",
-        "tolalloc/drawings/data/rv20e_all_sources.tolerances.csv",
+        "tolalloc/drawings/data/rv20e_drawing.tolerances.csv",
     }
     assert needed <= names
     assert not [name for name in names if name.startswith(("tests", "studies", "docs")) or "__pycache__" in name]

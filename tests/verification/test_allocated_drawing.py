@@ -136,7 +136,7 @@ def graded():
 def priced(tmp_path_factory):
     """Four groups that may change, each by several processes, and a lower limit whose stack adds, too."""
     free = {"disc bores", "pin.diameter", "disc run-out", "housing.pitch"}
-    sources = [replace(own, locked=own.group not in free) for own in load_tolerance_table("rv20e_baseline")]
+    sources = [replace(own, locked=own.group not in free) for own in load_tolerance_table("rv20e_table4")]
     table = tmp_path_factory.mktemp("table") / "locked.csv"
     table_frame(sources).to_csv(table, index=False)
     results = allocated(
@@ -367,7 +367,7 @@ def test_a_table_without_a_process_cost_table_keeps_its_own_processes(graded, tm
 
 @pytest.mark.parametrize(("middle", "widest"), [(0.0, 2.4691), (1.76549, 2.46911), (-0.33333, 1.00007), (5.1, 0.3)])
 def test_a_zone_at_its_largest_is_not_refused_for_its_last_decimal(middle, widest, tmp_path):
-    pin = next(own for own in load_tolerance_table("rv20e_baseline") if own.name == "pin.diameter")
+    pin = next(own for own in load_tolerance_table("rv20e_table4") if own.name == "pin.diameter")
     drawn = replace(pin, zone=widest * UM, middle=middle * UM, minimum=0.01 * UM, maximum=widest * UM)
     table_frame([drawn]).to_csv(tmp_path / "table.csv", index=False)
     (read,) = load_tolerance_table(tmp_path / "table.csv")

@@ -167,12 +167,12 @@ def test_the_next_question_of_a_reducer_finds_its_tables():
 
     def asked(torque: float) -> EquivalentModel:
         reducer = ta.reducer("rv20e_liu2020", torque=torque)
-        study = ta.Study(reducer, ta.drawing("rv20e_baseline"), limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)})
+        study = ta.Study(reducer, ta.drawing("rv20e_table4"), limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)})
         return Prepared(study=study).model.kernel.model
 
     assert asked(-2.0) is asked(-2.0)
     believable = [
-        ta.reducer("rv20e", torque=torque).bound(ta.drawing("rv20e_baseline").errors, "test").kernel.model
+        ta.reducer("rv20e", torque=torque).bound(ta.drawing("rv20e_table4").errors, "test").kernel.model
         for torque in (-2.0, -100.0)
     ]
     assert believable[0].reducer.stiffness != believable[1].reducer.stiffness  # that of the parts under each torque

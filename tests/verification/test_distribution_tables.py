@@ -86,7 +86,7 @@ def test_the_same_files_in_another_folder_are_the_same_study(tmp_path, monkeypat
     for folder in ("one", "two", "other"):
         (tmp_path / folder).mkdir()
         monkeypatch.chdir(tmp_path / folder)
-        frame = table_frame(load_tolerance_table("rv20e_baseline"))
+        frame = table_frame(load_tolerance_table("rv20e_table4"))
         chosen = frame["id"] == "pin.diameter"
         frame.loc[chosen, ["distribution", "measured"]] = ["empirical", "parts.csv"]
         frame.to_csv("t.csv", index=False)

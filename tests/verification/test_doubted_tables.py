@@ -131,7 +131,9 @@ def test_none_of_two_thousand_wrong_tables_is_read_without_a_word():
     assert sums["doubted"] > 500
 
 
-@pytest.mark.parametrize("name", ["rv20e_baseline", "rv20e_all_sources"])
+@pytest.mark.parametrize(
+    "name", ["rv20e_table4", "rv20e_all_sources", "rv20e_drawing", "rv40e_drawing", "rv110e_drawing"]
+)
 def test_nothing_is_doubted_of_shipped_tables(name):
     assert doubts(ta.drawing(name).sources, name) == ()
 

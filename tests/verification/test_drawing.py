@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from tolalloc.cli.start import clearances_of, modification_of, sources_of
 from tolalloc.drawings.correlation import Correlation, Pair
 from tolalloc.drawings.drawing import Drawing, load_drawing
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame, table_text
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
+from tolalloc.reading.units import MICROMETRE
+from tolalloc.reducers.reducer.files import load_reducer
 
 ZONE = {"plus": 0.1, "minus": -0.1, "unit": "mm", "min": 0.02, "max": 0.5, "cost": 3}
 HUB = {"id": "hub", "nominal": 55.29, **ZONE}
@@ -45,11 +49,36 @@ def test_rows_in_python_and_in_a_file_are_the_same_drawing(tmp_path):
         drawing.to_csv(tmp_path / "own.csv")
 
 
-@pytest.mark.parametrize("name", ["rv20e_baseline", "rv20e_all_sources"])
+@pytest.mark.parametrize("name", ["rv20e_table4", "rv20e_all_sources"])
 def test_a_table_is_written_as_pandas_writes_it(name, tmp_path):
     sources = [replace(own, zone=0.83 * own.zone, cost=own.cost / 3) for own in load_tolerance_table(name)]
     table_frame(sources).to_csv(tmp_path / "frame.csv", index=False)
     assert table_text(sources) == (tmp_path / "frame.csv").read_text(encoding="utf-8")
+
+
+def test_rows_of_the_shipped_drawing_that_differ_by_a_number_alone_are_alike():
+    rows: dict[str, set] = {}
+    for own in load_drawing("rv20e_drawing").sources:
+        like = rows.setdefault(re.sub(r"\d+", "", own.name), set())
+        like.add((own.zone, own.minimum, own.maximum, own.cost, own.spectrum, own.each, own.over, own.group))
+    assert {name: len(like) for name, like in rows.items()} == dict.fromkeys(rows, 1)
+
+
+@pytest.mark.parametrize("preset", ["rv40e", "rv80e", "rv110e"])
+def test_shipped_drawings_of_larger_sizes_are_what_the_rule_makes(preset):
+    reducer, drawing = load_reducer(preset), load_drawing(f"{preset}_drawing")
+    assert table_text(drawing.sources) == table_text(sources_of(reducer, complete=True))
+    assert drawing.settings == clearances_of(reducer)
+    smaller = {own.name: own for own in load_drawing("rv20e_drawing").sources}
+    assert all(own.zone > smaller[own.name].zone for own in drawing.sources if own.name in smaller)
+
+
+@pytest.mark.parametrize("preset", ["rv20e", "rv40e", "rv110e"])
+def test_modification_of_a_size_leaves_the_clearances_of_its_drawing(preset):
+    reducer = load_reducer(preset)
+    own, flank_and_radial = modification_of(reducer), [*clearances_of(reducer).values()]
+    left = [own.flank_clearance(reducer.cycloid_stage), own.radial_clearance]
+    assert np.array(left) / MICROMETRE == pytest.approx(flank_and_radial, abs=0.1)  # amounts in tenths
 
 
 def test_files_are_found_beside_the_study_and_shipped_ones_by_name(tmp_path, monkeypatch):
@@ -63,9 +92,9 @@ def test_files_are_found_beside_the_study_and_shipped_ones_by_name(tmp_path, mon
     assert drawing.sources[0].cp == 1.5
     assert drawing.correlation.source_matrix(drawing.sources)[0, 1] == 0.5
     assert drawing.costs == folder / "costs.csv"
-    assert load_drawing("rv20e_baseline", costs="rv20e", folder=folder).costs == "rv20e"
+    assert load_drawing("rv20e_table4", costs="rv20e", folder=folder).costs == "rv20e"
     assert load_drawing(folder / "t.csv", folder / "own.csv").sources == drawing.sources
-    with pytest.raises(InputError, match="no such file; shipped tolerance table files are rv20e_all_sources"):
+    with pytest.raises(InputError, match="no such file; shipped tolerance table files are rv110e_drawing, rv20e_all"):
         load_drawing("none.csv", folder=folder)
 
 

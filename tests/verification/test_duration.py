@@ -43,7 +43,7 @@ def test_the_units_of_a_reducer_are_foretold(identified):
     require_foretold(
         ta.Study(
             ta.reducer("rv20e_liu2020", flank_clearance=(1.0, 5.0), radial_clearance=(5.0, 20.0), **stiffness),
-            ta.drawing("rv20e_baseline"),
+            ta.drawing("rv20e_table4"),
             limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)},
             effort="quick",
         )

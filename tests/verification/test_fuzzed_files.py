@@ -159,7 +159,7 @@ def kinds(tmp_path_factory) -> dict[str, tuple[Path, Callable[[Path], Any]]]:
     """Return every kind of input: a good file beside what it names, and what reads it."""
     folder = tmp_path_factory.mktemp("good")
     given, seeds = load_reducer("rv20e_liu2020"), SeedTree(7)
-    sources = load_tolerance_table("rv20e_baseline")
+    sources = load_tolerance_table("rv20e_table4")
     bench = replace(CURVES_AND_LOOPS, curve_angles=CURVES_AND_LOOPS.curve_angles[::3])
     units = random_units(ErrorModel(sources), 2, seeds.child("units"))
     write_measurements(simulated_bench(given, units, bench).measured(seeds.child("noise")), folder)

@@ -112,7 +112,7 @@ def test_a_range_without_a_step_names_the_nearest_steps():
 
 
 def test_members_of_a_group_share_one_zone_inside_the_ranges_of_all():
-    table = load_tolerance_table("rv20e_baseline")
+    table = load_tolerance_table("rv20e_table4")
     bores = [source for source in table if source.group == "disc bores"]
     assert {round(bore.zone / UM, 3) for bore in bores} == {3.8, 4.0}
     ladder = group_ladder(bores)

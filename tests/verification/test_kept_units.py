@@ -164,7 +164,7 @@ import tolalloc as ta
 from tolalloc.running.result_cache import _digest
 from tolalloc.reducers import LOST_MOTION
 
-drawing = ta.drawing("rv20e_baseline")
+drawing = ta.drawing("rv20e_table4")
 model = ta.reducer("rv20e", neglected=("*",)).bound(drawing.errors, "digest")
 alone, chunk = model.kernel.alone, np.zeros((2, 3))
 for solve in (alone._extremes, alone._derivatives, model.reading((LOST_MOTION,)).alone.read):

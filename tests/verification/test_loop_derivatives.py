@@ -35,7 +35,7 @@ def two_cranks() -> tuple[ReducerModel, np.ndarray]:
 
 def three_cranks() -> tuple[ReducerModel, np.ndarray]:
     """Another number of cranks, constant stiffness of the pins."""
-    errors = ErrorModel(tuple(table_of_three_cranks("rv20e_baseline").values()))
+    errors = ErrorModel(tuple(table_of_three_cranks("rv20e_table4").values()))
     return bound(replace(load_reducer("rv20e_liu2020"), crank_count=3), errors)
 
 

@@ -23,7 +23,7 @@ from tolalloc.study.prepared import Prepared
 @pytest.fixture(scope="module")
 def model() -> ReducerModel:
     reducer = ta.reducer("rv20e", flank_clearance=(1.0, 8.0), radial_clearance=(3.0, 30.0))
-    study = ta.Study(reducer, ta.drawing("rv20e_baseline"), limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60)})
+    study = ta.Study(reducer, ta.drawing("rv20e_table4"), limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60)})
     return Prepared(study=study).model
 
 

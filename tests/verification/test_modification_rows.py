@@ -23,7 +23,7 @@ CLEARANCES = [(1.04, 8.0), (3.5, 12.0), (8.0, 20.0)]
 def prepared(*rows: dict, only: tuple[str, ...] = FEW, stiffness: str = "") -> Prepared:
     """Return a study of an RV-20E with some sources at zones that can be built, and these rows of the modification."""
     found = []
-    for own in ta.drawing("rv20e_baseline").errors.sources:
+    for own in ta.drawing("rv20e_table4").errors.sources:
         fitting = [size for part, size in BUILDABLE.items() if part in own.name]
         if not fitting or (only and own.name not in only):
             continue

@@ -30,7 +30,7 @@ WAVE = "order 1 cosine [arcsec]"
 
 @pytest.fixture(scope="module")
 def model(rv20e: EquivalentModel) -> ReducerModel:
-    table = {source.name: source for source in load_tolerance_table("rv20e_baseline")}
+    table = {source.name: source for source in load_tolerance_table("rv20e_table4")}
     errors = ErrorModel((table["disc1.bore1.position"], table["pin.diameter"]))
     fixed = dict.fromkeys(rv20e.columns, 0.0) | rv20e.reducer.modification.deviations
     fixed = {name: value for name, value in fixed.items() if name not in errors.columns}

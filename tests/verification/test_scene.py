@@ -217,7 +217,7 @@ def test_teeth_are_those_of_the_modified_profile(scene, rv20e):
     assert along[[root, tip]] == pytest.approx(removed / MILLIMETRE, abs=1e-9)
 
 
-@pytest.mark.parametrize("table", ["rv20e_baseline", "rv20e_all_sources"])
+@pytest.mark.parametrize("table", ["rv20e_table4", "rv20e_all_sources"])
 def test_every_source_of_a_shipped_drawing_has_one_place(table):
     sources = [source.name for source in load_tolerance_table(table)]
     found = places_of(load_reducer("rv20e"), sources)

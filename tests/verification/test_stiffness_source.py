@@ -34,7 +34,7 @@ FIELDS = ("crank_disc_bearing", "pin_contact")
 
 def few_sources() -> ErrorModel:
     """Return two sources of the shipped table."""
-    table = {source.name: source for source in load_tolerance_table("rv20e_baseline")}
+    table = {source.name: source for source in load_tolerance_table("rv20e_table4")}
     return ErrorModel((table["disc1.bore1.position"], table["pin.diameter"]))
 
 

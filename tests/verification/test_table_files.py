@@ -94,7 +94,7 @@ def test_a_sheet_may_be_chosen(sources, tmp_path):
     with pytest.raises(InputError, match="sheet 'Lists': the sheet is hidden"):
         load_drawing(path, sheet="Lists")
     with pytest.raises(InputError, match="sheet is 'Rev B'; allowed is none, since only a workbook"):
-        load_drawing("rv20e_baseline", sheet="Rev B")
+        load_drawing("rv20e_table4", sheet="Rev B")
 
 
 def test_titles_above_the_header_are_left_out(sources, tmp_path):

@@ -78,7 +78,7 @@ def test_cp_and_shift(generator):
 def test_baseline_zones_are_the_magnitudes_of_table_4():
     """A bore 2 µm off centre is a position of Ø 4 µm; a range over a turn is that of the printed harmonics."""
     unit = load_unit("table4").deviations
-    for row in load_tolerance_table("rv20e_baseline"):
+    for row in load_tolerance_table("rv20e_table4"):
         if row.zone == 0:
             continue
         errors = np.array([[unit[column] for column in row.columns]])
@@ -118,7 +118,7 @@ def test_columns_are_linear_in_the_zones(generator):
 
 
 def test_table_survives_writing_and_reading(tmp_path):
-    sources = load_tolerance_table("rv20e_baseline")
+    sources = load_tolerance_table("rv20e_table4")
     moved = with_zones(sources, [0.8 * source.zone for source in sources])
     table_frame(moved).to_csv(tmp_path / "moved.csv", index=False)
     table_frame(moved).to_excel(tmp_path / "moved.xlsx", index=False)
@@ -130,7 +130,7 @@ def test_table_survives_writing_and_reading(tmp_path):
 
 
 def test_zones_take_the_costs_that_they_were_bought_at_and_else_cost_1_over_zone():
-    sources = load_tolerance_table("rv20e_baseline")[:3]
+    sources = load_tolerance_table("rv20e_table4")[:3]
     moved = with_zones(sources, [0.5 * source.zone for source in sources], {sources[1].name: 7.0})
     assert [source.cost for source in moved] == [2 * sources[0].cost, 7.0, 2 * sources[2].cost]
     bought = with_zones(sources, [source.zone for source in sources], {sources[1].name: 7.0})

@@ -20,6 +20,7 @@ from tolalloc.assembly.steps import AssemblyStep
 from tolalloc.bench.measurements import CurveRecord, LoopRecord, MeasurementRecord, PeakToPeakRecord
 from tolalloc.cli.samples import Samples
 from tolalloc.drawings.distributions import Distribution
+from tolalloc.drawings.drawing import load_drawing
 from tolalloc.drawings.fields import COLUMNS, HEADERS
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_rows, table_text
@@ -30,7 +31,7 @@ from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.sources import ErrorSource
 from tolalloc.reducers.family import RV
-from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.design import Modification, Reducer
 from tolalloc.reducers.reducer.files import IdentifiedStiffnessRecord, ReducerRecord, load_reducer
 from tolalloc.reducers.unit_file import UnitRecord
 
@@ -113,10 +114,10 @@ class Likeness:
         return load_reducer(self.preset)
 
     def text(self, name: str) -> str:
-        """Return the reducer file; what the preset does not state of the new counts is marked as an assumption."""
+        """Return the reducer file; new counts and the modification of the drawing are marked as assumptions."""
         text = (_FOLDER / f"{self.preset}.reducer.toml").read_text(encoding="utf-8")
         text = re.sub(r'^name = ".*"$', f'name = "{name}"', text, count=1, flags=re.MULTILINE)
-        changed = []
+        text, changed = self._with_modification(text), []
         for field, count in (("crank_count", self.cranks), ("disc_count", self.discs)):
             before = int(re.search(rf"^{field} = (\d+)", text, re.MULTILINE)[1])  # type: ignore[index]
             if count not in (None, before):
@@ -127,26 +128,69 @@ class Likeness:
             text = text.replace("assumptions = [\n", f'assumptions = [\n  "{note}",\n', 1)
         return f"# Made by tolalloc new, like {self.preset}. Change what you know, and what `assumptions` says.\n{text}"
 
+    def _with_modification(self, text: str) -> str:
+        """Return a reducer file with the amounts that leave the clearances of the drawing at this size."""
+        amounts = modification_of(self.reducer)
+        for field in ("equidistant", "shift"):
+            amount = f"{getattr(amounts, field) / MICROMETRE:.1f}"
+            text = re.sub(rf"^{field}_um = \S+", f"{field}_um = {amount}", text, count=1, flags=re.MULTILINE)
+        flank, radial = clearances_of(self.reducer).values()
+        note = (
+            f"modification not that of {self.preset}: leaves {flank:g} µm on the flank and {radial:g} µm at tip and "
+            "root, as rv20e_drawing does in the proportion of its zones"
+        )
+        return text.replace("assumptions = [\n", f'assumptions = [\n  "{note}",\n', 1)
+
 
 _NUMBERED = re.compile(r"(disc|crank|bore|journal|planet|mesh)\d+")
 
 
-def sources_of(reducer: Reducer) -> tuple[Source, ...]:
+def sources_of(reducer: Reducer, complete: bool = False) -> tuple[Source, ...]:
     """Return all sources of a reducer with assumed zones.
 
-    Zones and their ranges are those of the shipped RV-20E, scaled by the tolerance unit i = 0.45·D^(1/3) + 0.001·D of
-    ISO 286-1 with D the diameter of the pin circle in mm. The first stage is locked.
+    Zones and their ranges are those of ``rv20e_drawing``, scaled by the tolerance unit i = 0.45·D^(1/3) + 0.001·D of
+    ISO 286-1 with D the diameter of the pin circle in mm. The shipped drawings of larger sizes are made by this rule.
+
+    Parameters
+    ----------
+    reducer
+        The reducer.
+    complete
+        Whether every source has a zone and may change, as in the shipped drawings; or else the first stage is locked,
+        and phases, tilts, single pins and teeth are neglected.
     """
     known = {source.name: source for source in load_tolerance_table(RV.new.table)}
-    scale = size_factor(2 * reducer.cycloid_stage.pin_circle_radius / MILLIMETRE)
+    scale = _scale_of(reducer)
     kinds = {name: RV.sources.of(name) for name in map(source_name, EquivalentModel(reducer).columns)}
     found = []
     for name, kind in kinds.items():
         like = known.get(name) or known.get(_NUMBERED.sub(r"\g<1>1", name))
         if like is not None and kind is not None:
             own = replace(like, name=name, part=name.partition(".")[0])
-            found.append((kind.fine + 2 * kind.first_stage, _scaled(own, kind, reducer, scale)))
+            scaled = _scaled(own, kind, reducer, scale)
+            found.append((kind.fine + 2 * kind.first_stage, scaled if complete else _reduced(scaled, kind)))
     return tuple(own for _, own in sorted(found, key=lambda ranked: ranked[0]))
+
+
+def clearances_of(reducer: Reducer) -> dict[str, float]:
+    """Return the clearances of the drawing's modification at this size, by name [µm].
+
+    They are those of ``rv20e_drawing`` in the proportion of the zones, in whole tenths of a micrometre.
+    """
+    stated = load_drawing(RV.new.table).settings
+    return {name: round(_scale_of(reducer) * value, 1) for name, value in stated.items()}
+
+
+def modification_of(reducer: Reducer) -> Modification:
+    """Return the amounts that leave the clearances of the drawing at this size, in whole tenths of a micrometre."""
+    flank, radial = clearances_of(reducer).values()
+    exact = Modification.from_clearances(flank * MICROMETRE, radial * MICROMETRE, reducer.cycloid_stage)
+    return Modification(equidistant=_rounded(exact.equidistant), shift=_rounded(exact.shift))
+
+
+def _scale_of(reducer: Reducer) -> float:
+    """Return how much wider zones are than those of the RV-20E [-]."""
+    return size_factor(2 * reducer.cycloid_stage.pin_circle_radius / MILLIMETRE)
 
 
 def size_factor(diameter: float) -> float:
@@ -163,16 +207,34 @@ def size_factor(diameter: float) -> float:
 
 
 def _scaled(source: Source, kind: ErrorSource, reducer: Reducer, scale: float) -> Source:
-    """Return a source at this size, its number of like features that of the reducer."""
-    nominal = kind.nominal.of(reducer) if kind.nominal and not kind.each else 0.0
+    """Return a source at this size, its number of like features that of the reducer.
+
+    The length over which an angle is measured grows with the pin circle.
+    """
+    nominal = kind.nominal.of(reducer) if kind.nominal else 0.0
     zone, least, most = (_rounded(scale * own) for own in (source.zone, source.minimum, source.maximum))
-    note = "zone, range and cost assumed: those of the RV-20E, scaled by ISO 286's tolerance unit"
-    own = replace(source, zone=zone, minimum=least, maximum=most, each=kind.count(reducer), nominal=nominal, note=note)
+    longer = 2 * reducer.cycloid_stage.pin_circle_radius / MILLIMETRE / RV.new.diameter
+    note = "zone, range and cost assumed: those of rv20e_drawing, scaled by ISO 286's tolerance unit"
+    return replace(
+        source,
+        zone=zone,
+        minimum=least,
+        maximum=most,
+        each=kind.count(reducer),
+        over=round(longer * source.over / MILLIMETRE, 1) * MILLIMETRE,
+        nominal=nominal,
+        note=note,
+    )
+
+
+def _reduced(source: Source, kind: ErrorSource) -> Source:
+    """Return a source as a new folder has it: a fine one is neglected, one of the first stage is locked."""
     if kind.fine:
-        return replace(own, zone=0.0, minimum=0.0, maximum=0.0, cost=0.0, locked=True, note="neglected: give it a zone")
+        source = replace(source, zone=0.0, minimum=0.0, maximum=0.0, cost=0.0, nominal=0.0)
+        return replace(source, locked=True, note="neglected: give it a zone")
     if kind.first_stage:
-        return replace(own, locked=True, note=f"{note}; locked: the first stage is divided by the ratio")
-    return own
+        return replace(source, locked=True, note=f"{source.note}; locked: the first stage is divided by the ratio")
+    return source
 
 
 def _rounded(length: float) -> float:

@@ -13,6 +13,7 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.fields import COLUMNS, ToleranceRow
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.table_file import (
+    DATA,
     read_table_file,
     require_columns,
     split_header,
@@ -142,7 +143,7 @@ class Drawing:
         notes, currency = _read_beside(path)
         sources = load_tolerance_table(path)
         notes, changed = (*notes, *doubts(sources, path.name)), self.with_sources(sources, str(table))
-        settings = {**self.settings, **(stated_settings(path) if path.suffix else {})}
+        settings = {**self.settings, **_settings_of(path)}
         return replace(changed, notes=notes, currency=currency or self.currency, settings=settings)
 
     def with_sources(self, changed: Iterable[Source], name: str = "") -> Drawing:
@@ -209,9 +210,9 @@ def load_drawing(
 
     Examples
     --------
-    >>> baseline = load_drawing("rv20e_baseline")
-    >>> len(baseline.sources), f"{1e6 * baseline.sources[0].zone:.1f} µm"
-    (23, '4.0 µm')
+    >>> drawing = load_drawing("rv20e_drawing")
+    >>> len(drawing.sources), f"{1e6 * drawing.sources[0].zone:.1f} µm", drawing.settings["flank clearance [µm]"]
+    (48, '4.0 µm', 3.5)
     """
     sources = load_tolerance_table(beside(folder, table), beside(folder, processes), sheet)
     correlation = load_correlations(beside(folder, correlations), sources) if correlations else Correlation()
@@ -223,8 +224,14 @@ def load_drawing(
         costs=_placed(costs if isinstance(costs, Mapping) else beside(folder, costs)),
         notes=(*notes, *doubts(sources, path.name)),
         currency=currency,
-        settings=stated_settings(path) if path.suffix else {},
+        settings=_settings_of(path),
     )
+
+
+def _settings_of(table: Path) -> dict[str, float]:
+    """Return the settings that a tolerance table states, a shipped one by its name too."""
+    shipped = DATA / f"{table.name}.tolerances.csv"
+    return stated_settings(table if table.suffix else shipped)
 
 
 def _read_beside(table: Path, sheet: str = "") -> tuple[tuple[str, ...], str]:

@@ -45,7 +45,7 @@ class NewRows:
     presets: tuple[str, ...]  # Presets whose dimensions follow one rule, smallest first
     cranks: tuple[int, ...]  # Counts that a folder can be made for [-]
     discs: tuple[int, ...]
-    table: str  # Tolerance table that is scaled
+    table: str  # Tolerance table that is scaled, and that states the clearances of its modification
     diameter: float  # Of the pin circle to which the table belongs [mm]
 
 
@@ -181,7 +181,7 @@ RV = ReducerFamily(
         presets=("rv20e", "rv40e", "rv80e", "rv110e", "rv160e"),
         cranks=(2, 3, 4),
         discs=(1, 2, 3),
-        table="rv20e_all_sources",
+        table="rv20e_drawing",
         diameter=104.0,
     ),
 )

@@ -99,7 +99,7 @@ class Study(Problem):
     Examples
     --------
     >>> import tolalloc as ta
-    >>> ta.Study(ta.reducer("rv20e"), ta.drawing("rv20e_baseline"), limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60)}).seed
+    >>> ta.Study(ta.reducer("rv20e"), ta.drawing("rv20e_drawing"), limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60)}).seed
     1
     """
 

@@ -26,7 +26,7 @@ class Diagnose(Inquiry["DiagnosisRequest"]):
 
     curve: Annotated[Path, Word("CSV: columns 'angle [deg]', 'transmission error [arcsec]'.")]
     reducer: ReducerName = None
-    tolerances: Annotated[str, Word("Tolerance table: shipped name, CSV or XLSX.")] = "rv20e_baseline"
+    tolerances: Annotated[str, Word("Tolerance table: shipped name, CSV or XLSX.")] = "rv20e_drawing"
     sheet: Annotated[str, Word("Sheet of a workbook that holds the table; the first unless given.")] = ""
     torque: TestTorque = None
     noise: Annotated[float, Word("Standard deviation of one reading [arcsec].")] = 0.5
