@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from tolalloc.models.model import Model as Model
     from tolalloc.models.settings import Setting as Setting
     from tolalloc.reducers import BACKLASH as BACKLASH
+    from tolalloc.reducers import DISC_TEMPERATURE as DISC_TEMPERATURE
     from tolalloc.reducers import EFFICIENCY as EFFICIENCY
     from tolalloc.reducers import FRICTION_TORQUE as FRICTION_TORQUE
     from tolalloc.reducers import HYSTERESIS_LOSS as HYSTERESIS_LOSS
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
     from tolalloc.reducers import RADIAL_CLEARANCE as RADIAL_CLEARANCE
     from tolalloc.reducers import TORSIONAL_STIFFNESS as TORSIONAL_STIFFNESS
     from tolalloc.reducers.choice import reducer as reducer
+    from tolalloc.reducers.settings import at as at
     from tolalloc.reports.document import Document as Document
     from tolalloc.reports.document import Section as Section
     from tolalloc.reports.figure import Figure as Figure
@@ -80,6 +82,7 @@ _WHERE = {
     "AtYield": "allocation.space.requirement",
     "BACKLASH": "reducers",
     "Calculation": "study.questions",
+    "DISC_TEMPERATURE": "reducers",
     "Difference": "study.questions",
     "Document": "reports.document",
     "Drawing": "drawings.drawing",
@@ -120,6 +123,7 @@ _WHERE = {
     "UnitPrice": "allocation.cost.unit_price",
     "UnknownNameError": "exceptions",
     "WorstCase": "allocation.space.requirement",
+    "at": "reducers.settings",
     "check": "study.commands",
     "drawing": ("drawings.drawing", "load_drawing"),
     "from_fmu": "models.function_model",

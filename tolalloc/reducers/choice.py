@@ -14,7 +14,7 @@ from tolalloc.exceptions import InputError
 from tolalloc.models.settings import require_settings
 from tolalloc.reading.named_fields import is_number
 from tolalloc.reading.units import MICROMETRE, MILLIMETRE
-from tolalloc.reducers import TORQUE
+from tolalloc.reducers import DISC_TEMPERATURE, TORQUE
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.model import EquivalentModel, cached_model
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
@@ -24,7 +24,7 @@ from tolalloc.reducers.reducer.design import Modification, Reducer, at_torque
 from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.reducers.response.kernel import KernelResponse
-from tolalloc.reducers.settings import clearance_settings
+from tolalloc.reducers.settings import clearance_settings, require_temperature
 from tolalloc.reducers.unit_file import BuiltUnit, load_unit
 
 if TYPE_CHECKING:
@@ -157,6 +157,9 @@ class ReducerChoice:
     torque: float | None = None
     flank_clearance: tuple[float, float] | None = None
     radial_clearance: tuple[float, float] | None = None
+    # As there [K]
+    disc_temperature: float = 0.0
+    further_disc_temperatures: tuple[float, ...] = ()
     neglected: tuple[str, ...] = NEGLECTED
     unit: BuiltUnit | None = None  # Built unit whose curve is shown, if any
 
@@ -171,16 +174,18 @@ class ReducerChoice:
         return self.reducer.name
 
     def set_to(self, settings: Mapping[str, float]) -> ReducerChoice:
-        """Return the reducer with a tooth modification that leaves other clearances [µm], or at another torque [N·m].
+        """Return the reducer with a tooth modification that leaves other clearances [µm], or other conditions [N·m, K].
 
         Raises
         ------
         InputError, UnknownNameError
-            A setting that it does not have, a clearance outside its bounds, or a torque that is not allowed.
+            A setting that it does not have, a clearance outside its bounds, or a condition that is not allowed.
         """
         place, torque = f"reducer {self.name}", settings.get(TORQUE, self.torque)
         self.reducer.torque_on_carrier(torque, place)
-        clearances = {name: value for name, value in settings.items() if name != TORQUE}
+        warmer = settings.get(DISC_TEMPERATURE, self.disc_temperature)
+        require_temperature(place, DISC_TEMPERATURE, warmer)
+        clearances = {name: value for name, value in settings.items() if name not in (TORQUE, DISC_TEMPERATURE)}
         own, stage = self.reducer.modification, self.reducer.cycloid_stage
         present = (own.flank_clearance(stage) / MICROMETRE, own.radial_clearance / MICROMETRE)
         # Without a range a clearance is not chosen by an allocation; whoever states one may state any.
@@ -188,10 +193,11 @@ class ReducerChoice:
         known = clearance_settings(present, (self.flank_clearance or anywhere, self.radial_clearance or anywhere))
         require_settings(place, known, clearances)
         if not clearances:
-            return replace(self, torque=torque)
+            return replace(self, torque=torque, disc_temperature=warmer)
         flank, radial = (clearances.get(setting.name, setting.value) * MICROMETRE for setting in known)
         modification = Modification.from_clearances(flank, radial, stage)
-        return replace(self, torque=torque, reducer=replace(self.reducer, modification=modification))
+        reducer = replace(self.reducer, modification=modification)
+        return replace(self, torque=torque, disc_temperature=warmer, reducer=reducer)
 
     def bound(self, errors: ErrorModel, place: str) -> ReducerModel:
         """Return the model at the sources of a drawing; nothing is solved.
@@ -209,7 +215,8 @@ class ReducerChoice:
             for own in (self.flank_clearance, self.radial_clearance)
         )
         return ReducerModel(
-            kernel=kernel,
+            kernel=kernel.at_disc_temperature(self.disc_temperature),
+            further_disc_temperatures=self.further_disc_temperatures,
             flank=flank,
             radial=radial,
             identified=self.identified,
@@ -219,6 +226,14 @@ class ReducerChoice:
         )
 
 
+def _require_temperatures(place: str, own: object, further: object) -> None:
+    require_temperature(place, "disc_temperature", own)
+    if isinstance(further, str) or not isinstance(further, Sequence):
+        raise InputError.at(place, "further_disc_temperatures", further, "a list of temperatures, such as (-5, 5)")
+    for warmer in further:
+        require_temperature(place, "further_disc_temperatures", warmer)
+
+
 def reducer(
     name: str | Path,
     *,
@@ -226,6 +241,8 @@ def reducer(
     torque: float | None = None,
     flank_clearance: tuple[float, float] | None = None,
     radial_clearance: tuple[float, float] | None = None,
+    disc_temperature: float = 0.0,
+    further_disc_temperatures: tuple[float, ...] = (),
     neglected: tuple[str, ...] = NEGLECTED,
     unit: str | Path = "",
 ) -> ReducerChoice:
@@ -242,6 +259,11 @@ def reducer(
     flank_clearance, radial_clearance
         Smallest and largest nominal clearance that the tooth modification may leave on the flank, and at tip and root;
         as they are unless given [µm].
+    disc_temperature
+        Temperature of the discs less that of the ring of pins [K].
+    further_disc_temperatures
+        Others of that kind at which outputs may be limited as well, by names that `tolalloc.at` makes, such as
+        ``ta.at(ta.LOST_MOTION, disc_temperature=-5)`` [K].
     neglected
         Sources that a drawing may leave out, taken as zero; ``*`` stands for anything.
     unit
@@ -265,6 +287,7 @@ def reducer(
             and -_FARTHEST <= own[0] <= own[1] <= _FARTHEST
         ):
             raise InputError.at(f"reducer {name}", field, own, "two numbers from -50 to 50 µm, the smaller one first")
+    _require_temperatures(f"reducer {name}", disc_temperature, further_disc_temperatures)
     if isinstance(neglected, str) or not (
         isinstance(neglected, Sequence) and all(isinstance(pattern, str) for pattern in neglected)
     ):
@@ -280,6 +303,8 @@ def reducer(
         torque=torque,
         flank_clearance=flank_clearance,
         radial_clearance=radial_clearance,
+        disc_temperature=float(disc_temperature),
+        further_disc_temperatures=tuple(dict.fromkeys(map(float, further_disc_temperatures))),
         neglected=tuple(neglected),
         unit=load_unit(unit) if unit else None,
     )

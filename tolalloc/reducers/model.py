@@ -15,10 +15,10 @@ from tolalloc.exceptions import UnknownNameError
 from tolalloc.models.model import Model, Observer, Response, SettingDerivatives
 from tolalloc.models.settings import DrawnAmounts, Setting
 from tolalloc.reading.units import MICROMETRE
-from tolalloc.reducers import PEAK_TO_PEAK, PRELOAD, RADIAL_CLEARANCE, TORQUE
+from tolalloc.reducers import DISC_TEMPERATURE, PEAK_TO_PEAK, PRELOAD, RADIAL_CLEARANCE, TORQUE
 from tolalloc.reducers.equivalent.hysteresis import HysteresisLoop
 from tolalloc.reducers.equivalent.perfect import exact_loop, preload, rated_pin_force
-from tolalloc.reducers.reducer.design import MODIFICATION_CONVENTION, Modification, Reducer
+from tolalloc.reducers.reducer.design import MODIFICATION_CONVENTION, Modification, Reducer, thermal_shift
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.reducers.response.kernel import (
     SEEN,
@@ -37,7 +37,7 @@ from tolalloc.reducers.response.outputs import (
     wave_outputs,
     with_orders,
 )
-from tolalloc.reducers.settings import clearance_settings, torque_condition
+from tolalloc.reducers.settings import at, clearance_settings, temperature_condition, torque_condition
 from tolalloc.reducers.unit_file import BuiltUnit
 from tolalloc.running.chunks import Mapper
 
@@ -58,6 +58,7 @@ class ReducerModel(Model):
     flank: tuple[float, float] | None = None
     radial: tuple[float, float] | None = None
     identified: IdentifiedStiffness | None = None  # Stiffnesses that replaced the reducer's own, if any
+    further_disc_temperatures: tuple[float, ...] = ()  # At which outputs may be limited beside that in force [K]
     # Values of the settings in force; those of the reducer's own modification unless given [µm]
     clearances: tuple[float, float] | None = None
     unit: BuiltUnit | None = None  # Built unit whose curve is shown beside others, if any
@@ -71,10 +72,14 @@ class ReducerModel(Model):
 
     @property
     def reducer_in_force(self) -> Reducer:
-        """The same with the modification that leaves the clearances in force."""
-        if self.clearances is None:
+        """The same with the modification that leaves the clearances in force, and as warm discs shift it."""
+        warmer, own = self.kernel.disc_temperature, self.reducer.modification
+        if self.clearances is None and not warmer:
             return self.reducer
-        return replace(self.reducer, modification=self.modification(np.array(self.clearances)))
+        if self.clearances is not None:
+            own = self.modification(np.array(self.clearances))
+        shift = own.shift + thermal_shift(self.reducer.cycloid_stage, warmer)
+        return replace(self.reducer, modification=replace(own, shift=shift))
 
     @property
     def name(self) -> str:
@@ -88,13 +93,42 @@ class ReducerModel(Model):
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """All that requirements may limit, the peak-to-peak first."""
+        """All that requirements may limit, the peak-to-peak first, and the same at the further temperatures."""
+        return (*self._own_outputs, *(name for own in self._at_temperatures.values() for name in own))
+
+    @cached_property
+    def _own_outputs(self) -> tuple[str, ...]:
+        """Outputs at the temperature in force."""
         return limited_outputs(self.reducer)
+
+    @cached_property
+    def _at_temperatures(self) -> Mapping[float, Mapping[str, str]]:
+        """Further temperature of the discs [K] → output under it → its name at the temperature in force."""
+        return {
+            warmer: {at(name, disc_temperature=warmer): name for name in self._own_outputs}
+            for warmer in self.further_disc_temperatures
+        }
+
+    def _under(self, output: str) -> tuple[ReducerModel, str]:
+        """Return the model at the temperature that an output names, and the output there."""
+        for warmer, names in self._at_temperatures.items():
+            if output in names:
+                kernel = self.kernel.at_disc_temperature(warmer)
+                return replace(self, kernel=kernel, further_disc_temperatures=()), names[output]
+        return self, output
+
+    def _everywhere(self, outputs: tuple[str, ...]) -> tuple[str, ...]:
+        """Return outputs at the temperature in force and at the further ones."""
+        further = self.further_disc_temperatures
+        return (*outputs, *(at(name, disc_temperature=warmer) for warmer in further for name in outputs))
 
     @property
     def ranked(self) -> tuple[str, ...]:
-        """All but those with friction, which ask for more than twice the equilibria of the other outputs of a loop."""
-        return tuple(name for name in self.outputs if name not in WITH_FRICTION)
+        """All but those with friction, which ask for more than twice the equilibria of the other outputs of a loop.
+
+        Those at further temperatures double the equilibria too.
+        """
+        return tuple(name for name in self._own_outputs if name not in WITH_FRICTION)
 
     def reading(self, outputs: tuple[str, ...]) -> Response:
         """Return the response of these outputs, waves of `spectra` among them if need be.
@@ -112,6 +146,9 @@ class ReducerModel(Model):
                 raise UnknownNameError.among(self.name, "output", name, self.outputs)
         orders = tuple(dict.fromkeys(waves[name] for name in outputs if name in waves))
         readings = with_orders(readings_of(outputs), orders) if orders else readings_of(outputs)
+        for warmer, names in self._at_temperatures.items():
+            own = readings_of(tuple(names[name] for name in outputs if name in names))
+            readings = (*readings, *(reading.at(warmer) for reading in own))
         response = OutputsResponse(kernel=self.kernel, readings=readings)
         return response if response.outputs == outputs else replace(response, chosen=outputs)
 
@@ -146,16 +183,19 @@ class ReducerModel(Model):
 
     @property
     def exact(self) -> tuple[str, ...]:
-        """The peak-to-peak alone."""
-        return (PEAK_TO_PEAK,)
+        """The peak-to-peak alone, at every temperature."""
+        return self._everywhere((PEAK_TO_PEAK,))
 
     @property
     def differentiable(self) -> tuple[str, ...]:
         """What is read off torque against twist."""
-        return DIFFERENTIABLE
+        return self._everywhere(DIFFERENTIABLE)
 
     def derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
         """Return the peak-to-peak, or what is read off torque against twist, of every sample with its derivatives."""
+        model, name = self._under(output)
+        if model is not self:
+            return model.derivatives(name, x)
         if output in self.differentiable:
             return self._loop_derivatives(output, x)
         if output not in self.exact:
@@ -194,13 +234,15 @@ class ReducerModel(Model):
 
     @property
     def conditions(self) -> Mapping[str, float | str]:
-        """Torque on the carrier."""
-        return {TORQUE: self.kernel.torque}
+        """Torque on the carrier, and the temperature of the discs where it is not that of the ring."""
+        warmer = self.kernel.disc_temperature
+        return {TORQUE: self.kernel.torque, **({DISC_TEMPERATURE: warmer} if warmer else {})}
 
     @property
     def operating_conditions(self) -> tuple[Setting, ...]:
-        """The torque."""
-        return (torque_condition(self.kernel.torque, self.reducer.load.rated_torque),)
+        """The torque, and the temperature of the discs above the ring."""
+        torque = torque_condition(self.kernel.torque, self.reducer.load.rated_torque)
+        return (torque, temperature_condition(self.kernel.disc_temperature))
 
     @cached_property
     def exact_loop_in_force(self) -> HysteresisLoop:
@@ -220,8 +262,10 @@ class ReducerModel(Model):
 
     @property
     def content(self) -> Any:
-        """Reducer, identified stiffnesses and torque."""
-        return (self.reducer, self.identified.content if self.identified else None, self.kernel.torque)
+        """Reducer, identified stiffnesses, torque, and temperatures of the discs where there are any."""
+        own = (self.reducer, self.identified.content if self.identified else None, self.kernel.torque)
+        warm = (self.kernel.disc_temperature, self.further_disc_temperatures)
+        return (*own, *warm) if any(warm) else own
 
     @property
     def uncertain(self) -> tuple[CorrelatedSource, ...]:
@@ -247,7 +291,7 @@ class ReducerModel(Model):
     @property
     def accuracy(self) -> Mapping[str, float]:
         """That of the peak-to-peak, from the angles of its search [arcsec]."""
-        return {PEAK_TO_PEAK: SEEN}
+        return dict.fromkeys(self._everywhere((PEAK_TO_PEAK,)), SEEN)
 
     @property
     def _peak_with_stiffness(self) -> StiffnessResponse:

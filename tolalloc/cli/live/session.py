@@ -331,7 +331,10 @@ class Session:
             "settings": [
                 *(_setting(own, portrait_of(model).settings_word) for own in model.settings),
                 # an odd number of steps leaves out the middle, a torque of 0, at which play leaves all undetermined
-                *(_setting(own, "operating condition", _STEPS + 1) for own in model.operating_conditions),
+                *(
+                    _setting(own, "operating condition", _STEPS + (own.value != 0.0))
+                    for own in model.operating_conditions
+                ),
             ],
             "limits": [own.sentence for own in self.requirements],
             "currency": self.prepared.currency or COST_UNITS,

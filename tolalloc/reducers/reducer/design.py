@@ -77,6 +77,29 @@ class CycloidStage:
         return self.pin_circle_radius * sqrt(1 + shortening**2 - 2 * shortening * cosine) ** 3 / bend
 
 
+THERMAL_EXPANSION = 11.5e-6
+"""Coefficient α of discs and ring, a usual value of bearing and case-hardened steel; an assumption [1/K]."""
+
+
+def thermal_shift(stage: CycloidStage, warmer: float) -> float:
+    """Return the shift that discs warmer than the ring by ΔT [K] have beside that of their grinding, α·R_p·ΔT [m].
+
+    Disc and ring are each of one temperature, α is `THERMAL_EXPANSION`. Of the growth of a disc as a whole,
+    α·ΔT·(R_p·cos φ − r_rp − e·cos γ) along a normal, the first term alone is taken: the others are below a tenth of it.
+
+    References
+    ----------
+    Own derivation; α is an assumption.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> round(1e6 * thermal_shift(load_reducer("rv20e").cycloid_stage, 5.0), 2)  # [µm]
+    2.99
+    """
+    return THERMAL_EXPANSION * stage.pin_circle_radius * warmer
+
+
 SHIFT_SIGNS = {"plus": 1.0, "minus": -1.0}
 """Convention → sign of its shift here: ``plus`` grinds at Rp + Δr_p (liu2020, song2019), ``minus`` at Rp − Δr_p
 (li2018, xi2015). All of them grind with a pin of r_rp + Δr_rp."""

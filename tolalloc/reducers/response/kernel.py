@@ -20,7 +20,7 @@ from tolalloc.models.model import Evaluation, Observer, Response, unobserved
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers import PEAK_TO_PEAK
 from tolalloc.reducers.equivalent.model import Derivatives, EquivalentModel, Extremes
-from tolalloc.reducers.reducer.design import Modification, Reducer
+from tolalloc.reducers.reducer.design import Modification, Reducer, thermal_shift
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.running.chunks import Mapper, map_chunks
 
@@ -55,6 +55,7 @@ class KernelResponse:
     # modification, which a row of a tolerance table lets deviate [m]
     fixed: Mapping[str, float]
     offsets: Mapping[str, float] = field(default_factory=dict)  # Added to columns that are fixed [m]
+    disc_temperature: float = 0.0  # Of the discs less that of the ring [K]
     observe: Observer = unobserved  # Told the statuses of each chunk
     mapper: Mapper = map  # What solves the chunks, `tolalloc.running.chunks.map_chunks`
 
@@ -78,6 +79,10 @@ class KernelResponse:
     def with_modification(self, modification: Modification) -> KernelResponse:
         """Return the response of the same reducer with another tooth modification."""
         return replace(self, fixed={**self.fixed, **modification.deviations})
+
+    def at_disc_temperature(self, warmer: float) -> KernelResponse:
+        """Return the response of the same reducer whose discs are warmer than the ring by so much [K]."""
+        return replace(self, disc_temperature=warmer)
 
     def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
         """Return the peak-to-peak of every sample [arcsec]."""
@@ -134,7 +139,7 @@ class KernelResponse:
     def errors(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample all_columns"]:
         """Return the varied columns and the fixed ones together, in the order of the model [m].
 
-        A column that is both deviates from its fixed value.
+        A column that is both deviates from its fixed value, and warmer discs shift their teeth, `thermal_shift`.
         """
         where = {name: at for at, name in enumerate(self.model.columns)}
         errors = np.zeros((x.shape[0], len(where)))
@@ -143,6 +148,9 @@ class KernelResponse:
         errors[:, [where[name] for name in self.columns]] += x
         for name, offset in self.offsets.items():
             errors[:, where[name]] += offset
+        if self.disc_temperature:
+            stage = self.model.reducer.cycloid_stage
+            errors[:, where["modification.shift"]] += thermal_shift(stage, self.disc_temperature)
         return errors
 
 

@@ -33,6 +33,7 @@ from tolalloc.reducers.equivalent.outputs import OUTPUTS, Solved, peak_line_load
 from tolalloc.reducers.equivalent.perfect import preload
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.reducers.settings import at
 from tolalloc.running.chunks import map_chunks
 
 Answer = tuple[Float[np.ndarray, "chunk output"], UInt8[np.ndarray, " chunk"]]
@@ -45,6 +46,12 @@ class Reading:
     outputs: tuple[str, ...]  # Names of the outputs with their units
     # From model, errors in the order of its columns, and test torque, the outputs and the status of every sample
     read: Callable[[EquivalentModel, Float[np.ndarray, "chunk column"], float], Answer]
+    disc_temperature: float | None = None  # At which it is read, that of the kernel unless said [K]
+
+    def at(self, disc_temperature: float) -> Reading:
+        """Return the same at a temperature of the discs above the ring, its outputs named after it [K]."""
+        outputs = tuple(at(name, disc_temperature=disc_temperature) for name in self.outputs)
+        return replace(self, outputs=outputs, disc_temperature=disc_temperature)
 
 
 def _peak_to_peak(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
@@ -238,8 +245,14 @@ class OutputsResponse:
 
     def read(self, x: Float[np.ndarray, "chunk column"]) -> Answer:
         """Return the outputs of one chunk and the worst status of every sample."""
-        errors = self.kernel.errors(x)
-        answers = [reading.read(self.kernel.model, errors, self.kernel.torque) for reading in self.readings]
+        errors = {
+            warmer: (self.kernel if warmer is None else self.kernel.at_disc_temperature(warmer)).errors(x)
+            for warmer in {reading.disc_temperature for reading in self.readings}
+        }
+        answers = [
+            reading.read(self.kernel.model, errors[reading.disc_temperature], self.kernel.torque)
+            for reading in self.readings
+        ]
         return np.concatenate([values for values, _ in answers], axis=1), np.asarray(
             np.max([status for _, status in answers], axis=0)
         )
