@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 NEGLECTED = RV.sources.neglected
 """Sources that a tolerance table need not list; they are then taken as exact, and the report says so."""
 
+_NOMINAL = "*.clearance"
+"""Sources of clearances: one without a row has the nominal value of the reducer file, whatever else is neglected."""
+
 _LARGEST_ZONE = 200.0 * MICROMETRE
 """Largest zone of a reducer's part that is believed; a metre typed for a millimetre is far above it [m]."""
 
@@ -62,7 +65,8 @@ def bind(
     # The next question of the same reducer finds the tables as they are.
     model = cached_model(at_torque(reducer, carried), AngleSearch(), orders or HARMONICS)
     listed = {*errors.columns, *errors.fixed}
-    left_out = {pattern: neglected_columns((pattern,), model.columns) - listed for pattern in neglected}
+    patterns = dict.fromkeys((*neglected, _NOMINAL))
+    left_out = {pattern: neglected_columns((pattern,), model.columns) - listed for pattern in patterns}
     fixed: Mapping[str, float] = {
         **dict.fromkeys((column for columns in left_out.values() for column in columns), 0.0),
         **dict.fromkeys(_absent_orders(errors, model, place), 0.0),
@@ -265,7 +269,8 @@ def reducer(
         Others of that kind at which outputs may be limited as well, by names that `tolalloc.at` makes, such as
         ``ta.at(ta.LOST_MOTION, disc_temperature=-5)`` [K].
     neglected
-        Sources that a drawing may leave out, taken as zero; ``*`` stands for anything.
+        Sources that a drawing may leave out, taken as zero; ``*`` stands for anything. A bearing's or a mesh's
+        clearance may always be left out: it is then the nominal one of the reducer file.
     unit
         Built unit whose curve is shown, by shipped name or path.
 
