@@ -163,8 +163,8 @@ def test_a_refusal_names_the_argument(word, given, said):
 def test_a_value_without_its_name_or_of_no_field_is_refused():
     with pytest.raises(InputError, match=r"tolalloc te: 'rv20e' stands without its name; write reducer=\.\.\.\."):
         ta.te("rv20e")
-    with pytest.raises(InputError, match=r"tolalloc modify: method is missing"):
-        ta.modify()
+    with pytest.raises(InputError, match=r"tolalloc diagnose: curve is missing"):
+        ta.diagnose()
     with pytest.raises(TolallocError, match="field 'reductor' is not known; the nearest known is reducer"):
         ta.te(reductor="rv20e")
 

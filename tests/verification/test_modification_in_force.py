@@ -10,13 +10,17 @@ import pytest
 
 import tolalloc as ta
 from tests.builders import says
+from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCMINUTE, MICROMETRE
+from tolalloc.reducers.cycloid.clearance import clearance_of
+from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
 from tolalloc.reducers.equivalent.perfect import exact_loop
 from tolalloc.reducers.model import ReducerModel
-from tolalloc.reducers.modification import ModificationRequest, choose
+from tolalloc.reducers.modification import ModificationRequest, choose, wanted_clearances
+from tolalloc.reducers.reducer.design import Modification
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reports.portrait import portrait_of
-from tolalloc.study.inquiries.modify import answer_of
+from tolalloc.study.inquiries.modify import Modify, answer_of
 from tolalloc.study.prepared import Prepared
 
 
@@ -72,3 +76,52 @@ def test_a_reducer_without_a_catalogue_has_nothing_to_exceed():
     found = choose(ModificationRequest(method="li2018"), load_reducer("rv20e_liu2020"), -167.0)
     assert found.lost_motion is None
     assert not found.exceeds_catalogue
+
+
+@pytest.mark.parametrize(("flank", "radial"), [(3.5, 8.0), (1.0, 10.0), (8.0, 6.0)])
+@pytest.mark.parametrize("name", ["rv40e", "rv160e"])
+def test_wanted_clearances_are_delivered_by_exact_distances(name, flank, radial):
+    """Amounts of both signs, on two and on three cranks: the wrong sign would be interference, which is refused."""
+    reducer = load_reducer(name)
+    request = ModificationRequest(flank_clearance=flank * MICROMETRE, radial_clearance=radial * MICROMETRE)
+    found = choose(request, reducer, -reducer.load.rated_torque)
+    stage = reducer.cycloid_stage
+    assert np.sign(found.best.amounts[1]) == np.sign(flank - radial)
+    exact = clearance_of(ToothProfile(stage=stage, modification=found.best.modification), exact=True)
+    assert exact.rotation * stage.disc_pitch_radius == pytest.approx(flank * MICROMETRE, abs=0.02 * MICROMETRE)
+    assert exact.before[[0, -1]] == pytest.approx(radial * MICROMETRE, abs=0.02 * MICROMETRE)
+    assert found.delivered_flank == exact.rotation * stage.disc_pitch_radius
+    assert exact.after.min() > -1e-9
+
+
+def test_default_amounts_can_be_built():
+    """The shipped reducers keep their catalogues' lost motion with the clearances that are wanted by default."""
+    for name in ("rv20e", "rv40e", "rv80e", "rv110e", "rv160e"):
+        found = choose(*Modify(reducer=name).prepare())
+        assert found.lost_motion < found.allowed_lost_motion, name
+        assert not found.exceeds_catalogue
+
+
+def test_wanted_clearances_beyond_the_catalogue_are_said():
+    wanted = ModificationRequest(flank_clearance=12 * MICROMETRE, radial_clearance=20 * MICROMETRE)
+    found = choose(wanted, load_reducer("rv20e"), -167.0)
+    assert found.exceeds_catalogue
+    assert says(answer_of(found).warnings, "modification.wanted_exceeds_catalogue")
+    assert not says(answer_of(found).sentences, "modification.play")
+
+
+def test_no_amounts_leave_a_flank_clearance_that_another_pin_closes_first():
+    """Beyond (1 + q)·J the pin at φ0 is not the first one: the exact flank clearance stays behind the formula's."""
+    stage = load_reducer("rv40e").cycloid_stage
+    ratio, radial = stage.flank_ratio, 5 * MICROMETRE
+    most = (1 + ratio) * radial
+    wanted_clearances(stage, most, radial)
+    with pytest.raises(InputError, match="another pin touches first"):
+        wanted_clearances(stage, 1.01 * most, radial)
+    delivered = []
+    for flank in (most, 1.2 * most):
+        amounts = Modification.from_clearances(flank, radial, stage)
+        exact = clearance_of(ToothProfile(stage=stage, modification=amounts), exact=True)
+        delivered.append(exact.rotation * stage.disc_pitch_radius / flank)
+    assert delivered[0] == pytest.approx(1.0, abs=0.002)
+    assert delivered[1] < 0.99

@@ -74,7 +74,7 @@ EXAMPLES = {
     "costs": "tolalloc costs mine/shop.csv",
     "te": "tolalloc te --reducer rv20e --unit table4 --attribute",
     "contact": "tolalloc contact --reducer mine/reducer.toml",
-    "modify": "tolalloc modify li2018 --reducer mine/reducer.toml --radial 15",
+    "modify": "tolalloc modify --flank 3.5 --radial 8 --reducer mine/reducer.toml",
     "identify": "tolalloc identify mine/bench.toml --reducer mine/reducer.toml",
     "diagnose": "tolalloc diagnose mine/unit7.csv --reducer mine/reducer.toml --tolerances mine/zones.csv",
     "assemble": "tolalloc assemble mine/chain.toml --measured mine/angles.csv",

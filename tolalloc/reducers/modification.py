@@ -1,4 +1,4 @@
-"""Equidistant and shift amount by a published method: what is minimised and kept, and the optimum without chance."""
+"""Equidistant and shift amount from wanted clearances or by a published method, and the optimum without chance."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ Amounts = Float[np.ndarray, "n 2"]
 """Pairs of Δr_rp and Δr_p, `tolalloc.reducers.reducer.design.Modification` [m]."""
 
 _ROUNDING = 1e-17  # violation that counts as none [m]
+_MOST_OFF = 2 * MICROMETRE  # by which a wanted clearance may be missed by exact distances [m]
 _UNMET = 1.0  # merit from which on a constraint is violated; no objective comes near it [m]
 
 
@@ -68,6 +69,7 @@ class ModificationProblem:
     upper: Float[np.ndarray, " 2"]
     radial_clearance: float = 0.0  # Smallest clearance j at tip and root, Δr_rp − Δr_p ≥ j [m]
     require_gap: bool = False  # Whether no pin may interfere once the flank at φ0 is closed
+    wanted: Modification | None = None  # The answer, where it follows from clearances that are wanted
 
     def constraints(self, amounts: Amounts) -> Float[np.ndarray, "n c"]:
         """Return what must not be negative: radial clearance beyond j and, if required, q·Δr_rp − Δr_p [m]."""
@@ -390,8 +392,72 @@ def _path(
     return pin - crank, slope, (stage.pin_count**2 * crank - pin) / stage.disc_teeth**2
 
 
-METHODS = ("song2019", "li2018")
-"""Published methods: closest to a rotated profile, and least gap on the working flank."""
+def wanted_clearances(stage: CycloidStage, flank: float, radial: float) -> ModificationProblem:
+    """Return the problem of the amounts that leave a flank clearance F and a radial clearance J [m].
+
+    Raises
+    ------
+    InputError
+        Another pin would touch before the flank is closed, so that no amounts leave these clearances.
+
+    Notes
+    -----
+    F = Δr_rp − q·Δr_p and J = Δr_rp − Δr_p are linear in both amounts, so Δr_p = (F − J)/(1 − q) and Δr_rp = J + Δr_p.
+    The pin at φ0 touches first if the gap after closing is nowhere negative (`ModificationProblem`):
+    q·Δr_rp ≥ Δr_p, which is F ≤ (1 + q)·J, for F ≥ J, and J ≥ 0 below.
+
+    References
+    ----------
+    xi2015, equation (3), for F and J; the bound is an own derivation.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> problem = wanted_clearances(load_reducer("rv20e").cycloid_stage, 3.5e-6, 8e-6)
+    >>> f"{problem.wanted.equidistant / 1e-6:.4f} µm, {problem.wanted.shift / 1e-6:.4f} µm"
+    '-8.1639 µm, -16.1639 µm'
+    """
+    ratio = stage.flank_ratio
+    most = (1 + ratio) * radial
+    if not 0 <= flank <= most + _ROUNDING:
+        raise InputError(
+            f"modification: flank clearance is {flank / MICROMETRE:g} µm with a radial clearance of "
+            f"{radial / MICROMETRE:g} µm; allowed is 0 to {most / MICROMETRE:.4g} µm, as another pin touches first "
+            f"beyond, or a radial clearance of at least {flank / (1 + ratio) / MICROMETRE:.4g} µm."
+        )
+    wanted = np.array([flank, radial])
+
+    def difference(amounts: Amounts) -> Float[np.ndarray, " n"]:
+        equidistant, shift = amounts.T
+        left = np.stack([equidistant - ratio * shift, equidistant - shift], axis=-1)
+        return np.asarray(np.abs(left - wanted).max(axis=-1))
+
+    return ModificationProblem(
+        name="wanted clearances",
+        description=f"flank clearance {flank / MICROMETRE:g} µm, radial clearance {radial / MICROMETRE:g} µm",
+        stage=stage,
+        objective=difference,
+        lower=np.full(2, -MILLIMETRE),
+        upper=np.full(2, MILLIMETRE),
+        radial_clearance=radial,
+        wanted=Modification.from_clearances(flank, radial, stage),
+    )
+
+
+def _solved(problem: ModificationProblem) -> Optimum:
+    """Return the optimum of a problem, the amounts themselves where they follow from what is wanted."""
+    if problem.wanted is None:
+        return reference(problem)
+    own = np.array([problem.wanted.equidistant, problem.wanted.shift])
+    return Optimum(amounts=own, objective=float(problem.objective(own[np.newaxis])[0]), violation=0.0, evaluations=1)
+
+
+METHODS = ("clearances", "song2019", "li2018")
+"""Amounts that leave wanted clearances, and two published methods: closest to a rotated profile, and least gap."""
+BUILDABLE_FLANK, BUILDABLE_RADIAL = 3.5 * MICROMETRE, 8 * MICROMETRE
+"""Clearances that are wanted unless said otherwise, of a drawing of an RV-20E that can be built; assumed [m]."""
+PUBLISHED_RADIAL = 15 * MICROMETRE
+"""Radial clearance of the published methods unless said otherwise [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -401,11 +467,13 @@ class ModificationRequest:
     Raises
     ------
     InputError, UnknownNameError
-        An unknown method or metric, or a radial clearance out of range.
+        An unknown method or metric, or a clearance out of range.
     """
 
-    method: str  # ``song2019``: closest to a rotated profile; ``li2018``: least gap on the working flank
-    radial_clearance: float = 15 * MICROMETRE  # Smallest clearance at tip and root [m]
+    # ``clearances``: those that are wanted; ``song2019``: closest to a rotated profile; ``li2018``: least gap
+    method: str = "clearances"
+    flank_clearance: float = BUILDABLE_FLANK  # Wanted on the flank, clearances only [m]
+    radial_clearance: float = PUBLISHED_RADIAL  # At tip and root: wanted by clearances, the smallest otherwise [m]
     rotation: float = 0.005  # δ of the profile to come close to, song2019 only [rad]
     metric: Metric = "same_angle"  # Distance of the profiles, song2019 only
     shift_sign: int = 1  # 1 for a positive and −1 for a negative shift, song2019 only [-]
@@ -418,12 +486,14 @@ class ModificationRequest:
             raise UnknownNameError.among(place, "method", self.method, METHODS)
         if self.metric not in METRICS:
             raise UnknownNameError.among(place, "metric", self.metric, METRICS)
-        if not 0 <= self.radial_clearance <= 1e-3:
-            asked = f"{self.radial_clearance / MICROMETRE:g} µm"
-            raise InputError.of_argument(place, "radial_clearance", asked, "0 to 1000 µm")
+        for argument in ("radial_clearance", "flank_clearance"):
+            if not 0 <= (value := getattr(self, argument)) <= 1e-3:
+                raise InputError.of_argument(place, argument, f"{value / MICROMETRE:g} µm", "0 to 1000 µm")
 
     def problem(self, reducer: Reducer) -> ModificationProblem:
         """Return what is minimised on a reducer's cycloid stage."""
+        if self.method == "clearances":
+            return wanted_clearances(reducer.cycloid_stage, self.flank_clearance, self.radial_clearance)
         if self.method == "li2018":
             return residual_gap(reducer.cycloid_stage, self.radial_clearance)
         return rotated_profile_fit(
@@ -438,7 +508,7 @@ class ModificationRequest:
 
 @dataclass(frozen=True, kw_only=True)
 class ModificationResult:
-    """The two amounts that a method chose, and what they do on the reducer."""
+    """The two amounts that were chosen, and what they do on the reducer."""
 
     request: ModificationRequest  # What was asked
     reducer: Reducer  # The design with these amounts
@@ -460,6 +530,25 @@ class ModificationResult:
         return max(self.lost_motion, self.contact.assessment.clearance.backlash) > self.allowed_lost_motion
 
     @property
+    def delivered_flank(self) -> float:
+        """Flank clearance by exact distances, from the free rotation until the first pin touches [m]."""
+        return self.contact.assessment.exact_clearance.rotation * self.reducer.cycloid_stage.disc_pitch_radius
+
+    @property
+    def delivered_radial(self) -> float:
+        """Smaller one of the exact distances at root and tip [m]."""
+        before = self.contact.assessment.exact_clearance.before
+        return float(min(before[0], before[-1]))
+
+    @property
+    def off(self) -> float:
+        """By how much exact distances miss the clearances that were wanted, 0 where none were [m]."""
+        if self.problem.wanted is None:
+            return 0.0
+        flank = abs(self.delivered_flank - self.request.flank_clearance)
+        return max(flank, abs(self.delivered_radial - self.request.radial_clearance))
+
+    @property
     def turns_far(self) -> bool:
         """Whether the rotated profile to come close to has more play than a precision reducer."""
         far = self.request.rotation * self.reducer.cycloid_stage.disc_pitch_radius > LARGE
@@ -475,13 +564,14 @@ def choose(request: ModificationRequest, reducer: Reducer, torque: float) -> Mod
     Raises
     ------
     InputError
-        No amounts meet the constraints, or the best ones cannot be ground or mounted.
+        No amounts meet the constraints or leave the wanted clearances, or the best ones cannot be ground or mounted.
 
     References
     ----------
-    song2019, equation (10); li2018, whose formulas are lost, as `residual_gap` reads it.
+    xi2015, equation (3), for wanted clearances; song2019, equation (10); li2018, whose formulas are lost, as
+    `residual_gap` reads it.
 
-    Least mean gap of song2019 (2019) or li2018 (2018), with Δr_rp − Δr_p ≥ j.
+    Amounts of the wanted clearances, or the optimum of song2019 (2019) or li2018 (2018) with Δr_rp − Δr_p ≥ j.
 
     Examples
     --------
@@ -491,7 +581,7 @@ def choose(request: ModificationRequest, reducer: Reducer, torque: float) -> Mod
     [35.968, 20.968]
     """
     problem = request.problem(reducer)
-    best = reference(problem)
+    best = _solved(problem)
     if best.violation > 0:
         equidistant, shift = (
             f"{low / MICROMETRE:g}…{high / MICROMETRE:g} µm"
@@ -503,7 +593,7 @@ def choose(request: ModificationRequest, reducer: Reducer, torque: float) -> Mod
             "allowed is less radial clearance."
         )
     modified = replace(reducer, modification=best.modification)
-    return ModificationResult(
+    found = ModificationResult(
         request=request,
         reducer=modified,
         problem=problem,
@@ -511,3 +601,11 @@ def choose(request: ModificationRequest, reducer: Reducer, torque: float) -> Mod
         contact=contact_of(modified, torque),
         lost_motion=float(exact_loop(modified).lost_motion[-1]) if modified.catalogue else None,
     )
+    if found.off > _MOST_OFF:
+        amounts = " and ".join(f"{amount / MICROMETRE:.4g}" for amount in best.amounts)
+        raise InputError(
+            f"{reducer.name}: {problem.description} would need amounts of {amounts} µm, which leave "
+            f"{found.delivered_flank / MICROMETRE:.3g} and {found.delivered_radial / MICROMETRE:.3g} µm by exact "
+            "distances; allowed is less radial clearance."
+        )
+    return found

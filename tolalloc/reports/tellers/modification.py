@@ -1,4 +1,4 @@
-"""The two modification amounts that a method chose, and what they do on the reducer."""
+"""The two modification amounts that were chosen, and what they do on the reducer."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 
 _say = Sentences("modification")
 _NONE = 1e-11  # clearance that counts as none [m]
+_OFF = 0.3e-6
+"""By how much exact distances may differ from what is wanted unsaid [m]."""
 _UNPRINTED = {
+    "clearances": ("clearances_closing",),
     "song2019": ("song2019_box", "song2019_clearance"),
     "li2018": ("li2018_reading", "li2018_interval"),
 }
@@ -52,11 +55,29 @@ class ModificationTeller(Teller[ModificationResult]):
         """The amounts, how a reducer file states them, and how the teeth carry."""
         best, (equidistant, shift) = self.result.best, self.result.best.amounts / MICROMETRE
         description, objective = self.result.problem.description, best.objective / MICROMETRE
+        amounts = {"equidistant": equidistant, "shift": shift, "description": description}
         return (
-            _say("amounts", equidistant=equidistant, shift=shift, description=description, objective=objective),
+            _say("amounts_wanted", **amounts) if self._wanted else _say("amounts", **amounts, objective=objective),
+            *self._play(),
             _say("file", equidistant=f"{equidistant:.4f}", shift=f"{shift:.4f}"),
             *self._contact.sentences,
         )
+
+    @property
+    def _wanted(self) -> bool:
+        """Whether clearances were wanted, which an amount follows from."""
+        return self.result.problem.wanted is not None
+
+    def _play(self) -> tuple[str, ...]:
+        """Return the play that wanted clearances leave; one beyond the catalogue is a warning."""
+        found = self.result
+        if not self._wanted or found.exceeds_catalogue:
+            return ()
+        backlash = found.contact.assessment.clearance.backlash / ARCMINUTE
+        if found.lost_motion is None:
+            return (_say("backlash", backlash=backlash),)
+        allowed, lost = found.allowed_lost_motion / ARCMINUTE, found.lost_motion / ARCMINUTE
+        return (_say("play", backlash=backlash, lost_motion=lost, model=self.header.model, allowed=allowed),)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -67,13 +88,16 @@ class ModificationTeller(Teller[ModificationResult]):
         if found.exceeds_catalogue and found.lost_motion is not None:
             said.append(
                 _say(
-                    "exceeds_catalogue",
+                    "wanted_exceeds_catalogue" if self._wanted else "exceeds_catalogue",
                     backlash=found.contact.assessment.clearance.backlash / ARCMINUTE,
                     lost_motion=found.lost_motion / ARCMINUTE,
                     model=self.header.model,
                     allowed=found.allowed_lost_motion / ARCMINUTE,
                 )
             )
+        if found.off > _OFF:
+            flank, radial = found.delivered_flank / MICROMETRE, found.delivered_radial / MICROMETRE
+            said.append(_say("not_delivered", flank=flank, radial=radial, description=found.problem.description))
         return (*said, *self._contact.warnings)
 
     @property
@@ -89,11 +113,18 @@ class ModificationTeller(Teller[ModificationResult]):
     @property
     def delivered(self) -> pd.DataFrame:
         """What was asked for beside what the exact distances show."""
-        found = self.result.contact.assessment.exact_clearance
+        found, request = self.result.contact.assessment.exact_clearance, self.result.request
         lowest, asked = float(found.after.min()), self.result.problem.radial_clearance / MICROMETRE
         lowest = lowest if abs(lowest) > _NONE else 0.0
+        radial, flank = "radial clearance at tip and root [µm]", f"{request.flank_clearance / MICROMETRE:g}"
+        first = [(radial, f"{asked:g} or more", found.radial / MICROMETRE)]
+        if self._wanted:
+            first = [
+                ("flank clearance [µm]", flank, self.result.delivered_flank / MICROMETRE),
+                (radial, f"{asked:g}", self.result.delivered_radial / MICROMETRE),
+            ]
         rows = [
-            ("radial clearance at tip and root [µm]", f"{asked:g} or more", found.radial / MICROMETRE),
+            *first,
             ("smallest clearance after the first contact [µm]", "0", lowest / MICROMETRE),
         ]
         return Table(name="delivered", columns=_DELIVERED, rows=rows).frame()
@@ -102,7 +133,9 @@ class ModificationTeller(Teller[ModificationResult]):
     def sections(self) -> tuple[Section, ...]:
         """What the amounts deliver, and the contact."""
         found = self.result
-        objective = _say("objective", description=found.problem.description, evaluations=found.best.evaluations)
+        objective = _say("objective_wanted")
+        if not self._wanted:
+            objective = _say("objective", description=found.problem.description, evaluations=found.best.evaluations)
         delivered = Section(
             heading=_say("delivered_heading"), paragraphs=(objective,), tables=(("delivered", self.delivered),)
         )

@@ -1,4 +1,4 @@
-"""Equidistant and shift amount by a published method."""
+"""Equidistant and shift amount that leave wanted clearances, or by a published method."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 
+from tolalloc.exceptions import InputError
 from tolalloc.reading.units import MICROMETRE
 from tolalloc.reports.header import Header
 from tolalloc.running.progress import Progress
@@ -20,16 +21,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Modify(Inquiry["tuple[ModificationRequest, Reducer, float]"]):
-    """Choose equidistant and shift amount by a published objective, and say what they deliver."""
+    """Choose equidistant and shift amount for wanted clearances or by a published objective; say what they deliver."""
 
     word: ClassVar[str] = "modify"
     by_position: ClassVar[int] = 1
     kernel: ClassVar[Literal["", "equivalent", "cycloid"]] = "cycloid"
     written: ClassVar[tuple[str, ...]] = ("profile", "write_to")
 
-    method: Annotated[str, Word("song2019 (towards a rotated profile) or li2018 (least gap).")]
+    method: Annotated[
+        str, Word("clearances (those wanted), song2019 (towards a rotated profile) or li2018 (least gap).")
+    ] = "clearances"
     reducer: ReducerName = None
-    radial: Annotated[float, Word("Least clearance at tip and root [µm].", option="--radial")] = 15.0
+    flank: Annotated[float | None, Word("clearances: wanted on the flank [µm]; 3.5 unless given.")] = None
+    radial: Annotated[
+        float | None,
+        Word("At tip and root [µm]: wanted by clearances, 8 unless given, the least of the others, 15 unless given."),
+    ] = None
     rotation: Annotated[float, Word("song2019: rotation of the profile to come close to [rad].")] = 0.005
     metric: Annotated[str, Word("song2019: same_angle, normal or nearest.")] = "same_angle"
     negative: Annotated[bool, Word("song2019: a negative shift.", option="--negative-shift")] = False
@@ -44,12 +51,24 @@ class Modify(Inquiry["tuple[ModificationRequest, Reducer, float]"]):
     def prepare(self) -> tuple[ModificationRequest, Reducer, float]:
         """Return what is chosen, on which design, and the torque on the carrier [N·m]."""
         from tolalloc.reading.files import require_new
-        from tolalloc.reducers.modification import ModificationRequest
+        from tolalloc.reducers.modification import (
+            BUILDABLE_FLANK,
+            BUILDABLE_RADIAL,
+            PUBLISHED_RADIAL,
+            ModificationRequest,
+        )
         from tolalloc.reducers.reducer.files import load_reducer
 
+        wanted = self.method == "clearances"
+        if self.flank is not None and not wanted:
+            raise InputError.of_argument(
+                self.called, "flank", f"{self.flank:g} µm", f"none with {self.method}, which chooses it by itself"
+            )
+        radial = BUILDABLE_RADIAL if wanted else PUBLISHED_RADIAL
         request = ModificationRequest(
             method=self.method,
-            radial_clearance=self.radial * MICROMETRE,
+            flank_clearance=BUILDABLE_FLANK if self.flank is None else self.flank * MICROMETRE,
+            radial_clearance=radial if self.radial is None else self.radial * MICROMETRE,
             rotation=self.rotation,
             metric=cast("Metric", self.metric),
             shift_sign=-1 if self.negative else 1,
