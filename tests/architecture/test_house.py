@@ -80,7 +80,7 @@ def test_the_package_is_imported_without_heavy_libraries():
 
 
 @pytest.mark.parametrize(
-    ("words", "allowed"), [(["--help"], ()), (["check", "studies/rv20e_allocation.py"], SOLVED_WITH)]
+    ("words", "allowed"), [(["--help"], ()), (["check", "studies/liu2020_allocation.py"], SOLVED_WITH)]
 )
 def test_help_and_check_need_no_heavy_library(words, allowed):
     program = f"""

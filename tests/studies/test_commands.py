@@ -17,7 +17,7 @@ from tests.studies.scripts import study_script
 from tolalloc.drawings.table_file import DATA
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 
-STUDY = ROOT / "studies" / "rv20e_allocation.py"
+STUDY = ROOT / "studies" / "liu2020_allocation.py"
 PEAK = "peak-to-peak transmission error [arcsec]"
 
 
@@ -408,7 +408,7 @@ def test_a_script_without_a_study_is_refused(tmp_path):
 
 
 def test_the_script_runs_by_itself(tmp_path):
-    copy = tmp_path / "rv20e_allocation.py"
+    copy = tmp_path / "liu2020_allocation.py"
     shutil.copy(STUDY, copy)
     (tmp_path / "busy").mkdir()
     (tmp_path / "busy" / "file").write_text("x")

@@ -49,8 +49,8 @@ def study(script):
 @pytest.fixture(scope="module")
 def reducer(tmp_path_factory):
     folder = tmp_path_factory.mktemp("reducer")
-    shutil.copy(ROOT / "studies" / "rv20e_allocation.py", folder)
-    opened = OpenStudy(folder / "rv20e_allocation.py")
+    shutil.copy(ROOT / "studies" / "liu2020_allocation.py", folder)
+    opened = OpenStudy(folder / "liu2020_allocation.py")
     yield opened
     opened.kill()
 

@@ -66,7 +66,7 @@ def test_the_page_says_the_digits_of_whatif(script, desk, units):
 
 @pytest.mark.slow
 def test_the_page_says_the_digits_of_whatif_on_a_reducer():
-    script = Path(__file__).parents[2] / "studies" / "rv20e_allocation.py"
+    script = Path(__file__).parents[2] / "studies" / "liu2020_allocation.py"
     zones = {"pin.diameter": 3.0, "disc1.pitch": 10.0}
     answer = load_study(script).ask(ta.Difference(zones=zones, units=300)).result
     found = ask(desk_of(script), "units", design={"zones": zones}, units=300)
@@ -80,8 +80,8 @@ def test_the_page_says_the_digits_of_whatif_on_a_reducer():
 
 
 def test_another_torque_says_the_digits_of_a_study_at_that_torque(tmp_path):
-    shutil.copy(ROOT / "studies" / "rv20e_allocation.py", tmp_path)
-    script = tmp_path / "rv20e_allocation.py"
+    shutil.copy(ROOT / "studies" / "liu2020_allocation.py", tmp_path)
+    script = tmp_path / "liu2020_allocation.py"
     desk = desk_of(script)
     design = {"zones": {"pin.diameter": 3.0}, "settings": {TORQUE: 167.0}}
     found, one = ask(desk, "units", design=design, units=64), ask(desk, "design", design=design, unit=5)
@@ -98,7 +98,7 @@ def test_another_torque_says_the_digits_of_a_study_at_that_torque(tmp_path):
 
 
 def test_the_picture_follows_a_swept_error():
-    desk = desk_of(ROOT / "studies" / "rv20e_allocation.py")
+    desk = desk_of(ROOT / "studies" / "liu2020_allocation.py")
     swept = ask(desk, "sweep", unit=3, source="disc1.runout")
     scenes = [ask(desk, "scene", unit=3, source="disc1.runout", share=share)["scene"] for share in (-1.0, 1.0)]
     curves = [scene["forward"]["transmission_error"]["data"] for scene in scenes]

@@ -130,7 +130,7 @@ def test_a_number_is_rounded_and_says_its_exact_value():
 
 
 def test_what_cannot_be_printed_is_said_before_anything_runs(tmp_path, monkeypatch):
-    study = "studies/rv20e_allocation.py"
+    study = "studies/liu2020_allocation.py"
     result = tolalloc("run", study, "--pdf", "--paper", "A5", "--out", tmp_path / "run")
     refused(result, "--paper", "A4 or Letter")
     monkeypatch.setattr(pdf, "which", lambda name: None)

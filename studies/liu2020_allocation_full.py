@@ -1,6 +1,8 @@
-"""The cheapest drawing of an RV-20E in depth: processes, grades, several requirements, modification, certificate.
+"""The replica `liu2020_allocation.py` in depth: processes, grades, several requirements, modification, certificate.
 
-tolalloc allocate studies/rv20e_allocation_full.py --quick
+tolalloc allocate studies/liu2020_allocation_full.py --quick
+
+Its loads are as little believable as those of `liu2020_allocation.py`.
 """
 
 import tolalloc as ta
@@ -16,7 +18,7 @@ study = ta.Study(
     questions=[
         ta.Allocation(grades=True, unit_price=ta.UnitPrice(inspection=1.0, rework_share=0.3, rework=15.0, scrap=5.0))
     ],
-    name="rv20e_allocation_full",
+    name="liu2020_allocation_full",
     seed=1,
 )
 
