@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,9 @@ from tests.studies.scripts import study_script
 from tolalloc.exceptions import InputError
 from tolalloc.reducers.choice import ReducerChoice
 from tolalloc.reducers.equivalent.perfect import preload, rated_pin_force
-from tolalloc.reports.portrait import portrait_of
+from tolalloc.reducers.model import ReducerModel
+from tolalloc.reports.portrait import Examination, portrait_of
+from tolalloc.reports.wording import number
 from tolalloc.study.prepared import Prepared
 
 LIMITS = {ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)}
@@ -49,8 +52,8 @@ def test_a_check_counts_the_preloaded_among_random_units(tmp_path):
     script = study_script(tmp_path, reducer={"name": "rv20e"})
     result = tolalloc("check", script)
     assert result.returncode == 0, result.stderr
-    for number in ("1.04 µm", "8 µm", "N·m/arcmin", " 49 ("):
-        assert number in result.stdout
+    for shown in ("1.04 µm", "8 µm", "N·m/arcmin", " 49 ("):
+        assert shown in result.stdout
     counted = ta.check(script).result.examined
     said = counted["share preloaded [-]"]
     assert counted["units [-]"] == 1000
@@ -92,6 +95,29 @@ def test_a_verdict_says_that_units_are_preloaded_by_printed_stiffnesses_too():
     assert "stiffnesses" in verdict(ta.reducer("rv20e_liu2020"), 1.0)
     opened = verdict(ta.reducer("rv20e", flank_clearance=(1.0, 12.0)), 1.0)
     assert opened.endswith(" 1 to 12 µm")
+
+
+def test_no_load_torque_is_said_at_output_and_motor_beside_the_one_that_the_catalogue_allows():
+    def examined(allowed: float | None, scale: float) -> tuple[ReducerModel, np.ndarray, Examination]:
+        choice = ta.reducer("rv20e")
+        assert choice.reducer.catalogue is not None
+        stated = replace(choice.reducer.catalogue, no_load_torque=allowed)
+        choice = replace(choice, reducer=replace(choice.reducer, catalogue=stated))
+        asked = Prepared(study=ta.Study(choice, ta.drawing("rv20e_table4"), limits=LIMITS))
+        uniform = np.random.default_rng(6).uniform(size=(200, len(asked.errors.columns)))
+        x = asked.errors.deviations(asked.errors.standard_values(uniform), scale * asked.errors.zones)
+        return asked.model, x, portrait_of(asked.model).examination(asked.model.examined(x))
+
+    model, x, said = examined(0.75, 1.0)
+    torque = preload(model.kernel.model, model.kernel.errors(x)).friction_torque
+    half, most = np.median(torque), np.quantile(torque, 0.9973)
+    for value in (half, most, most / 105, 0.75, 100 * most / 167):
+        assert number(float(value), ".2g") in said.fault
+    assert number(0.75, ".3g") in said.but
+    # A drawing whose pins press little is held to the catalogue's torque, too, and to nothing where it states none.
+    _, _, little = examined(5e-4, 1e-3)
+    assert "0.0005" in little.but and little.fault
+    assert examined(None, 1e-3)[2].but == ""
 
 
 def test_a_model_of_a_user_is_in_order_without_a_but():

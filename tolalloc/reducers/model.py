@@ -45,6 +45,8 @@ _MULTIPLES = 4
 """Multiples of pins and teeth whose waves are told apart [-]."""
 _ANGLES = (468, 936)
 """Angles at which the contact is solved without a search between them [-]."""
+_NEARLY_ALL = 0.9973
+"""Share of units that stay below the no-load torque which is said of all [-]."""
 _MOST_COLUMNS = 100
 """Columns beyond which all products of two are more than the samples can tell apart [-]."""
 
@@ -330,7 +332,7 @@ class ReducerModel(Model):
         return rated_pin_force(self.reducer)
 
     def examined(self, x: Float[np.ndarray, "sample column"]) -> Mapping[str, float]:
-        """Return how many random units are preloaded or have no radial clearance, and by how much.
+        """Return how many random units are preloaded or have no radial clearance, by how much, and what turns them.
 
         Parameters
         ----------
@@ -350,4 +352,6 @@ class ReducerModel(Model):
             "share without radial clearance [-]": float((radial < 0).mean()),
             "least radial clearance [µm]": float(radial.min()),
             "median pin force without torque [N]": float(np.median(found.pin_force[solved])),
+            "no-load torque of the pins, median [N·m]": float(np.median(found.friction_torque[solved])),
+            "no-load torque of the pins, 99.73 % [N·m]": float(np.quantile(found.friction_torque[solved], _NEARLY_ALL)),
         }

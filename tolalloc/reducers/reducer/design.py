@@ -187,6 +187,8 @@ class Catalogue:
     # Largest twist between both directions of 3 % of the rated torque, and largest error over a turn [rad]
     lost_motion: Annotated[float, Field(alias="lost_motion_arcmin", ge=0.05, le=10), times(ARCMINUTE)]
     transmission_error: Annotated[float, Field(alias="transmission_error_arcsec", ge=5, le=600), times(ARCSECOND)]
+    # Largest torque that turns it without load, at the output, if the catalogue states one [N·m]
+    no_load_torque: Annotated[float | None, Field(alias="no_load_torque_nm", gt=0, le=1e4)] = None
 
 
 @dataclass(frozen=True, kw_only=True)

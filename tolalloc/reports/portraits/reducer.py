@@ -45,6 +45,8 @@ _COUNTED = (
     "pin force of the rated torque [N]",
     "share without radial clearance [-]",
     "least radial clearance [µm]",
+    "no-load torque of the pins, median [N·m]",
+    "no-load torque of the pins, 99.73 % [N·m]",
 )
 """What a summary says of the random units of a check."""
 
@@ -235,6 +237,7 @@ def _examination(portrait: ReducerPortrait, figures: Mapping[str, float]) -> Exa
         f"{unsolved}: without torque their pins press with more than "
         f"the {model.rated_pin_force:,.0f} N of the rated torque; half of all press with "
         f"{float(f'{half:.2g}'):,g} N or more.",
+        _no_load(model, figures),
         f"The radial clearance of a unit is {number(least, '.2g')} µm at least.",
         *portrait.remarks,
         *cautions,
@@ -243,8 +246,33 @@ def _examination(portrait: ReducerPortrait, figures: Mapping[str, float]) -> Exa
     if not reasons:
         return Examination(sentences, figures=counted)
     trust = " ".join(own for own in cautions if "not trust" in own)
-    fault = f"Cannot be built as drawn: of {count:,} simulated reducers {' and '.join(reasons)}. {trust}".strip()
+    preloaded, overlaps = (figures[f"share {own} [-]"] > 1 - USUAL_YIELD for own in ("preloaded", _WITHOUT))
+    what = "Cannot be built as drawn" if overlaps else "Should not be released as drawn"
+    means = f" {_MEANS} {_no_load(model, figures)}" if preloaded else ""
+    fault = f"{what}: of {count:,} simulated reducers {' and '.join(reasons)}.{means} {trust}".strip()
     return Examination(sentences, f"of its units {' and '.join(reasons)}: {_advice(model)}", fault, counted)
+
+
+_WITHOUT = "without radial clearance"
+_MEANS = "A preloaded reducer turns, but it runs warm, wears early and has no lost motion until it has worn."
+"""What pins that press without torque do to a reducer."""
+
+
+def _no_load(model: ReducerModel, figures: Mapping[str, float]) -> str:
+    """Return what the pins' friction takes without load, at the output and at the motor, beside the catalogue."""
+    half, most = (figures[f"no-load torque of the pins, {which} [N·m]"] for which in ("median", "99.73 %"))
+    rated, stated = model.reducer.load.rated_torque, _catalogue_no_load(model)
+    beside = f", where the catalogue allows {stated:.3g} N·m" if stated else ""
+    return (
+        f"Without load the friction of the pins takes {number(half, '.2g')} N·m at the output in half of them and up "
+        f"to {number(most, '.2g')} N·m in 99.73 %{beside}: {number(100 * most / rated, '.2g')} % of the rated torque, "
+        f"{number(most / abs(model.reducer.ratio), '.2g')} N·m at the motor; seals and grease come on top."
+    )
+
+
+def _catalogue_no_load(model: ReducerModel) -> float | None:
+    """Return what the catalogue allows without load at the output, if it says so [N·m]."""
+    return model.reducer.catalogue.no_load_torque if model.reducer.catalogue else None
 
 
 def _reasons(model: ReducerModel, figures: Mapping[str, float]) -> list[str]:
@@ -255,6 +283,11 @@ def _reasons(model: ReducerModel, figures: Mapping[str, float]) -> list[str]:
         force = figures["pin force of the rated torque [N]"]
         more = f"a pin presses with more than the {force:,.0f} N of rated torque{by}"
         found.append(f"{number(share, '.1%')} are preloaded ({more})")
+    stated, most = _catalogue_no_load(model), figures["no-load torque of the pins, 99.73 % [N·m]"]
+    if stated and most > stated:
+        found.append(
+            f"99.73 % take up to {number(most, '.2g')} N·m without load (the catalogue allows {stated:.3g} N·m)"
+        )
     if (share := figures["share without radial clearance [-]"]) > allowed:
         least = number(figures["least radial clearance [µm]"], ".2g")
         found.append(f"{number(share, '.1%')} have no radial clearance ({least} µm at worst)")
