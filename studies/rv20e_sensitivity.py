@@ -1,6 +1,9 @@
 """Which error drives which requirement, which order and the rejects, all 48 sources varying.
 
 tolalloc rank studies/rv20e_sensitivity.py --quick
+
+On liu2020's printed stiffness and its unit's magnitudes, to hold beside published orders: with the zones of a drawing
+and the stiffness of a catalogue, `rv20e_allocation.py` ranks.
 """
 
 import tolalloc as ta

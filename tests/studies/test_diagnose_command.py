@@ -15,7 +15,9 @@ from tests.studies.command import ROOT, tolalloc
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
 from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reports.excel import write_sheets
+from tolalloc.study.inquiries.diagnose import Diagnose
 
 REPORT = ("--reducer", "rv20e_liu2020", "--out")
 
@@ -50,6 +52,16 @@ def bench(tmp_path_factory) -> Bench:
     frame = pd.DataFrame({"angle [deg]": np.degrees(angle), "transmission error [arcsec]": read})
     frame.to_csv(path / "unit7.csv", index=False)
     return Bench(path / "few.csv", path / "unit7.csv")
+
+
+def test_a_unit_is_diagnosed_with_the_modification_that_its_drawing_states(bench):
+    own = Diagnose(curve=bench.curve, reducer="rv20e").prepare()
+    left = own.reducer.modification
+    clearances = [left.flank_clearance(own.reducer.cycloid_stage), left.radial_clearance]
+    assert np.array(clearances) * 1e6 == pytest.approx([3.5, 8.0])
+    assert len(own.errors.sources) == 48
+    silent = Diagnose(curve=bench.curve, reducer="rv20e", tolerances="rv20e_table4").prepare()
+    assert silent.reducer == load_reducer("rv20e")
 
 
 @pytest.mark.slow

@@ -41,15 +41,19 @@ class Diagnose(Inquiry["DiagnosisRequest"]):
         """Return which unit is to be diagnosed, against which drawings."""
         from tolalloc.bench.diagnosis import DiagnosisRequest
         from tolalloc.drawings.drawing import load_drawing
+        from tolalloc.reducers.choice import ReducerChoice
         from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 
         design = load_reducer(str(self.reducer))
         if self.stiffness:
             design = with_stiffness(design, load_identified_stiffness(self.stiffness))
+        drawing = load_drawing(self.tolerances, correlations=self.correlations, sheet=self.sheet)
+        if drawing.settings:  # the unit was made with the modification of its drawing
+            design = ReducerChoice(reducer=design).set_to(drawing.settings).reducer
         return DiagnosisRequest(
             curve=self.curve,
             reducer=design,
-            errors=load_drawing(self.tolerances, correlations=self.correlations, sheet=self.sheet).errors,
+            errors=drawing.errors,
             torque_nm=self.torque,
             noise_arcsec=self.noise,
             discrepancy_arcsec=self.discrepancy,
