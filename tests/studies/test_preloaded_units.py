@@ -118,6 +118,7 @@ def test_no_load_torque_is_said_at_output_and_motor_beside_the_one_that_the_cata
     _, _, little = examined(5e-4, 1e-3)
     assert "0.0005" in little.but and little.fault
     assert examined(None, 1e-3)[2].but == ""
+    assert model.own_limits == {ta.PRELOAD: model.rated_pin_force, ta.FRICTION_TORQUE: 0.75}
 
 
 def test_a_model_of_a_user_is_in_order_without_a_but():

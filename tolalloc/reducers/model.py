@@ -15,7 +15,7 @@ from tolalloc.exceptions import UnknownNameError
 from tolalloc.models.model import Model, Observer, Response, SettingDerivatives
 from tolalloc.models.settings import DrawnAmounts, Setting
 from tolalloc.reading.units import MICROMETRE
-from tolalloc.reducers import DISC_TEMPERATURE, PEAK_TO_PEAK, PRELOAD, RADIAL_CLEARANCE, TORQUE
+from tolalloc.reducers import DISC_TEMPERATURE, FRICTION_TORQUE, PEAK_TO_PEAK, PRELOAD, RADIAL_CLEARANCE, TORQUE
 from tolalloc.reducers.equivalent.hysteresis import HysteresisLoop
 from tolalloc.reducers.equivalent.perfect import exact_loop, preload, rated_pin_force
 from tolalloc.reducers.reducer.design import MODIFICATION_CONVENTION, Modification, Reducer, thermal_shift
@@ -323,8 +323,13 @@ class ReducerModel(Model):
         """No pin may press harder without torque than the rated torque makes it: such a unit is preloaded.
 
         Only where bearings are stated by their dimensions: with printed stiffnesses, far too large, nearly all are.
+        With either the pins' friction may take no more without load than the catalogue allows, where it states that.
         """
-        return {PRELOAD: self.rated_pin_force} if self.reducer.parts else {}
+        limits = {PRELOAD: self.rated_pin_force} if self.reducer.parts else {}
+        catalogue = self.reducer.catalogue
+        if catalogue and catalogue.no_load_torque:
+            limits[FRICTION_TORQUE] = catalogue.no_load_torque
+        return limits
 
     @cached_property
     def rated_pin_force(self) -> float:
