@@ -15,18 +15,20 @@ from openpyxl import load_workbook
 from typer.testing import CliRunner
 
 import tolalloc as ta
-from tests.builders import prepared
+from tests.builders import prepared, source
 from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.cost.model import Combined, Exponential, Reciprocal, ReciprocalPower, SumOfCosts, Weighted
 from tolalloc.allocation.cost.points import Points, Spline, Tabulated
 from tolalloc.allocation.cost.process_costs import load_process_costs
+from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import QUICK_ALLOCATION
 from tolalloc.cli.main import app
+from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.table_file import stated_settings
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
+from tolalloc.drawings.zones import Feature
 from tolalloc.reports.feature_frame import callout
 from tolalloc.reports.header import Header
-from tolalloc.reports.tellers.allocation_drawing import frames as frames_of_members
 from tolalloc.reports.tellers.allocation_drawing import sources_table, tolerances_frame, write_drawing
 from tolalloc.reports.tellers.allocation_workbook import cost_formula
 
@@ -260,19 +262,57 @@ def test_a_reader_that_calculates_nothing_sees_what_the_formulas_give(drawn):
 
 
 @pytest.mark.slow
-def test_what_is_written_on_the_drawing_allows_nothing_wider(drawn):
+def test_every_line_of_the_drawing_states_the_one_verified_zone_of_its_members(drawn):
     results, folder = drawn
-    workbook, members = Workbook(folder / "drawing.xlsx"), results.dimensions
-    for row, name in enumerate(results.drawn.groups, start=2):
-        frame, source = callout(members[name][0]), members[name][0]
-        written = workbook.value("drawing", f"K{row}")
-        whole = 2 * written if frame.characteristic == "size" else written
-        assert -1e-9 < source.zone / 1e-3 - whole < 2.01e-4
-        assert frame.zone.lstrip("±⌀") == f"{written:.4f}".rstrip("0").rstrip(".")
+    workbook, rows = Workbook(folder / "drawing.xlsx"), {}
+    verified = dict(
+        zip((own.name for own in results.drawn.errors.active), results.drawn.zones(results.chosen.design), strict=True)
+    )
+    for (text,) in workbook.sheets["drawing"].iter_rows(max_col=1):
+        rows[text.value] = text.row
+    for line in results.lines:
+        (zone,) = {round(verified[own.name] / UM, 6) for own in line[1]}
+        frame = callout(line[1][0])
+        if line[1][0].locked:
+            continue
+        stated = workbook.value("drawing", f"K{rows[results.line_name(line)]}")
+        whole = 2e3 * stated if frame.characteristic == "size" else 1e3 * stated
+        assert -1e-6 < zone - whole < 2e-2 + 1e-6
+        assert frame.zone.lstrip("±⌀") == f"{stated:.5f}".rstrip("0").rstrip(".")
     frames = ezdxf.readfile(folder / "frames.dxf")
     shown = [entity.dxf.name for entity in frames.modelspace().query("INSERT")]
-    assert len(shown) == sum(len(frames_of_members(own)) for own in members.values())
+    assert len(shown) == len(results.lines)
     assert all(len(frames.blocks[name]) >= 1 for name in shown)
+
+
+@pytest.mark.slow
+def test_the_accepted_drawing_has_the_zones_in_whole_steps_that_were_verified_last(priced):
+    design, space = priced.chosen, priced.drawn
+    assert design.accepted
+    assert design.independent is not None
+    tabled = dict(zip((own.name for own in space.errors.active), space.zones(design.design), strict=True))
+    for own in priced.space.errors.active:
+        zone = tabled[own.name] / UM
+        if own.locked or zone == pytest.approx(own.minimum / UM) or zone == pytest.approx(own.zone / UM):
+            continue
+        sides = 2 if own.feature is Feature.SIZE else 1
+        step = 0.01 if zone / sides < 1 else 0.1 if zone / sides < 10 else 0.5
+        assert zone / sides / step == pytest.approx(round(zone / sides / step), abs=1e-6), own.name
+    assert design.cost == pytest.approx(sum(space.cost_of_sources(design.design).values()) + space.locked_cost)
+
+
+def test_members_with_their_own_zones_are_rounded_each_on_its_own():
+    first, other = (source(name, zone=zone, group="both") for name, zone in (("a", 4.2 * UM), ("b", 4.0 * UM)))
+    alone = source("c", Feature.POSITION, zone=20.0 * UM, step=2.0 * UM)
+    space = DesignSpace(errors=ErrorModel((first, other, alone)))
+    stated, design = space.rounded_down(np.array([1.18, 0.77]))
+    assert (stated.zones(design) / UM).tolist() == pytest.approx([4.8, 4.6, 14.0])
+    assert stated.cost(design) == pytest.approx(4.2 / 4.8 + 4.0 / 4.6 + 20 / 14)
+    same, design = space.rounded_down(np.array([1.0, 0.77]))
+    assert same is space
+    assert design.tolist() == pytest.approx([1.0, 0.7])
+    _, least = space.rounded_down(np.array([1.0, space.lower[1]]))
+    assert least[1] == space.lower[1]
 
 
 @pytest.mark.slow

@@ -81,9 +81,9 @@ def test_correlated_members_of_two_groups_are_one_dimension():
 
 @pytest.mark.parametrize(
     ("zone", "text"),
-    [(4.75, "0.0047"), (10.0, "0.01"), (9.999999999, "0.01"), (0.3, "0.0003"), (0.05, "0"), (16.6, "0.0166")],
+    [(4.757, "0.00475"), (10.0, "0.01"), (9.999999999, "0.01"), (0.3, "0.0003"), (0.005, "0"), (16.6, "0.0166")],
 )
-def test_a_zone_is_written_in_tenths_of_a_micrometre_and_never_wider(zone, text):
+def test_a_zone_is_written_in_hundredths_of_a_micrometre_and_never_wider(zone, text):
     assert written(zone * UM) == text
     assert float(text) * 1e3 <= zone + 1e-6
 
@@ -95,7 +95,7 @@ def test_a_zone_is_written_in_tenths_of_a_micrometre_and_never_wider(zone, text)
         ({"name": "housing.runout", "feature": Feature.RUNOUT, "spectrum": ((1, 1.0),)}, "↗ 0.006 A"),
         ({"name": "housing.pitch", "feature": Feature.PITCH, "spectrum": ((1, 1.0),)}, "Fp 0.006"),
         ({"name": "pin.diameter"}, "±0.003"),
-        ({"name": "pin.diameter", "middle": -2.26 * UM}, "+0.0007 / −0.0052"),
+        ({"name": "pin.diameter", "middle": -2.26 * UM}, "+0.00074 / −0.00526"),
         ({"name": "carrier.tilt", "feature": Feature.POSITION, "over": 0.05}, "∥ ⌀0.006/50 A"),
         ({"name": "sun.eccentricity", "feature": Feature.POSITION}, "◎ ⌀0.006 A"),
     ],

@@ -22,7 +22,7 @@ from tolalloc.allocation.front.what_if import (
     setting_trade,
 )
 from tolalloc.allocation.result import AllocationResult
-from tolalloc.allocation.search.candidates import ALONE, FREE, GRADES, Candidates, NextCandidate
+from tolalloc.allocation.search.candidates import ALONE, FREE, GRADES, TABLE, Candidates, NextCandidate
 from tolalloc.allocation.search.discrete import GradedAllocation, allocate_grades, group_options, with_shared_zones
 from tolalloc.allocation.search.zone_allocation import (
     ZoneAllocation,
@@ -201,8 +201,21 @@ class DrawingQuestion:
             space=self.space,
             verifier=partial(self.verifier, "confirmation"),
         )
-        result = accept_cheapest(test, promising, next_candidate, self.effort.gain)
+        result = accept_cheapest(test, promising, next_candidate, self.effort.gain, self._as_drawn)
         return found.with_acceptance(result, self.model.drawn_amounts)
+
+    def _as_drawn(self, kind: str, design: VerifiedDesign) -> VerifiedDesign:
+        """Return a design with zones and amounts as the drawing states them, verified again if that moves them.
+
+        Ladders have the zones that their drawing states, and so has the tolerance table.
+        """
+        if kind in (GRADES, TABLE):
+            return design
+        drawn = self.model.drawn_amounts if design.space.settings else None
+        space, stated = design.space.rounded_down(design.design, drawn)
+        if space is design.space and np.array_equal(stated, design.design):
+            return design
+        return self.verifier("rounded", space).verify(stated, design.name)
 
     def trade(self, free: ZoneAllocation) -> SettingTrade | None:
         """Return the cost of the cheapest zones over the settings; nothing without settings or beyond two."""
@@ -217,7 +230,8 @@ class DrawingQuestion:
     def fronts(self, found: ZoneAllocation | GradedAllocation, checkpoint: Checkpoint | None) -> Fronts:
         """Return what can be had at which cost, around the design that is drawn and on its ladders, if it has any."""
         drawn, graded = found.chosen, found if isinstance(found, GradedAllocation) else None
-        space, ladders = (graded.space, graded.scales) if graded else (self.space, {})
+        unrounded = replace(self.space, errors=drawn.space.errors)
+        space, ladders = (graded.space, graded.scales) if graded else (unrounded, {})
         effort = self.effort.search.front
         # Where the limit is out of reach, the front lies around what is kept instead.
         around = max(1.0, min(drawn.quantile_bound, float(drawn.sample.values.max())) / drawn.constraints[0].limit)
@@ -235,7 +249,8 @@ class DrawingQuestion:
 
     def robustness(self, free: ZoneAllocation) -> Robustness:
         """Return the answers under changed assumptions."""
-        verifier = replace(self.verifier("robustness", self.space), units=self.effort.stiffness_units)
+        space = replace(self.space, errors=free.chosen.space.errors)
+        verifier = replace(self.verifier("robustness", space), units=self.effort.stiffness_units)
         seeds = self.seeds("robustness")
         return robustness(verifier, free, self._changed_models(seeds), seeds, self.effort.changed_costs)
 

@@ -25,6 +25,9 @@ from tolalloc.models.model import Model
 from tolalloc.reading.units import unit_of
 from tolalloc.sensitivity.sobol import SobolIndices
 
+_SAME = 1e-12
+"""Distance up to which two zones are one number on a drawing [m]."""
+
 _ROUNDING = 1e-6
 """Smallest share of the cost that a solver tells from nothing, however small its gap [-]."""
 
@@ -176,6 +179,22 @@ class AllocationResult:
             if source.zone > 0.0:
                 found.setdefault(source.group or source.name, []).append(source)
         return {name: tuple(members) for name, members in found.items()}
+
+    @cached_property
+    def lines(self) -> tuple[tuple[str, tuple[Source, ...]], ...]:
+        """Lines of the drawing, each with one value: the dimension, and those of its members that have this value."""
+        found: dict[tuple[object, ...], list[Source]] = {}
+        for name, members in self.dimensions.items():
+            for own in members:
+                value = (own.feature, round(own.zone / _SAME), round(own.middle / _SAME), own.over)
+                found.setdefault((name, *value), []).append(own)
+        return tuple((str(key[0]), tuple(members)) for key, members in found.items())
+
+    def line_name(self, line: tuple[str, tuple[Source, ...]]) -> str:
+        """Return the name of a line: its dimension, and its members where others of the dimension have other values."""
+        name, members = line
+        alone = len(members) == len(self.dimensions[name])
+        return name if alone else f"{name}: {', '.join(own.name for own in members)}"
 
     @property
     def process_changes(self) -> dict[str, float]:

@@ -218,6 +218,16 @@ class ToleranceRow(Record):
         ),
     ]
     grade: Annotated[str, Column("carried through", attribute="grade")] = ""
+    step: Annotated[
+        float,
+        Field(ge=0, le=LARGEST_ZONE),
+        Column(
+            "step of the numbers that the drawing states, to which an allocated zone is rounded down: the zone, or for "
+            "a size its deviations; 0.01 µm below 1 µm, 0.1 below 10, 0.5 below 100, then 1 unless given",
+            "unit",
+            write=lambda source: _micrometres(source.step) or None,
+        ),
+    ] = 0.0
     spectrum: Annotated[
         str,
         Column(
@@ -385,6 +395,7 @@ class ToleranceRow(Record):
             middle=middle,
             minimum=self.min * factor,
             maximum=self.max * factor,
+            step=self.step * factor,
             shape=self.shape or 0.0,
             batches=parsed_batches(self.batches),
             measured=self._measured_parts(folder, middle),

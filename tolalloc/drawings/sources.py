@@ -39,6 +39,29 @@ def is_angular(source: str) -> bool:
     return source.rpartition(".")[2] in ANGULAR
 
 
+STEPS = ((1.0, 0.01), (10.0, 0.1), (100.0, 0.5), (np.inf, 1.0))
+"""Step of a number on a drawing up to a size, where its table states none: two or three figures [µm]. An assumption: a
+tenth of a micrometre is what a measuring room tells apart on parts of a reducer; finer numbers need finer steps."""
+
+_WHOLE = 1e-6
+"""Part of a step that a number may lack and still count as whole [-]."""
+
+
+def rounded_down(number: float, step: float = 0.0) -> float:
+    """Return a number of a drawing rounded down to its step, or to that of `STEPS` if none is given [m].
+
+    Examples
+    --------
+    Of 4.75 µm the drawing states 4.7 µm, of 23.3 µm 23 µm, and 4.5 µm in steps of half a micrometre:
+
+    >>> [round(rounded_down(*own) * 1e6, 6) for own in ((4.75e-6,), (23.3e-6,), (4.75e-6, 0.5e-6))]
+    [4.7, 23.0, 4.5]
+    """
+    size = number / MICROMETRE
+    own = step / MICROMETRE or next(own for end, own in STEPS if size < end * (1 - _ROUNDING))
+    return float(np.floor(size / own + _WHOLE) * own * MICROMETRE)
+
+
 _ROUNDING = 1e-9
 """Mean of a deviation over its zone, up to which it is rounding [-]."""
 
@@ -105,6 +128,8 @@ class Source:
         Number of teeth on which the range of the spectrum is taken; 0: over the whole turn [-].
     each
         Number of like features (pins, teeth) that each deviate on their own inside this zone [-].
+    step
+        Step of the numbers that the drawing states; 0: that of `STEPS` [m].
     over
         For an angle, the length over which the zone limits the deviation; 0 for everything else [m].
     own_id
@@ -136,6 +161,7 @@ class Source:
     written_spectrum: str = ""
     each: int = 1
     over: float = 0.0
+    step: float = 0.0
     group: str = ""
     locked: bool = False
     grade: str = ""
@@ -153,6 +179,14 @@ class Source:
         if self.feature is Feature.POSITION:
             return tuple(f"{name}.{axis}" for name in names for axis in ("x", "y"))
         return tuple(f"{self.name}.{wave}{order}" for order, _ in self.spectrum for wave in ("cos", "sin"))
+
+    def rounded_down(self, zone: float) -> float:
+        """Return the widest zone in steps of the drawing that is no wider than one, and no smaller than allowed [m].
+
+        A size has its step in each of its two deviations. A zone within a step of the smallest one becomes that one.
+        """
+        sides = 2 if self.feature is Feature.SIZE else 1
+        return min(zone, max(sides * rounded_down(zone / sides, self.step), self.minimum))
 
     @property
     def lever(self) -> float:

@@ -76,7 +76,9 @@ class DrawnAmounts:
     by_setting
         Change of every amount (row) with every setting (column) [unit of the amount per unit of the setting].
     steps
-        Step of every amount on a drawing [unit of the amount].
+        Step of every amount on a drawing whose zones climb ladders [unit of the amount].
+    finest
+        Step of every amount on any other drawing; none if it states them as they were found [unit of the amount].
     convention
         What their signs mean, a sentence without its full stop; empty where a name says all.
     """
@@ -84,6 +86,7 @@ class DrawnAmounts:
     names: tuple[str, ...]
     by_setting: Float[np.ndarray, "amount setting"]
     steps: tuple[float, ...]
+    finest: tuple[float, ...] = ()
     convention: str = ""
 
 

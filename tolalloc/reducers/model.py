@@ -259,6 +259,7 @@ class ReducerModel(Model):
             names=names,
             by_setting=self._modification_by_clearance,
             steps=(0.5, 0.5),
+            finest=(0.1, 0.1),
             convention=MODIFICATION_CONVENTION,
         )
 

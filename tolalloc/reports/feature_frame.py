@@ -28,8 +28,8 @@ _HEIGHT, _LETTER = 20.0, 9.0
 _SCALE = 7.0 / _HEIGHT
 """Height of a frame on paper is 7 mm, for letters of 3.5 mm [mm/px]."""
 
-STEP = 0.1 * MICROMETRE
-"""Step in which a drawing writes a zone [m]."""
+STEP = 0.01 * MICROMETRE
+"""Finest step in which a drawing writes a zone [m]; an allocated zone has the step of its row already."""
 _ROUNDING = 1e-6
 """Part of a step that a zone may lack and still count as whole [-]."""
 
@@ -111,13 +111,13 @@ def _found(source: Source) -> tuple[str, str]:
 
 
 def written(length: float) -> str:
-    """Return a width as a drawing writes it [mm], rounded down to 0.1 µm so that nothing wider is allowed.
+    """Return a width as a drawing writes it [mm], rounded down to 0.01 µm so that nothing wider is allowed.
 
     >>> written(4.7503e-6), written(10e-6), written(0.5e-6)
-    ('0.0047', '0.01', '0.0005')
+    ('0.00475', '0.01', '0.0005')
     """
     steps = floor(length / STEP + _ROUNDING)
-    return f"{steps * STEP / MILLIMETRE:.4f}".rstrip("0").rstrip(".") or "0"
+    return f"{steps * STEP / MILLIMETRE:.5f}".rstrip("0").rstrip(".") or "0"
 
 
 def callout(source: Source) -> FeatureFrame:

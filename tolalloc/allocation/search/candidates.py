@@ -50,7 +50,11 @@ class Candidates:
         found = self.designs(free_label)
         if self.graded:
             return {TABLE: found[TABLE], GRADES: found[GRADES]}
-        return {name: design for name, design in found.items() if name == TABLE or self._space.allows(design.design)}
+        return {name: design for name, design in found.items() if name == TABLE or self._allows(design)}
+
+    def _allows(self, design: VerifiedDesign) -> bool:
+        """Return whether zones and settings of a design may be so, its members rounded each on their own."""
+        return replace(self._space, errors=design.space.errors).allows(design.design)
 
     @property
     def drawn(self) -> VerifiedDesign:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -17,7 +18,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source, known_as, meant
 from tolalloc.drawings.tolerance_table import with_zones
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.models.settings import Setting
+from tolalloc.models.settings import DrawnAmounts, Setting
 from tolalloc.reading.units import MICROMETRE
 
 _ROUNDING = 1e-9
@@ -173,6 +174,67 @@ class DesignSpace:
         """Return the zones of the active sources [m]."""
         scales = np.append(design[: len(self.groups)], 1.0)
         return np.asarray(self.errors.zones * scales[self.group_of_source])
+
+    def rounded_down(
+        self, design: Float[np.ndarray, " variable"], drawn: DrawnAmounts | None = None
+    ) -> tuple[DesignSpace, Float[np.ndarray, " variable"]]:
+        """Return a design as a drawing states it: zones rounded down to their steps, amounts to the nearest of theirs.
+
+        Parameters
+        ----------
+        design
+            Scales [-] and settings.
+        drawn
+            What the drawing says of the settings; they stay as they are if it is not given.
+
+        Notes
+        -----
+        A zone that is the one of the tolerance table stays as its table states it. Members of a group that have one
+        zone keep one; others are rounded one by one, in a space whose table has them at the rounded ratio. So the
+        design costs what its rounded zones cost, and units of it lie in them.
+
+        Examples
+        --------
+        >>> from tolalloc.allocation.verify.verification import verifier_of_sum
+        >>> space = verifier_of_sum(6.0, 8.0, limit=5.0).space
+        >>> _, design = space.rounded_down(np.array([1.0, 0.51234]))
+        >>> (design * [6.0, 8.0]).round(6).tolist()
+        [6.0, 4.098]
+        """
+        found, zones = design.copy(), {own.name: own.zone for own in self.errors.sources}
+        for at, group in enumerate(self.groups):
+            members, scale = self._members(group), float(design[at])
+            if abs(scale - 1.0) <= _ROUNDING:
+                continue
+            rounded = [own.rounded_down(own.zone * scale) for own in members]
+            ratios = [zone / own.zone for zone, own in zip(rounded, members, strict=True)]
+            if max(ratios) - min(ratios) <= _ROUNDING * max(ratios):
+                found[at] = min(ratios)
+            else:
+                zones |= {own.name: zone / scale for own, zone in zip(members, rounded, strict=True)}
+        if drawn is not None and drawn.finest:
+            found[len(self.groups) :] = self._stated(self.settings_of(design), drawn)
+        sources = with_zones(self.errors.sources, [zones[own.name] for own in self.errors.sources])
+        changed = sources != self.errors.sources
+        return (replace(self, errors=replace(self.errors, sources=sources)) if changed else self), found
+
+    def _stated(self, settings: Float[np.ndarray, " setting"], drawn: DrawnAmounts) -> Float[np.ndarray, " setting"]:
+        """Return the settings whose amounts are whole steps, nearest to some that are not those of today."""
+        present = np.array([own.value for own in self.settings], float)
+        locked = bool(np.all(self.shared.lower == self.shared.upper))
+        if locked or np.allclose(settings, present, rtol=_ROUNDING, atol=0.0):
+            return settings
+        steps = np.array(drawn.finest, float)
+        exact = drawn.by_setting @ settings / steps
+        sides = product(*((np.floor(own + _ROUNDING), np.ceil(own - _ROUNDING)) for own in exact.tolist()))
+        near = sorted(sides, key=lambda own: float(np.abs((np.array(own) - exact) * steps).max()))
+        inverse = np.linalg.inv(drawn.by_setting)
+        room = _ROUNDING * np.maximum(1.0, np.abs(self.shared.upper))
+        for amounts in near:
+            stated = inverse @ (np.array(amounts) * steps)
+            if np.all((stated >= self.shared.lower - room) & (stated <= self.shared.upper + room)):
+                return np.asarray(np.clip(stated, self.shared.lower, self.shared.upper))
+        return settings
 
     def units(
         self, design: Float[np.ndarray, " variable"], seeds: SeedTree, units: int

@@ -103,6 +103,7 @@ def accept_cheapest(
     candidates: Mapping[str, VerifiedDesign],
     next_candidate: Callable[[str, VerifiedDesign, AlphaSpending, float], tuple[str, VerifiedDesign] | None],
     gain: float,
+    as_drawn: Callable[[str, VerifiedDesign], VerifiedDesign] = lambda _, design: design,
 ) -> Acceptance:
     """Return the cheapest design that an acceptance test passes.
 
@@ -117,6 +118,8 @@ def accept_cheapest(
         cost; with its kind. A cheaper design after an accepted one, a safer one after any other, or none.
     gain
         Relative gain of cost that a design must promise to be made once another one is accepted [-].
+    as_drawn
+        Makes of a kind and a design the one that the drawing states, with rounded zones; that one is tested.
 
     Notes
     -----
@@ -145,7 +148,10 @@ def accept_cheapest(
         kind = min(waiting, key=lambda own: (own in doubtful, waiting[own].cost), default=None)
         if kind is None or (drawn and waiting[kind].cost >= drawn[1].cost):
             break
-        found = test.run(waiting.pop(kind), spending)
+        stated = as_drawn(kind, waiting.pop(kind))
+        if drawn and stated.cost >= drawn[1].cost:
+            continue
+        found = test.run(stated, spending)
         tested.append((kind, found))
         if found.accepted:
             drawn = (kind, found)

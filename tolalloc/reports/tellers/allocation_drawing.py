@@ -75,7 +75,7 @@ def sources_table(result: AllocationResult) -> Table[_Source]:
 
 
 def dimensions_table(result: AllocationResult) -> Table[_Dimension]:
-    """Return the drawing with one line per dimension, which all members of a group share."""
+    """Return the drawing line by line: a dimension, or members of one that share a value where it has several."""
     parts = _parts(result)
     before, after = _processes(result)
     columns: list[Column[_Dimension]] = [
@@ -99,7 +99,7 @@ def dimensions_table(result: AllocationResult) -> Table[_Dimension]:
         Column(header="locked", value=lambda row: "yes" if row[1][0][0].locked else "no", nothing="no"),
     ]
     known = {own.name: own for own in result.space.errors.sources}
-    rows = [(name, [(known[own.name], own) for own in members]) for name, members in result.dimensions.items()]
+    rows = [(result.line_name(own), [(known[member.name], member) for member in own[1]]) for own in result.lines]
     return Table(name="dimensions", columns=columns, rows=rows)
 
 
@@ -225,7 +225,7 @@ def write_drawing(result: AllocationResult, header: Header, folder: Path) -> Non
     others = {**_settings_sheet(result), "tolerances": tolerances_frame(result, cost_unit)}
     write_sheets({**calculator, **others}, folder / "drawing.xlsx")
     style_calculator(result, calculator, notes, folder / "drawing.xlsx")
-    named = [(name, frame) for name, members in result.dimensions.items() for frame in frames(members)]
+    named = [(result.line_name(own), callout(own[1][0])) for own in result.lines]
     write_frames(named, folder / "frames.dxf", notes)
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import singledispatch
-from math import floor
 from pathlib import Path
 
 import numpy as np
@@ -24,9 +23,11 @@ from tolalloc.allocation.cost.model import Combined, Exponential, Reciprocal, Re
 from tolalloc.allocation.cost.points import Spline, Tabulated
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.allocation.space.problem import OneSidedConstraint
-from tolalloc.reading.units import MICROMETRE, unit_of
+from tolalloc.drawings.sources import STEPS, Source, rounded_down
+from tolalloc.drawings.zones import Feature
+from tolalloc.reading.units import MICROMETRE, MILLIMETRE, unit_of
 from tolalloc.reports.excel import Formula, keep_values
-from tolalloc.reports.feature_frame import FeatureFrame, callout
+from tolalloc.reports.feature_frame import STEP, FeatureFrame, callout
 from tolalloc.reports.templates import Sentences
 
 _say = Sentences("allocation")
@@ -35,6 +36,8 @@ _FIRST = 2
 """Row of the first entry below the header."""
 _WEIGHTS = 13
 """Column of the first weight; those before it are printed."""
+_AS_VERIFIED = 1e-4
+"""Distance up to which a zone is the verified one [µm]."""
 _INPUT = PatternFill("solid", fgColor="FFF2CC")
 _RESULT = PatternFill("solid", fgColor="E2EFDA")
 _EDGE = Side(style="thin", color="7F7F7F")
@@ -48,7 +51,7 @@ def calculator_sheets(result: AllocationResult, cost_unit: str) -> dict[str, pd.
 def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     """Return one row per group, with what to write, what it costs and what it adds to every limited side."""
     space, chosen = result.drawn, result.chosen
-    groups, callouts = len(space.groups), [callout(result.dimensions[name][0]) for name in space.groups]
+    groups, callouts = len(space.groups), [callout(_first_member(result, name)) for name in space.groups]
     scales, zones = chosen.design[:groups], space.first_zones * chosen.design[:groups] / MICROMETRE
     rows = range(_FIRST, _FIRST + groups)
     made = [
@@ -57,7 +60,7 @@ def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     ]
     table = pd.DataFrame(
         {
-            "group": space.groups,
+            "group": [_first_line(result, name) for name in space.groups],
             "zone to change [µm]": zones,
             "zone in the tolerance table [µm]": space.first_zones / MICROMETRE,
             "scale [-]": [Formula(f"=B{row}/C{row}", scale) for row, scale in zip(rows, scales.tolist(), strict=True)],
@@ -76,8 +79,8 @@ def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
             ],
             "characteristic": [f"{own.symbol} {own.characteristic}".strip() for own in callouts],
             "write [mm]": [
-                Formula(f"=INT(B{row}*{_steps(own)}+0.001)/10000", floor(zone * _steps(own) + 0.001) / 10000)
-                for row, own, zone in zip(rows, callouts, zones.tolist(), strict=True)
+                _written(_first_member(result, name), row, zone)
+                for row, name, zone in zip(rows, space.groups, zones.tolist(), strict=True)
             ],
             "datum": [" ".join(own.datums) for own in callouts],
         }
@@ -87,7 +90,63 @@ def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
             side
         )
         table[f"{side.stack.name}: spread per scale [{unit_of(side.stack.name)}]"] = side.stack.root_sum_square
-    return table
+    return pd.concat([table, _further_lines(result)], ignore_index=True) if _further(result) else table
+
+
+def _further(result: AllocationResult) -> list[tuple[str, tuple[Source, ...]]]:
+    """Return the lines of the drawing whose zone follows that of another line, in the ratio of the tolerance table."""
+    first = [_first_member(result, name) for name in result.drawn.groups]
+    return [
+        line
+        for line in result.lines
+        if line[0] in result.drawn.groups and not line[1][0].locked and not any(own in line[1] for own in first)
+    ]
+
+
+def _first_member(result: AllocationResult, group: str) -> Source:
+    """Return the member of a group whose zone is the one to change."""
+    return next(own for own in result.dimensions[group] if not own.locked)
+
+
+def _first_line(result: AllocationResult, group: str) -> str:
+    """Return the name of the line of a group whose zone is changed."""
+    first = _first_member(result, group)
+    return result.line_name(next(line for line in result.lines if first in line[1]))
+
+
+def _further_lines(result: AllocationResult) -> pd.DataFrame:
+    """Return one row for every line whose zone follows that of its group, which adds nothing to cost and limits."""
+    first = {name: _FIRST + at for at, name in enumerate(result.drawn.groups)}
+    rows = []
+    for row, line in enumerate(_further(result), start=_FIRST + len(first)):
+        name, members = line
+        own, zone = callout(members[0]), members[0].zone / MICROMETRE
+        ratio = number(members[0].zone / _first_member(result, name).zone)
+        rows.append(
+            {
+                "group": result.line_name(line),
+                "zone to change [µm]": Formula(f"=B{first[name]}*{ratio}", zone),
+                "characteristic": f"{own.symbol} {own.characteristic}".strip(),
+                "write [mm]": _written(members[0], row, zone),
+                "datum": " ".join(own.datums),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _written(source: Source, row: int, zone: float) -> Formula:
+    """Return what the drawing states of a zone [µm] in a row: rounded down to its step, half of it for a size [mm]."""
+    size = f"B{row}/2" if source.feature is Feature.SIZE else f"B{row}"
+    step = number(source.step / MICROMETRE)
+    if not source.step:
+        step = number(STEPS[-1][1])
+        for end, own in reversed(STEPS[:-1]):
+            step = f"IF({size}<{number(end)},{number(own)},{step})"
+    half = zone / 2 if source.feature is Feature.SIZE else zone
+    # What was verified is stated as it is, a grade or a smallest zone too.
+    value = rounded_down(half * MICROMETRE, STEP) / MILLIMETRE
+    verified = f"AND({size}>{number(half - _AS_VERIFIED)},{size}<{number(half + _AS_VERIFIED)})"
+    return Formula(f"=IF({verified},{number(round(value, 8))},INT({size}/{step}+0.000001)*{step}/1000)", value)
 
 
 def _relief(side: OneSidedConstraint) -> Float[np.ndarray, " group"]:
@@ -106,11 +165,6 @@ def _without_weight(result: AllocationResult) -> tuple[str, ...]:
     weights = np.sum([side.stack.worst_case + side.stack.root_sum_square for side in result.chosen.constraints], axis=0)
     names = [group for group, weight in zip(result.drawn.groups, weights.tolist(), strict=True) if weight == 0.0]
     return (_say("workbook_weightless", groups=", ".join(names)),) if names else ()
-
-
-def _steps(frame: FeatureFrame) -> int:
-    """Return how many steps of a tenth of a micrometre a micrometre of the zone is written as; ± has half of them."""
-    return 5 if frame.characteristic == "size" else 10
 
 
 def _requirements(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
@@ -175,7 +229,8 @@ def style_calculator(
         for name, frame in sheets.items()
     }
     below = (*notes, *_without_weight(result), _say("workbook_change"), _say("workbook_models"))
-    values["drawing"] |= _below(drawing, sheets["requirements"], len(result.drawn.groups), below)
+    rows = len(sheets["drawing"])
+    values["drawing"] |= _below(drawing, sheets["requirements"], rows, below)
     drawing.freeze_panes = "C2"
     drawing.print_area = f"A1:{get_column_letter(_WEIGHTS - 1)}{drawing.max_row}"
     for sheet in (drawing, requirements):
@@ -203,18 +258,20 @@ def _mark(result: AllocationResult, drawing: Worksheet) -> None:
         drawing.cell(row, 2).fill, drawing.cell(row, 2).border = _INPUT, Border(*[_EDGE] * 4)
         guard.add(drawing.cell(row, 2))
         drawing.cell(row, 4).number_format = "0.000"
-        drawing.cell(row, 11).number_format = _written_as(callout(result.dimensions[name][0]))
+        drawing.cell(row, 11).number_format = _written_as(callout(_first_member(result, name)))
+    for row, (_, members) in enumerate(_further(result), start=_FIRST + len(result.drawn.groups)):
+        drawing.cell(row, 11).number_format = _written_as(callout(members[0]))
 
 
 def _written_as(frame: FeatureFrame) -> str:
     """Return the format of a number that looks as on the drawing, whatever the language of its reader."""
     sign = "±" if frame.characteristic == "size" else "⌀" if frame.zone.startswith("⌀") else ""
-    return f'"{sign}"0.0000' if sign else "0.0000"
+    return f'"{sign}"0.0000#' if sign else "0.0000#"
 
 
-def _below(drawing: Worksheet, watched: pd.DataFrame, groups: int, notes: tuple[str, ...]) -> dict[str, float | str]:
+def _below(drawing: Worksheet, watched: pd.DataFrame, rows: int, notes: tuple[str, ...]) -> dict[str, float | str]:
     """Write cost, limits and notes below the drawing, and return what the formulas there give."""
-    start, values = _FIRST + groups + 1, dict[str, float | str]()
+    start, values = _FIRST + rows + 1, dict[str, float | str]()
     for column, header in enumerate(("what", "limit", "predicted", "kept"), start=1):
         drawing.cell(start, column, header).font = Font(bold=True)
     for at, own in enumerate(watched.to_dict("records")):
