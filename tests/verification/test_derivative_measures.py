@@ -131,6 +131,19 @@ def test_local_derivatives_have_sign_length_and_direction():
     np.testing.assert_allclose(found.direction, [np.nan, np.arctan2(4.0, 3.0), np.nan])
     np.testing.assert_allclose(found.root_mean_square, np.array([3.0, 5.0, 2.0]) * 1e-6)
     assert found.nominal == -6.0
+    one, across = found.per_micrometre[[0, 1]] * 1e6
+    assert one == pytest.approx(3.0, rel=1e-12)
+    assert across == pytest.approx(5.0 / np.sqrt(2.0), rel=0.2)  # a random direction, of 64 units
+    assert found.by_zone[0] == pytest.approx(3.0, rel=0.3)  # σ = 1 of 64 units
+
+
+def test_a_micrometre_is_of_one_feature_and_the_zone_of_all():
+    """Four like features, each with the slope 2: one changes the output by 2 a micrometre, all by √4 times σ."""
+    errors = ErrorModel((source("pins", each=4), source("b")))
+    slopes = [2.0] * 4 + [1.0]
+    found = local_derivatives(Experiment.of(linear(errors, slopes), errors, SeedTree(4)), 4096)
+    np.testing.assert_allclose(found.per_micrometre, np.array([2.0, 1.0]) * 1e-6, rtol=1e-12)
+    np.testing.assert_allclose(found.by_zone, [4.0, 1.0], rtol=0.05)
 
 
 def test_root_mean_square_is_over_random_units():

@@ -33,6 +33,10 @@ class LocalDerivatives:
     direction: Float[np.ndarray, " source"]
     # Root mean square of the gradient's length over random units [output/µm]
     root_mean_square: Float[np.ndarray, " source"]
+    # Root mean square change of the output, to first order, by the errors that a source's zone lets through [output]
+    by_zone: Float[np.ndarray, " source"]
+    # The same by an error of one of its features, in its own directions and waves, per micrometre [output/µm]
+    per_micrometre: Float[np.ndarray, " source"]
     # Good random units, and those without a usable answer [-]
     units: int
     failed: int
@@ -72,7 +76,9 @@ def local_derivatives(experiment: Experiment[ResponseWithDerivatives], units: in
     place: the derivative there is one of several one-sided ones. The root mean square does not depend on it.
 
     The length of a gradient is √(Σ (∂y/∂xᵢ)²) over a source's columns [output/µm] (own derivation); in the middle, and
-    as root mean square over units.
+    as root mean square over units. An error has no steepest direction but its own: by a source's zone the output
+    changes by √(Σ E[(∂y/∂xᵢ)²]·σᵢ²), and divided by √(Σ σᵢ²) by a micrometre of one of its features, which is
+    the distance from the true position, or the amplitude of a wave.
 
     Examples
     --------
@@ -88,18 +94,24 @@ def local_derivatives(experiment: Experiment[ResponseWithDerivatives], units: in
         raise SolveError("Local derivatives: the nominal has no usable answer.")
     sample, by_column, _ = _sampled(experiment, units)
     where, length, direction, random = np.array(errors.source_of_column), [], [], []
+    variance, mean_square = sample.x[sample.evaluation.good].var(axis=0), (by_column**2).mean(axis=0)
+    by_zone, per_micrometre = [], []
     for source in errors.active:
         own, per_length = where == source.name, MICROMETRE / source.lever
         gradient = middle.by_column[0, own] * per_length
         length.append(float(gradient[0]) if gradient.size == 1 else float(np.linalg.norm(gradient)))
         direction.append(float(np.arctan2(gradient[1], gradient[0])) if gradient.size == 2 else np.nan)
         random.append(float(np.sqrt(((by_column[:, own] * per_length) ** 2).sum(axis=1).mean())))
+        by_zone.append(float(np.sqrt(mean_square[own] @ variance[own])))
+        per_micrometre.append(by_zone[-1] / float(np.sqrt(variance[own].sum())) * per_length)
     return LocalDerivatives(
         sources=tuple(source.name for source in errors.active),
         nominal=float(middle.evaluation.values[0, 0]),
         at_nominal=np.array(length),
         direction=np.array(direction),
         root_mean_square=np.array(random),
+        by_zone=np.array(by_zone),
+        per_micrometre=np.array(per_micrometre),
         units=by_column.shape[0],
         failed=sample.failed,
     )

@@ -38,6 +38,8 @@ _SURE = 0.995
 """Confidence that would be rounded to certainty [-]."""
 _NAMED = 3
 """Sources that the answer names [-]."""
+_AS_STRONG = 0.9
+"""Share of the largest change per micrometre from which a source is as strong as any [-]."""
 _SHOWN = 24
 """Rows of a picture; the table has all [-]."""
 _LINE = 14
@@ -70,6 +72,7 @@ class RankingTeller(Teller[RankingResult]):
         found = self.result
         return (
             *_drivers(found.dimensions or found.indices),
+            *self._per_micrometre(),
             converged(found.sobol.convergence),
             *self._replicated(),
             *self._orders(),
@@ -143,6 +146,27 @@ class RankingTeller(Teller[RankingResult]):
                 confidence=found.confidence,
                 share=found.share,
             )
+
+    def _per_micrometre(self) -> Iterator[str]:
+        """Yield the order per micrometre, and why it is not that of the ranking, if a zone weighs in it."""
+        local, indices, errors = self.result.local, self.result.indices, self.result.errors
+        ranked = [indices.sources[at] for at in indices.order if indices.sources[at] in local.sources]
+        if not ranked:
+            return
+        first = [(local.sources[at], local.per_micrometre[at]) for at in tables.largest_first(local.per_micrometre)]
+        zones = dict(zip((source.name for source in errors.active), errors.zones / MICROMETRE, strict=False))
+        names = ", ".join(
+            _say("per_micrometre_name", source=name, change=change, sign=self._sign) for name, change in first[:_NAMED]
+        )
+        same = dict(first)[ranked[0]] >= _AS_STRONG * first[0][1]
+        yield _say(
+            "per_micrometre_same" if same else "per_micrometre_other",
+            names=names,
+            driver=ranked[0],
+            zone=zones[ranked[0]],
+            first=first[0][0],
+            zone_of_first=zones[first[0][0]],
+        )
 
     def _orders(self) -> Iterator[str]:
         """Yield who makes the strongest orders."""
@@ -463,19 +487,29 @@ class RankingTeller(Teller[RankingResult]):
         return Figure(
             name="ranking",
             title=_say("ranking_figure", output=self._output),
-            x_label="Sobol index [-]",
-            series=tuple(
-                Series(
-                    label=_say("with_interval", name=name),
-                    kind="bars",
-                    x=[indices.sources[at] for at in rows],
-                    y=[max(values[at], 0.0) for at in rows],
-                    low=[max(interval[0, at], 0.0) for at in rows],
-                    high=[max(interval[1, at], 0.0) for at in rows],
-                )
-                for name, values, interval in bars
+            x_label=_say("ranking_axis"),
+            series=(
+                *(
+                    Series(
+                        label=_say("with_interval", name=name),
+                        kind="bars",
+                        x=[indices.sources[at] for at in rows],
+                        y=[max(values[at], 0.0) for at in rows],
+                        low=[max(interval[0, at], 0.0) for at in rows],
+                        high=[max(interval[1, at], 0.0) for at in rows],
+                    )
+                    for name, values, interval in bars
+                ),
+                self._per_micrometre_bars([indices.sources[at] for at in rows]),
             ),
         )
+
+    def _per_micrometre_bars(self, names: list[str]) -> Series:
+        """Return the change per micrometre of sources as shares of the largest one."""
+        local = self.result.local
+        largest = float(local.per_micrometre.max()) or 1.0
+        share = dict(zip(local.sources, (local.per_micrometre / largest).tolist(), strict=True))
+        return Series(label=_say("per_micrometre_bars"), kind="bars", x=names, y=[share.get(own, 0.0) for own in names])
 
     def _requirements_figure(self) -> HeatMap:
         """Return the total index of every source for every requirement."""

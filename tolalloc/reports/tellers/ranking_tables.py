@@ -98,17 +98,20 @@ def _blocks(pair: Neighbours | None) -> str:
 
 
 def ranking_table(result: RankingResult) -> pd.DataFrame:
-    """Return the ranking of the leading output, with the zone and the root mean square derivative beside it."""
+    """Return the ranking of the leading output, with the zone and the order per micrometre beside it."""
     frame = sobol_table(result.indices)
     zones = dict(zip((source.name for source in result.errors.active), result.errors.zones / MICROMETRE, strict=False))
-    sens = dict(zip(result.local.sources, result.local.root_mean_square, strict=True))
+    local, unit = result.local, unit_of(result.leading)
+    place = {local.sources[at]: rank for rank, at in enumerate(largest_first(local.per_micrometre), start=1)}
+    columns = {
+        "zone [µm]": zones,
+        f"Sens [{unit}/µm]": dict(zip(local.sources, local.at_nominal, strict=True)),
+        f"rms change per µm [{unit}/µm]": dict(zip(local.sources, local.per_micrometre, strict=True)),
+        "rank per µm [-]": place,
+        f"rms change by its zone [{unit}]": dict(zip(local.sources, local.by_zone, strict=True)),
+    }
     frame = frame.assign(
-        **{
-            "zone [µm]": [zones.get(name, np.nan) for name in frame["source"]],
-            f"Sens, root mean square [{unit_of(result.leading)}/µm]": [
-                sens.get(name, np.nan) for name in frame["source"]
-            ],
-        }
+        **{header: [own.get(name, np.nan) for name in frame["source"]] for header, own in columns.items()}
     )
     return with_own_words(frame, "source", {own.name: (own,) for own in result.errors.active})
 
