@@ -214,6 +214,7 @@ WRONG = {
     "half zone": ("[µm]", "half zone; numbers are not converted"),
     "weight:shift:spread": ("[µm]", "weight:shift:spread; numbers are not converted"),
     "order:amplitude": ("[µm]", "order:amplitude; numbers are not converted"),
+    "order:amplitude@°": ("[µm]", "order:amplitude@°; numbers are not converted"),
     "cost units": ("[µm]", "a currency such as EUR, or cost units; numbers are not converted"),
 }
 

@@ -225,9 +225,8 @@ class LinearLaw:
 
     @cached_property
     def _column_means(self) -> Float[np.ndarray, " column"]:
-        middles = [source.middle / source.lever for source in self.errors.active]
-        counts = [len(source.columns) for source in self.errors.active]
-        return np.asarray(np.repeat(middles, counts) + self._zone_means)
+        middles = [source.middles for source in self.errors.active]
+        return np.asarray(np.concatenate([*middles, []]) + self._zone_means)
 
     @cached_property
     def _normal_loads(self) -> Float[np.ndarray, " column"]:

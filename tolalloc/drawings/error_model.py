@@ -52,12 +52,12 @@ class ErrorModel:
 
     @cached_property
     def fixed(self) -> dict[str, float]:
-        """Columns of the sources with zone zero, which stay in the middle of it [m]."""
+        """Columns of the sources with zone zero, which stay where it is or at their systematic waves [m]."""
         return {
-            column: source.middle / source.lever
+            column: float(middle)
             for source in self.sources
             if source.zone == 0.0
-            for column in source.columns
+            for column, middle in zip(source.columns, source.middles, strict=True)
         }
 
     @property
@@ -182,8 +182,9 @@ class ErrorModel:
     ) -> Float[np.ndarray, "sample column"]:
         """Return the columns [m, angles rad] that the standard values give at the zones [m]."""
         counts = [len(source.columns) for source in self._varying]
-        middles = [*(source.middle / source.lever for source in self.active), *(0.0 for _ in self.joint)]
-        middle = np.repeat(middles, counts)
+        middle = np.concatenate(
+            [*(source.middles for source in self.active), *(np.zeros(len(source.columns)) for source in self.joint), []]
+        )
         return np.asarray(standard * np.repeat(zones, counts) + middle)
 
     def deviations_of_normal(

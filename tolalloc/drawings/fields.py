@@ -13,7 +13,7 @@ from tolalloc.drawings.distributions import Distribution, batches_text, parsed_b
 from tolalloc.drawings.measured_parts import MeasuredParts, load_measured_parts
 from tolalloc.drawings.sources import Source, is_angular
 from tolalloc.drawings.table_file import usual_signs
-from tolalloc.drawings.zones import Feature, parsed_spectrum, spectrum_text
+from tolalloc.drawings.zones import Feature, parsed_spectrum, parsed_systematic, spectrum_text, systematic_text
 from tolalloc.reading.files import Record
 from tolalloc.reading.units import COST_UNITS, MICROMETRE, MILLIMETRE
 
@@ -238,6 +238,15 @@ class ToleranceRow(Record):
             write=lambda source: source.written_spectrum or spectrum_text(source.spectrum),
         ),
     ] = ""
+    systematic: Annotated[
+        str,
+        Column(
+            "for pitch and run-out: waves that all parts share beside the random ones, as `2:5.0@30`: order of the "
+            "spectrum, amplitude in the unit of the row, direction of a crest",
+            "order:amplitude@°",
+            write=lambda source: systematic_text(source.systematic, MICROMETRE),
+        ),
+    ] = ""
     each: Annotated[
         int,
         Field(ge=1, le=1000),
@@ -367,6 +376,17 @@ class ToleranceRow(Record):
             self._require_sensible_waves()
         return self
 
+    @model_validator(mode="after")
+    def _systematic_makes_sense(self) -> ToleranceRow:
+        orders = {order for order, _ in parsed_spectrum(self.spectrum)[0]}
+        for order, amplitude, _ in parsed_systematic(self.systematic):
+            if order not in orders:
+                allowed = ", ".join(map(str, sorted(orders))) or "none, as the row has no spectrum"
+                raise ValueError(f"systematic has order {order}; allowed are the orders of its spectrum: {allowed}")
+            if amplitude * UNITS[self.unit] > LARGEST_ZONE:
+                raise ValueError(f"systematic has an amplitude of {amplitude:g} {self.unit}; allowed is 0 to 2 mm")
+        return self
+
     def _require_sensible_waves(self) -> None:
         """Raise unless the distribution says something about waves over a turn."""
         spectrum, teeth = parsed_spectrum(self.spectrum)
@@ -400,6 +420,7 @@ class ToleranceRow(Record):
             batches=parsed_batches(self.batches),
             measured=self._measured_parts(folder, middle),
             spectrum=spectrum,
+            systematic=tuple((order, size * factor, at) for order, size, at in parsed_systematic(self.systematic)),
             teeth=teeth,
             over=(self.over or 0.0) * MILLIMETRE,
         )

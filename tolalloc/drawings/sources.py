@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cached_property
+from math import degrees
 
 import numpy as np
 from jaxtyping import Float
@@ -23,7 +24,7 @@ from tolalloc.drawings.distributions import (
     smoothing_width,
 )
 from tolalloc.drawings.measured_parts import MeasuredParts
-from tolalloc.drawings.zones import Feature, Spectrum, ZoneMapping
+from tolalloc.drawings.zones import Feature, Spectrum, Systematic, ZoneMapping
 from tolalloc.reading.units import MICROMETRE, MILLIMETRE
 
 ANGULAR = ("tilt", "phase", "rotation")
@@ -124,6 +125,8 @@ class Source:
         Shape of a lognormal or Weibull distribution, else 0 [-].
     spectrum
         Order → relative amplitude of pitch and run-out deviations [-].
+    systematic
+        Waves that all parts share beside the random ones inside the zone, of orders of the spectrum [-, m, rad].
     teeth
         Number of teeth on which the range of the spectrum is taken; 0: over the whole turn [-].
     each
@@ -157,6 +160,7 @@ class Source:
     sorted: bool = False
     process: str = ""
     spectrum: Spectrum = ()
+    systematic: Systematic = ()
     teeth: int = 0
     written_spectrum: str = ""
     each: int = 1
@@ -187,6 +191,18 @@ class Source:
         """
         sides = 2 if self.feature is Feature.SIZE else 1
         return min(zone, max(sides * rounded_down(zone / sides, self.step), self.minimum))
+
+    @cached_property
+    def middles(self) -> Float[np.ndarray, " column"]:
+        """Where the columns stand without what is random: the middle of the zone, or the systematic waves [m, rad].
+
+        Of a wave A·cos(n·(θ − θ0)) they are A·cos(n·θ0) and A·sin(n·θ0), own derivation.
+        """
+        if not self.systematic:
+            return np.full(len(self.columns), self.middle / self.lever)
+        waves = {order: amplitude * np.exp(1j * order * at) for order, amplitude, at in self.systematic}
+        shared = np.array([waves.get(order, 0.0) for order, _ in self.spectrum])
+        return np.stack([shared.real, shared.imag], axis=1).ravel()
 
     @property
     def lever(self) -> float:
@@ -246,6 +262,11 @@ class Source:
             reading += f" over a length of {self.over / MILLIMETRE:g} mm"
         if abs(self.middle) > _ROUNDING * self.zone:
             reading += f", its middle {self.middle / MICROMETRE:+.3g} µm from the nominal size".replace("-", "−")
+        for order, amplitude, at in self.systematic:
+            reading += (
+                f", beside a wave of order {order} that all parts share, {amplitude / MICROMETRE:.3g} µm high at "
+                f"{degrees(at):.3g}°"
+            )
         if self.each > 1:
             reading += f", each of {self.each} on its own"
         is_normal = self.distribution is Distribution.NORMAL and not self.sorted
@@ -307,11 +328,12 @@ def limited_measure(source: Source, columns: Float[np.ndarray, "sample column"])
 
     Notes
     -----
-    A size: its deviation from the middle, for like features the largest magnitude. A position: twice the distance from
+    Systematic waves are taken off. A size: its deviation from the middle, for like features the largest magnitude. A
+    position: twice the distance from
     the true one, the largest of like features. Pitch and run-out: the range over a turn, or at the teeth for a spectrum
     with a random part.
     """
-    length = columns * source.lever - source.middle
+    length = columns * source.lever - (source.middles if source.systematic else source.middle)
     if source.feature is Feature.SIZE:
         return np.asarray(np.abs(length).max(axis=1) if source.each > 1 else length[:, 0])
     if source.feature is Feature.POSITION:

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property, lru_cache
-from math import sqrt
+from math import degrees, radians, sqrt
 
 import numpy as np
 from jaxtyping import Float
@@ -33,6 +33,9 @@ from tolalloc.drawings.distributions import (
 
 Spectrum = tuple[tuple[int, float], ...]
 """Order of the turn and relative amplitude, one pair per harmonic."""
+
+Systematic = tuple[tuple[int, float, float], ...]
+"""Order of the turn, amplitude and direction of a wave that all parts share [-, m, rad]."""
 
 KNOWN_RANGES: Mapping[Spectrum, float] = {
     ((1, 9.2), (2, 4.3), (4, 1.0)): 67.76217971395965,
@@ -135,6 +138,40 @@ def parsed_spectrum(text: str) -> tuple[Spectrum, int]:
         variance = random**2 * (1.0 if 2 * order == teeth else 2.0) / teeth
         amplitudes[order] = sqrt(amplitudes.get(order, 0.0) ** 2 + variance)
     return tuple(sorted(amplitudes.items()) if teeth else amplitudes.items()), teeth
+
+
+def parsed_systematic(text: str) -> Systematic:
+    """Return systematic waves such as ``2:5.0@30``, order:amplitude@direction, in the unit of the text and rad.
+
+    A wave is amplitude·cos(order·(θ − direction)), half as high as its indicator reading.
+
+    Raises
+    ------
+    ValueError
+        The text does not read like that.
+
+    Examples
+    --------
+    >>> parsed_systematic("2:5.0@90")
+    ((2, 5.0, 1.5707963267948966),)
+    """
+    found: dict[int, tuple[float, float]] = {}
+    for item in text.split():
+        wave = re.fullmatch(rf"([0-9]{{1,9}}):({NUMBER})@(-?{NUMBER})", item)
+        if wave is None or int(wave[1]) in found:
+            raise ValueError(
+                f"systematic must read like '2:5.0@30' (order:amplitude@direction in degrees), each order once: {item}"
+            )
+        found[int(wave[1])] = (float(wave[2]), radians(float(wave[3])))
+    return tuple((order, *wave) for order, wave in found.items())
+
+
+def systematic_text(systematic: Systematic, unit: float) -> str:
+    """Return systematic waves as a tolerance table writes them, their amplitudes over a unit."""
+    return " ".join(
+        f"{order}:{round(amplitude / unit, 9)!r}@{round(degrees(direction), 9)!r}"
+        for order, amplitude, direction in systematic
+    )
 
 
 def spectrum_text(spectrum: Spectrum) -> str:

@@ -463,7 +463,7 @@ class LiveUnits:
             raise UnknownNameError.among("page", "source", source, sources)
         own = np.array([name == source for name in errors.source_of_column])
         tried = np.tile(self._columns(design, number), (len(shares), 1))
-        tried[:, own] = _middle(sources[source]) + np.outer(shares, self._full(sources[source], number, own))
+        tried[:, own] = sources[source].middles + np.outer(shares, self._full(sources[source], number, own))
         return tried
 
     def _columns(self, design: LiveDesign, number: int) -> Float[np.ndarray, " column"]:
@@ -480,7 +480,7 @@ class LiveUnits:
         session = self.session
         zones = np.ones(len(session.prepared.errors.active))
         own = session.prepared.errors.deviations(session.standard[max(number, 1) - 1 : max(number, 1)], zones)[0, at]
-        centred = own - _middle(source)
+        centred = own - source.middles
         measure = float(limited_measure(source, own[np.newaxis])[0]) or 1.0
         half = source.zone / 2 if source.feature is Feature.SIZE else source.zone
         return np.asarray(centred * half / measure)
@@ -488,8 +488,3 @@ class LiveUnits:
     def _values(self, design: LiveDesign, x: Float[np.ndarray, "unit column"]) -> Float[np.ndarray, "unit output"]:
         evaluation = self.session.model(design).reading(self.session.outputs)(x)
         return np.where(evaluation.good[:, np.newaxis], evaluation.values, np.nan)
-
-
-def _middle(source: Source) -> float:
-    """Return where the columns of a source stand in the middle of its zone [m, angles rad]."""
-    return source.middle / source.lever
