@@ -81,12 +81,14 @@ def inverse_sensitivity(
 
     Notes
     -----
-    All trials use the same uniform numbers, so the quantile is a continuous function of each factor. Opening goes in
-    doublings, so the first crossing is found unless the quantile returns within one. A zone whose closing leaves too
-    many of the worst units beyond the limit cannot repair the design alone, and no other unit is solved with it closed.
-    Sources of a group that share a zone on the drawing open one at a time here. The interval is that of the quantile by
-    order statistics, over its slope; the middle of a size does not move. What counts is the empirical quantile, without
-    the margin that shows a yield with confidence.
+    All trials use the same uniform numbers, so the quantile is a continuous function of each factor. A zone is opened
+    to twice its width, then to the largest factor, so the first crossing is found unless the quantile returns within
+    one of these steps. Between two factors the square of the quantile is taken as linear in the square of the factor,
+    exact for errors that add in quadrature. A zone whose closing leaves too many of the worst units beyond the limit
+    cannot repair the design alone, and no other unit is solved with it closed. Sources of a group that share a zone on
+    the drawing open one at a time here. The interval is that of the quantile by order statistics, over its slope; the
+    middle of a size does not move. What counts is the empirical quantile, without the margin that shows a yield with
+    confidence.
 
     References
     ----------
@@ -230,12 +232,11 @@ class _Openings:
 def _bracket(
     openings: _Openings, now: float, limit: float, largest_factor: float
 ) -> tuple[Int[np.ndarray, " found"], Float[np.ndarray, "4 found"]]:
-    """Return the sources whose quantile crosses the limit between factor 1 and the last trial, and what brackets it.
+    """Return the sources whose quantile crosses the limit between factor 1 and the farthest, and what brackets it.
 
     These are two factors per source with the limit between their quantiles, then quantile less limit at both.
     """
-    doublings = 2.0 ** np.arange(1, int(np.ceil(np.log2(largest_factor))))
-    trials = [*doublings.tolist(), largest_factor] if now <= limit else [0.0]
+    trials = sorted({min(2.0, largest_factor), largest_factor}) if now <= limit else [0.0]
     left = np.arange(len(openings.errors.active))
     if now > limit:
         left = left[openings.may_repair(left, limit)]
@@ -252,6 +253,17 @@ def _bracket(
     return sources[0].astype(int), bracket
 
 
+def _squared(excess: Float[np.ndarray, " found"], limit: float) -> Float[np.ndarray, " found"]:
+    """Return quantile² less limit² with the sign of the excess, or the excess where no limit above 0 leaves a square.
+
+    Examples
+    --------
+    >>> _squared(np.array([1.0, -3.0, -9.0]), 3.0).tolist()
+    [7.0, -9.0, -9.0]
+    """
+    return np.maximum(limit + excess, 0.0) ** 2 - limit**2 if limit > 0.0 else excess
+
+
 def _crossings(
     openings: _Openings,
     sources: Int[np.ndarray, " found"],
@@ -259,17 +271,18 @@ def _crossings(
     limit: float,
 ) -> tuple[Float[np.ndarray, " found"], Float[np.ndarray, "found 3"]]:
     """Return the factors at which the quantile equals the limit [-], and there the quantile and its interval."""
-    stale, fresh, stale_excess, fresh_excess = bracket.copy()
+    stale, fresh = bracket[:2].copy()
+    stale_excess, fresh_excess = (_squared(excess, limit) for excess in bracket[2:])
     left, quantiles = np.arange(stale.size), np.empty((stale.size, 3))
     for _ in range(_MOST_STEPS):
         a, b, at_a, at_b = stale[left], fresh[left], stale_excess[left], fresh_excess[left]
-        trial = b - at_b * (b - a) / (at_b - at_a)
+        trial = np.sqrt(b**2 - at_b * (b**2 - a**2) / (at_b - at_a))
         quantiles[left] = openings.quantiles(sources[left], trial)
         excess = quantiles[left, 0] - limit
         # The new end replaces the one on its own side; an end that stays twice loses half its weight.
         other_side = (excess > 0.0) != (at_b > 0.0)
         stale[left], stale_excess[left] = np.where(other_side, b, a), np.where(other_side, at_b, at_a / 2.0)
-        fresh[left], fresh_excess[left] = trial, excess
+        fresh[left], fresh_excess[left] = trial, _squared(excess, limit)
         left = left[np.abs(excess) > _SAME * abs(limit)]
         if not left.size:
             return fresh, quantiles
