@@ -17,10 +17,10 @@ _LEAST_OUTSIDE = 5.0
 """Units that must lie beyond the quantile on average, so that order statistics bound it from above [-]."""
 _SAME = 1e-3
 """Distance from the limit, over the limit, at which the quantile counts as equal to it [-]."""
+_FAR_BELOW = 0.9
+"""Part of the limit that a quantile must leave free by its squares, not to be tried at the largest factor [-]."""
 _MOST_STEPS = 30
 """Steps between two factors after which the quantile cannot be continuous; about four are usual [-]."""
-_SLOPE_STEP = 0.1
-"""Change of a factor that its slope is taken over, wide enough to move many units past each other [-]."""
 _CONFIDENCE = 0.9
 """Confidence of the two-sided interval of every factor [-]."""
 _ROWS_AT_ONCE = 2**14
@@ -36,6 +36,9 @@ class InverseSensitivity:
     sources: tuple[str, ...]  # Names of the sources that a drawing limits, in the order of all arrays
     quantile: float  # Quantile of the output at the target yield with the zones as they are [output]
     meets: bool  # Whether that keeps the limit; if so the factors are above 1, if not below
+    # Whether the interval of that quantile leaves the limit out; if not, these units tell no factor from 1, all are
+    # NaN, and none is searched for
+    decided: bool
     # Factor of the zone; infinite if the largest factor tried keeps the limit too, NaN if the limit is missed even
     # without the source [-]
     factor: Float[np.ndarray, " source"]
@@ -83,12 +86,13 @@ def inverse_sensitivity(
     -----
     All trials use the same uniform numbers, so the quantile is a continuous function of each factor. A zone is opened
     to twice its width, then to the largest factor, so the first crossing is found unless the quantile returns within
-    one of these steps. Between two factors the square of the quantile is taken as linear in the square of the factor,
-    exact for errors that add in quadrature. A zone whose closing leaves too many of the worst units beyond the limit
-    cannot repair the design alone, and no other unit is solved with it closed. Sources of a group that share a zone on
-    the drawing open one at a time here. The interval is that of the quantile by order statistics, over its slope; the
-    middle of a size does not move. What counts is the empirical quantile, without the margin that shows a yield with
-    confidence.
+    one of these steps; what by its squares stays far from the limit is not tried at the largest. Between two factors
+    the square of the quantile is taken as linear in the square of the factor, exact for errors that add in quadrature;
+    so is its slope. Where the interval of the present quantile holds the limit, no factor could be told from 1, and
+    none is searched for. A zone whose closing leaves too many of the worst units beyond the limit cannot repair the
+    design alone, and no other unit is solved with it closed. Sources of a group that share a zone on the drawing open
+    one at a time here. The interval is that of the quantile by order statistics, over its slope; the middle of a size
+    does not move. What counts is the empirical quantile, without the margin that shows a yield with confidence.
 
     References
     ----------
@@ -110,18 +114,20 @@ def inverse_sensitivity(
         raise InputError.at("inverse sensitivity", "largest factor", largest_factor, "a number above 1")
     errors = experiment.errors
     openings = _Openings(experiment, errors.standard_values(experiment.uniform(units)), target)
-    now = openings.quantile(*openings.present)[0]
+    now, *ends = openings.quantile(*openings.present)
     meets, count = now <= limit, len(errors.active)
-    factor = np.full(count, np.inf if meets else np.nan)
+    decided = not ends[0] <= limit <= ends[1]
+    factor = np.full(count, np.inf if meets and decided else np.nan)
     low, high = np.full((2, count), np.nan)
-    own, bracket = _bracket(openings, now, limit, largest_factor)
+    own, bracket = _bracket(openings, now, limit, largest_factor) if decided else (np.empty(0, int), np.empty((4, 0)))
     if own.size:
         factor[own], quantiles = _crossings(openings, own, bracket, limit)
-        low[own], high[own] = _interval(openings, own, factor[own], quantiles, limit)
+        low[own], high[own] = _interval(factor[own], quantiles, bracket, limit)
     return InverseSensitivity(
         sources=tuple(source.name for source in errors.active),
         quantile=now,
         meets=meets,
+        decided=decided,
         factor=factor,
         low=low,
         high=high,
@@ -249,6 +255,12 @@ def _bracket(
         ends = np.full((2, left.size), [[near], [far]])
         found.append(np.stack([left, *ends, near_excess, excess])[:, crossed])
         left, near, near_excess = left[~crossed], far, excess[~crossed]
+        if now <= limit and limit > 0.0:
+            # What adds in quadrature is far from the limit at the largest factor too.
+            rise = (_squared(near_excess, limit) - _squared(np.array([now - limit]), limit)) / (far**2 - 1.0)
+            farthest = max(now, 0.0) ** 2 + rise * (largest_factor**2 - 1.0)
+            may = farthest > (_FAR_BELOW * limit) ** 2
+            left, near_excess = left[may], near_excess[may]
     sources, bracket = np.split(np.concatenate([np.empty((5, 0)), *found], axis=1), [1])
     return sources[0].astype(int), bracket
 
@@ -291,16 +303,17 @@ def _crossings(
 
 
 def _interval(
-    openings: _Openings,
-    sources: Int[np.ndarray, " found"],
     factor: Float[np.ndarray, " found"],
     quantiles: Float[np.ndarray, "found 3"],
+    bracket: Float[np.ndarray, "4 found"],
     limit: float,
 ) -> tuple[Float[np.ndarray, " found"], Float[np.ndarray, " found"]]:
-    """Return the ends of the factors' intervals: those of the quantile, over its slope [-]."""
+    """Return the ends of the factors' intervals: those of the quantile, over its slope between the brackets [-]."""
     estimate, low, high = quantiles.T
-    step = _SLOPE_STEP * np.maximum(factor, 1.0)
-    slope = (openings.quantiles(sources, factor + step)[:, 0] - estimate) / step
+    near, far, *excesses = bracket
+    at_near, at_far = (_squared(excess, limit) for excess in excesses)
+    slope = (at_far - at_near) / (far**2 - near**2) * 2.0 * factor
+    slope = slope / (2.0 * np.maximum(estimate, np.finfo(float).tiny)) if limit > 0.0 else slope
     # Where the quantile does not rise, it does not bound the factor.
     down, up = (
         np.where(slope > 0.0, way / np.where(slope > 0.0, slope, 1.0), np.inf) for way in (high - limit, limit - low)

@@ -263,7 +263,8 @@ class RankingTeller(Teller[RankingResult]):
             key = "opening_least" if found.meets else "opening_easiest"
             opening = _say(key, source=found.sources[at], factor=found.factor[at])
         else:
-            opening = _say("opening_any" if found.meets else "opening_none")
+            missing = "opening_any" if found.meets else "opening_none"
+            opening = _say(missing if found.decided else "opening_undecided", units=found.units)
         limits = self.result.limits[self.result.leading]
         key = "kept_upper" if limits.lower is None else "kept_lower"
         if limits.width is not None:

@@ -365,7 +365,7 @@ def inverse_table(result: RankingResult) -> pd.DataFrame:
             "factor low 5 % [-]": found.low,
             "factor high 95 % [-]": found.high,
             "zone alone [µm]": found.zone / MICROMETRE,
-            "reading": [_reading(value) for value in found.factor],
+            "reading": [_reading(value) if found.decided else _say("undecided") for value in found.factor],
         },
         tightest_first(found),
     ).frame()
