@@ -302,7 +302,8 @@ def test_the_accepted_drawing_has_the_zones_in_whole_steps_that_were_verified_la
 
 
 def test_members_with_their_own_zones_are_rounded_each_on_its_own():
-    first, other = (source(name, zone=zone, group="both") for name, zone in (("a", 4.2 * UM), ("b", 4.0 * UM)))
+    zones = {"a": 4.2 * UM, "b": 4.0 * UM}
+    first, other = (source(name, zone=zone, group="both", step=0.1 * UM) for name, zone in zones.items())
     alone = source("c", Feature.POSITION, zone=20.0 * UM, step=2.0 * UM)
     space = DesignSpace(errors=ErrorModel((first, other, alone)))
     stated, design = space.rounded_down(np.array([1.18, 0.77]))

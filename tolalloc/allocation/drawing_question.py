@@ -211,8 +211,7 @@ class DrawingQuestion:
         """
         if kind in (GRADES, TABLE):
             return design
-        drawn = self.model.drawn_amounts if design.space.settings else None
-        space, stated = design.space.rounded_down(design.design, drawn)
+        space, stated = design.space.rounded_down(design.design, self.model.drawn_amounts)
         if space is design.space and np.array_equal(stated, design.design):
             return design
         return self.verifier("rounded", space).verify(stated, design.name)

@@ -223,7 +223,8 @@ class ToleranceRow(Record):
         Field(ge=0, le=LARGEST_ZONE),
         Column(
             "step of the numbers that the drawing states, to which an allocated zone is rounded down: the zone, or for "
-            "a size its deviations; 0.01 µm below 1 µm, 0.1 below 10, 0.5 below 100, then 1 unless given",
+            "a size its deviations; 0.01 µm below 1 µm, 0.1 below 10, 0.5 below 100, then 1 unless given, for a "
+            "reducer; an own model's zones stay as found",
             "unit",
             write=lambda source: _micrometres(source.step) or None,
         ),

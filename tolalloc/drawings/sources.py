@@ -41,15 +41,18 @@ def is_angular(source: str) -> bool:
 
 
 STEPS = ((1.0, 0.01), (10.0, 0.1), (100.0, 0.5), (np.inf, 1.0))
-"""Step of a number on a drawing up to a size, where its table states none: two or three figures [µm]. An assumption: a
-tenth of a micrometre is what a measuring room tells apart on parts of a reducer; finer numbers need finer steps."""
+"""Step of a number on a reducer's drawing up to a size, where its table states none: two or three figures [µm]. An
+assumption: a tenth of a micrometre is what a measuring room tells apart on parts of a reducer; finer numbers need finer
+steps."""
 
 _WHOLE = 1e-6
 """Part of a step that a number may lack and still count as whole [-]."""
 
 
-def rounded_down(number: float, step: float = 0.0) -> float:
-    """Return a number of a drawing rounded down to its step, or to that of `STEPS` if none is given [m].
+def rounded_down(number: float, step: float = 0.0, usual: Sequence[tuple[float, float]] = STEPS) -> float:
+    """Return a number of a drawing rounded down to its step, or to the usual one of its size if none is given [m].
+
+    Without either it stays as it is.
 
     Examples
     --------
@@ -59,7 +62,9 @@ def rounded_down(number: float, step: float = 0.0) -> float:
     [4.7, 23.0, 4.5]
     """
     size = number / MICROMETRE
-    own = step / MICROMETRE or next(own for end, own in STEPS if size < end * (1 - _ROUNDING))
+    own = step / MICROMETRE or next((own for end, own in usual if size < end * (1 - _ROUNDING)), 0.0)
+    if not own:
+        return number
     return float(np.floor(size / own + _WHOLE) * own * MICROMETRE)
 
 
@@ -132,7 +137,7 @@ class Source:
     each
         Number of like features (pins, teeth) that each deviate on their own inside this zone [-].
     step
-        Step of the numbers that the drawing states; 0: that of `STEPS` [m].
+        Step of the numbers that the drawing states; 0: the usual one, if its model has such [m].
     over
         For an angle, the length over which the zone limits the deviation; 0 for everything else [m].
     own_id
@@ -184,13 +189,13 @@ class Source:
             return tuple(f"{name}.{axis}" for name in names for axis in ("x", "y"))
         return tuple(f"{self.name}.{wave}{order}" for order, _ in self.spectrum for wave in ("cos", "sin"))
 
-    def rounded_down(self, zone: float) -> float:
+    def rounded_down(self, zone: float, usual: Sequence[tuple[float, float]] = STEPS) -> float:
         """Return the widest zone in steps of the drawing that is no wider than one, and no smaller than allowed [m].
 
         A size has its step in each of its two deviations. A zone within a step of the smallest one becomes that one.
         """
         sides = 2 if self.feature is Feature.SIZE else 1
-        return min(zone, max(sides * rounded_down(zone / sides, self.step), self.minimum))
+        return min(zone, max(sides * rounded_down(zone / sides, self.step, usual), self.minimum))
 
     @cached_property
     def middles(self) -> Float[np.ndarray, " column"]:

@@ -15,7 +15,7 @@ from tolalloc.allocation.cost.process_costs import today
 from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Shared, Stack
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import Source, known_as, meant
+from tolalloc.drawings.sources import STEPS, Source, known_as, meant
 from tolalloc.drawings.tolerance_table import with_zones
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.settings import DrawnAmounts, Setting
@@ -189,9 +189,10 @@ class DesignSpace:
 
         Notes
         -----
-        A zone that is the one of the tolerance table stays as its table states it. Members of a group that have one
-        zone keep one; others are rounded one by one, in a space whose table has them at the rounded ratio. So the
-        design costs what its rounded zones cost, and units of it lie in them.
+        A zone that is the one of the tolerance table stays as its table states it. Rows without a step have the usual
+        ones where the model's drawings round (`DrawnAmounts.finest`), or else stay as they were found.
+        Members of a group that have one zone keep one; others are rounded one by one, in a space whose table has them
+        at the rounded ratio. So the design costs what its rounded zones cost, and units of it lie in them.
 
         Examples
         --------
@@ -199,20 +200,25 @@ class DesignSpace:
         >>> space = verifier_of_sum(6.0, 8.0, limit=5.0).space
         >>> _, design = space.rounded_down(np.array([1.0, 0.51234]))
         >>> (design * [6.0, 8.0]).round(6).tolist()
+        [6.0, 4.09872]
+        >>> stated = replace(space, errors=replace(space.errors, sources=tuple(
+        ...     replace(own, step=5e-7) for own in space.errors.sources)))
+        >>> (stated.rounded_down(np.array([1.0, 0.51234]))[1] * [6.0, 8.0]).round(6).tolist()
         [6.0, 4.098]
         """
+        usual = STEPS if drawn is not None and drawn.finest else ()
         found, zones = design.copy(), {own.name: own.zone for own in self.errors.sources}
         for at, group in enumerate(self.groups):
             members, scale = self._members(group), float(design[at])
             if abs(scale - 1.0) <= _ROUNDING:
                 continue
-            rounded = [own.rounded_down(own.zone * scale) for own in members]
+            rounded = [own.rounded_down(own.zone * scale, usual) for own in members]
             ratios = [zone / own.zone for zone, own in zip(rounded, members, strict=True)]
             if max(ratios) - min(ratios) <= _ROUNDING * max(ratios):
                 found[at] = min(ratios)
             else:
                 zones |= {own.name: zone / scale for own, zone in zip(members, rounded, strict=True)}
-        if drawn is not None and drawn.finest:
+        if drawn is not None and drawn.finest and self.settings:
             found[len(self.groups) :] = self._stated(self.settings_of(design), drawn)
         sources = with_zones(self.errors.sources, [zones[own.name] for own in self.errors.sources])
         changed = sources != self.errors.sources
