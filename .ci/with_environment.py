@@ -34,7 +34,12 @@ def environment() -> Path:
         return python.parent
     print(f"Making the environment in {folder} (once, a minute or two) ...", file=sys.stderr, flush=True)
     own_pip = find_spec("ensurepip") is not None
-    venv.create(folder, with_pip=own_pip)
+    try:
+        venv.create(folder, with_pip=own_pip)
+    except OSError as fault:
+        stop(
+            f"the environment {folder} cannot be made: {fault}. If another Python made it, remove it and run this again."
+        )
     # Debian may ship Python without ensurepip; its own pip can still fill the environment.
     pip = [str(python), "-m", "pip"] if own_pip else [sys.executable, "-m", "pip", "--python", str(python)]
     if not own_pip and find_spec("pip") is None:

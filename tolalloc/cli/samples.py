@@ -59,7 +59,7 @@ def process_files(sources: Sequence[Source]) -> dict[str, str]:
 
 
 STIFFER = "crank_disc_bearing"
-FACTOR = 1.25
+FACTOR = 1.6
 """True stiffness of these bearings over that of the reducer file [-]."""
 _READINGS = 144
 """Readings of a curve [-]."""
