@@ -37,9 +37,7 @@ def environment() -> Path:
     try:
         venv.create(folder, with_pip=own_pip)
     except OSError as fault:
-        stop(
-            f"the environment {folder} cannot be made: {fault}. If another Python made it, remove it and run this again."
-        )
+        stop(f"the environment {folder} cannot be made: {fault}. Remove it if another Python made it, and try again.")
     # Debian may ship Python without ensurepip; its own pip can still fill the environment.
     pip = [str(python), "-m", "pip"] if own_pip else [sys.executable, "-m", "pip", "--python", str(python)]
     if not own_pip and find_spec("pip") is None:
