@@ -101,11 +101,10 @@ def missing(allocation: ZoneAllocation, beyond: float = 3.0) -> ZoneAllocation:
 
 def test_the_certificate_says_for_which_drawings_it_holds(results):
     joint = results.free
-    below = f"{joint.bound:.2f} ({1 - joint.bound / joint.chosen.cost:.1%} below {joint.chosen.cost:.2f})"
     assert joint.bound < joint.chosen.cost
-    sentence = said(results, "Lower bound by the local model around the free zones")
-    assert below in sentence
-    assert says(sentence, "allocation.bound_local", bound=joint.bound, confidence=0.95)
+    sentence = said(results, "Lower bound by the local model")
+    below = 1 - joint.bound / joint.chosen.cost
+    assert says(sentence, "allocation.bound_local", bound=joint.bound, below=below, confidence=0.95)
     graded = said(results, "On grades")
     assert graded.endswith(f"near by: {results.graded.bound:.2f}.")
 
@@ -152,14 +151,14 @@ def test_the_modification_saves_only_what_the_searches_can_tell(results):
 def test_a_search_that_missed_says_what(results):
     alone = answer_of(replace(results, fixed=missing(results.fixed))).sentences
     assert says(alone, "allocation.alone_missed")
-    assert says(alone, "allocation.missed", limit=50.0, value=53.0, unit="arcsec", excess=3.0)
+    assert says(alone, "allocation.missed", limit="50″", value="53″", excess="3″")
     joint = replace(results, free=missing(results.free, 7.0))
     (sentence,) = (own for own in answer_of(joint).sentences if says(own, "allocation.none_free"))
-    assert says(sentence, "allocation.missed", value=57.0)
+    assert says(sentence, "allocation.missed", value="57″")
     assert not says(answer_of(joint).sentences, "allocation.saves")
     both = replace(joint, fixed=missing(results.fixed))
     (sentence,) = (own for own in answer_of(both).sentences if says(own, "allocation.none_alone"))
-    assert says(sentence, "allocation.missed", value=53.0)
+    assert says(sentence, "allocation.missed", value="53″")
     unknown = replace(results, fixed=missing(results.fixed, np.inf))
     assert says(answer_of(unknown).sentences, "allocation.missed_unanswered")
 
@@ -228,7 +227,7 @@ def test_the_quantile_of_the_units_is_what_the_target_share_keeps(results):
     assert np.isnan(table[at][1])  # a Cpk
     first = section(results, "Requirements").paragraphs[0]
     shown = results.chosen.quantile_bound
-    assert says(first, "allocation.quantile_upper", target=0.95, kept=value, unit="arcsec", value=shown)
+    assert says(first, "allocation.quantile_upper", target=0.95, kept=f"{value:.1f}″", value=f"{shown:.2f}″")
 
 
 def test_prices_are_marginal_and_per_what_the_limit_is_large_of(results):
@@ -236,8 +235,8 @@ def test_prices_are_marginal_and_per_what_the_limit_is_large_of(results):
     assert limit_price(side, 0.9) == (0.9, "arcsec")
     assert limit_price(replace(side, limit=0.5), 0.9) == (0.09, "0.1 arcsec")
     price = results.free.prices[side.stack.name]
-    sentence = said(results, "peak-to-peak transmission error: at its limit of 50 arcsec")
-    assert says(sentence, "allocation.price", price=price, cost_unit="cost units", per="arcsec")
+    sentence = said(results, "peak-to-peak transmission error, limit 50″")
+    assert says(sentence, "allocation.price", price=price, cost_unit="cost units", step="1″")
 
 
 def test_prices_below_the_noise_of_the_solver_are_nothing(results):
@@ -264,9 +263,8 @@ def test_a_stiffness_that_breaks_the_free_zones_is_said_of_them(results):
     uncertain = (kept, replace(kept, kept=False, regret=np.nan))
     model = replace(results.model, identified=load_identified_stiffness("rv20e_table6"))
     lost = replace(results, model=model, robustness=replace(results.robustness, uncertain=uncertain))
-    sentence = "With 1 of 2 drawn stiffness values the free zones are no longer shown to keep every limit."
-    assert sentence in answer_of(lost).warnings
-    assert not [own for own in answer_of(results).warnings if "drawn stiffness" in own]
+    assert [own for own in answer_of(lost).warnings if own.startswith("With 1 of 2 random stiffness values")]
+    assert not [own for own in answer_of(results).warnings if "stiffness values" in own]
     assert "nan" not in " ".join(answer_of(lost).sentences)
 
 
