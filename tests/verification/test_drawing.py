@@ -27,7 +27,7 @@ def test_a_row_of_an_own_model_is_one_column_in_metres(generator):
     drawing = Drawing.of_rows([HUB, CAGE])
     hub, cage = drawing.sources
     assert drawing.errors.columns == ("hub", "cage")
-    assert (hub.part, hub.group, hub.feature, hub.cost) == ("hub", "hub", Feature.SIZE, 3.0)
+    assert (hub.part, hub.dimension, hub.feature, hub.cost) == ("hub", "hub", Feature.SIZE, 3.0)
     assert (hub.zone, hub.minimum, hub.maximum) == pytest.approx((2e-4, 2e-5, 5e-4))
     assert hub.nominal == pytest.approx(0.05529)
     assert (cage.part, cage.locked, cage.grade) == ("outer race", True, "own")

@@ -159,7 +159,7 @@ class AllocationResult:
                 zone=float(zones[source.name]),
                 cost=costs[source.name],
                 process=made[source.name].name if self._has_prices(source) else source.process,
-                grade=labels.get(source.group, ""),
+                grade=labels.get(source.dimension, ""),
             )
             if source.name in made
             else source
@@ -177,7 +177,7 @@ class AllocationResult:
         found: dict[str, list[Source]] = {}
         for source in self.drawn_sources:
             if source.zone > 0.0:
-                found.setdefault(source.group or source.name, []).append(source)
+                found.setdefault(source.dimension, []).append(source)
         return {name: tuple(members) for name, members in found.items()}
 
     @cached_property

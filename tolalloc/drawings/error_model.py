@@ -85,7 +85,7 @@ class ErrorModel:
     def dimension_of_column(self) -> tuple[str, ...]:
         """Name of the drawing dimension of each column: its group, or several joined by " + " where they correlate."""
         found = {name: name for block in self.blocks for name in block}
-        found |= {source.name: source.group or source.name for source in self.active}
+        found |= {source.name: source.dimension for source in self.active}
         for block in self.blocks:
             met = dict.fromkeys(found[name] for name in block)
             if len(met) > 1:

@@ -192,7 +192,9 @@ class ToleranceRow(Record):
     group: Annotated[
         str,
         Column(
-            "rows of one group keep the ratios of their zones: both discs of one drawing; the id unless given",
+            "rows of one group keep the ratios of their zones: both discs of one drawing. Unless given, rows of one "
+            "feature on identical parts of a reducer form a group if zone, limits and price are the same; any other "
+            "row stands alone",
             attribute="group",
         ),
     ] = ""
@@ -409,7 +411,7 @@ class ToleranceRow(Record):
         plain = {name: column for name, column in COLUMNS.items() if column.attribute}
         stated: dict[str, Any] = {column.attribute: column.read(getattr(self, name)) for name, column in plain.items()}
         return Source(
-            **stated | {"part": self.part or self.name, "group": self.group or self.name},
+            **stated | {"part": self.part or self.name},
             name=self.name,
             own_id=self.id if self.name != self.id else "",
             zone=self.zone * factor,

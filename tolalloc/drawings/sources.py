@@ -189,6 +189,21 @@ class Source:
             return tuple(f"{name}.{axis}" for name in names for axis in ("x", "y"))
         return tuple(f"{self.name}.{wave}{order}" for order, _ in self.spectrum for wave in ("cos", "sin"))
 
+    @property
+    def dimension(self) -> str:
+        """The dimension of the drawing that it belongs to: its group, or itself if it has none."""
+        return self.group or self.name
+
+    @property
+    def stated(self) -> tuple[object, ...]:
+        """What the drawing states of its zone, its limits and its price: copies of one feature have it alike."""
+        return (
+            self.feature,
+            *(self.zone, self.minimum, self.maximum, self.cost),
+            *(self.middle, self.nominal, self.over, self.step),
+            *(self.process, self.locked, self.drawing),
+        )
+
     def rounded_down(self, zone: float, usual: Sequence[tuple[float, float]] = STEPS) -> float:
         """Return the widest zone in steps of the drawing that is no wider than one, and no smaller than allowed [m].
 

@@ -7,7 +7,7 @@ rank, judge and allocate.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
@@ -266,6 +266,21 @@ class Model(ABC):
 
     def release(self) -> None:  # noqa: B027
         """Let go of what is made again when it is needed, such as tables; a model may have no such thing."""
+
+
+@runtime_checkable
+class HasCopies(Protocol):
+    """A model source some of whose parts are copies of each other, made to one drawing."""
+
+    def shared_lines(self, stated: Mapping[str, Hashable]) -> Mapping[str, str]:
+        """Return the line of the drawing, part and feature, of every source that is one of several copies.
+
+        Parameters
+        ----------
+        stated
+            Source → what the table states of it; copies of which it states different things have lines of their own.
+        """
+        ...
 
 
 @runtime_checkable

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -202,6 +202,16 @@ class ReducerChoice:
         modification = Modification.from_clearances(flank, radial, stage)
         reducer = replace(self.reducer, modification=modification)
         return replace(self, torque=torque, disc_temperature=warmer, reducer=reducer)
+
+    def shared_lines(self, stated: Mapping[str, Hashable]) -> Mapping[str, str]:
+        """Return the line of the drawing of every source: discs are alike, and so are cranks, planets, bores, journals.
+
+        Parameters
+        ----------
+        stated
+            Source → what the table states of it.
+        """
+        return RV.sources.shared_lines(stated)
 
     def bound(self, errors: ErrorModel, place: str) -> ReducerModel:
         """Return the model at the sources of a drawing; nothing is solved.

@@ -445,7 +445,7 @@ def joined(parts: Sequence[Evaluation]) -> Evaluation:
 
 def _groups(errors: ErrorModel, factor_groups: tuple[str, ...]) -> tuple[str, ...]:
     """Return the tolerance group of each factor group: the tolerance that it shares with others, or itself."""
-    group_of = {source.name: source.group for source in errors.sources if source.group}
+    group_of = {source.name: source.dimension for source in errors.sources}
     return tuple(group_of.get(name, name) for name in factor_groups)
 
 

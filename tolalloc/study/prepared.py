@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from tolalloc.allocation.cost.process_costs import currency_of_costs, load_process_costs, priced
+from tolalloc.allocation.cost.process_costs import ProcessesOfSources, currency_of_costs, load_process_costs, priced
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import AllocationEffort
 from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, JointRequirement, Requirement
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.models.model import Model
+from tolalloc.models.model import HasCopies, Model
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.running.chunks import Mapper
@@ -42,11 +42,24 @@ class Prepared:
         return f"study {self.study.name}"
 
     @cached_property
-    def errors(self) -> ErrorModel:
-        """The sources of the drawing."""
+    def _stated(self) -> ErrorModel:
+        """The sources of the drawing as its table states them."""
         if self.study.drawing is None:
             raise InputError(f"{self.place}: drawing is missing; give ta.drawing(...), the tolerance table.")
         return self.study.drawing.errors
+
+    @cached_property
+    def errors(self) -> ErrorModel:
+        """The sources of the drawing, each with its group.
+
+        Where the table states none, it is the line of the drawing on which the source stands with its copies on
+        identical parts: those of which the table states the same zone, limits and price.
+        """
+        source, rows = self.study.model, [own for own in self._stated.sources if not own.group]
+        stated = {own.name: (own.stated, repr(self._processes.get(own.name))) for own in rows}
+        lines: Mapping[str, str] = source.shared_lines(stated) if isinstance(source, HasCopies) else {}
+        found = (replace(own, group=own.group or lines.get(own.name, own.name)) for own in self._stated.sources)
+        return replace(self._stated, sources=tuple(found))
 
     @cached_property
     def model(self) -> Model:
@@ -107,6 +120,11 @@ class Prepared:
     @cached_property
     def space(self) -> DesignSpace:
         """Zones and settings that an allocation may choose."""
+        return DesignSpace(errors=self.errors, settings=self.model.settings, processes=self._processes)
+
+    @cached_property
+    def _processes(self) -> ProcessesOfSources:
+        """Ways to make the features whose zones may change; none but that of the table without process costs."""
         costs = self.study.drawing.costs if self.study.drawing else ""
         if isinstance(costs, Mapping):
             for name, row in ((name, row) for name, rows in costs.items() for row in rows):
@@ -114,10 +132,8 @@ class Prepared:
                     allowed = "(name, A, B, smallest t, largest t)"
                     raise InputError.at(f"{self.place}, process costs of {name}", "row", row, allowed)
             # What a person writes in Python is a tolerance ± t, half a zone.
-            processes = priced(costs, self.errors.sources, "half zone")
-        else:
-            processes = load_process_costs(costs, self.errors.sources) if costs else {}
-        return DesignSpace(errors=self.errors, settings=self.model.settings, processes=processes)
+            return priced(costs, self._stated.sources, "half zone")
+        return load_process_costs(costs, self._stated.sources) if costs else {}
 
     @property
     def allocation_effort(self) -> AllocationEffort:

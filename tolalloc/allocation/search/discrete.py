@@ -303,11 +303,11 @@ def with_shared_zones(space: DesignSpace) -> DesignSpace:
     """
     active = [source for source in space.errors.active if not source.locked]
     shared = {
-        group: float(np.exp(np.mean([np.log(source.zone) for source in active if source.group == group])))
+        group: float(np.exp(np.mean([np.log(source.zone) for source in active if source.dimension == group])))
         for group in space.groups
     }
     sources = space.errors.sources
-    zones = [shared[source.group] if source in active else source.zone for source in sources]
+    zones = [shared[source.dimension] if source in active else source.zone for source in sources]
     return replace(space, errors=replace(space.errors, sources=with_zones(sources, zones)))
 
 
@@ -337,7 +337,7 @@ def group_ladders(space: DesignSpace) -> tuple[Ladder, ...]:
         No step lies in the range of every member.
     """
     active = [source for source in space.errors.active if not source.locked]
-    return tuple(group_ladder([source for source in active if source.group == group]) for group in space.groups)
+    return tuple(group_ladder([source for source in active if source.dimension == group]) for group in space.groups)
 
 
 class _Grid:

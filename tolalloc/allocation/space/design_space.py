@@ -52,7 +52,7 @@ class DesignSpace:
     @cached_property
     def groups(self) -> tuple[str, ...]:
         """Names of the groups that may change."""
-        return tuple(dict.fromkeys(source.group for source in self.errors.active if not source.locked))
+        return tuple(dict.fromkeys(source.dimension for source in self.errors.active if not source.locked))
 
     @cached_property
     def columns(self) -> tuple[str, ...]:
@@ -63,7 +63,7 @@ class DesignSpace:
     def group_of_source(self) -> Int[np.ndarray, " source"]:
         """Position of each active source's group; −1 for locked sources."""
         return np.array(
-            [-1 if source.locked else self.groups.index(source.group) for source in self.errors.active], dtype=int
+            [-1 if source.locked else self.groups.index(source.dimension) for source in self.errors.active], dtype=int
         )
 
     def by_scale(self, by_zone: Float[np.ndarray, "*units source"]) -> Float[np.ndarray, "*units group"]:
@@ -160,7 +160,7 @@ class DesignSpace:
         """Return the process of every source whose zone may change, over its zone [m]."""
         names = dict(zip(self.groups, self.process_names(design), strict=True))
         free = [source for source in self.errors.active if not source.locked]
-        return {source.name: self._made(source, names[source.group]) for source in free}
+        return {source.name: self._made(source, names[source.dimension]) for source in free}
 
     @cached_property
     def first_zones(self) -> Float[np.ndarray, " group"]:
@@ -168,7 +168,7 @@ class DesignSpace:
         return np.array([self._members(group)[0].zone for group in self.groups])
 
     def _members(self, group: str) -> list[Source]:
-        return [source for source in self.errors.active if not source.locked and source.group == group]
+        return [source for source in self.errors.active if not source.locked and source.dimension == group]
 
     def zones(self, design: Float[np.ndarray, " variable"]) -> Float[np.ndarray, " source"]:
         """Return the zones of the active sources [m]."""

@@ -174,7 +174,7 @@ def group_ladder(sources: Sequence[Source]) -> Ladder:
     together. Grades serve a group whose members are sizes of one size step; otherwise one grade would mean several
     zones.
     """
-    place = f"group {sources[0].group}" if len(sources) > 1 else f"source {sources[0].name}"
+    place = f"group {sources[0].dimension}" if len(sources) > 1 else f"source {sources[0].name}"
     locked = [source.name for source in sources if source.locked]
     if locked:
         raise InputError.at(place, "locked members", locked, "none")

@@ -359,7 +359,7 @@ def _described(source: Source, processes: tuple[Process, ...]) -> dict[str, Any]
         "lower": smallest / MICROMETRE,
         "upper": largest / MICROMETRE,
         "processes": [[own.name, own.minimum / MICROMETRE, own.maximum / MICROMETRE] for own in processes],
-        "group": source.group or source.name,
+        "group": source.dimension,
         "locked": source.locked,
         "cost": source.cost,
     }

@@ -7,7 +7,7 @@ once for every pin or tooth.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Literal
@@ -115,6 +115,12 @@ class ErrorSource:
         found = self.column_pattern.fullmatch(column)
         return slice(*found.span("member")) if found and self.each else slice(0, 0)
 
+    def line(self, sources: Sequence[str]) -> str:
+        """Return what a drawing calls sources of its kind: the name with those numbers that all of them have."""
+        numbers = [found.groupdict() for own in sources if (found := self.pattern.fullmatch(own))]
+        alike = {key: {own[key] for own in numbers} for key in numbers[0]}
+        return self.name.format(**{key: found.pop() if len(found) == 1 else "" for key, found in alike.items()})
+
     def place_of(self, source: str) -> str:
         """Return the id of the place at which the picture shows a source of its kind."""
         numbers = self.pattern.fullmatch(source)
@@ -144,6 +150,37 @@ class ErrorSources:
     def of(self, source: str) -> ErrorSource | None:
         """Return the kind of a source, none if nothing declares it."""
         return self._of(source)
+
+    def shared_lines(self, stated: Mapping[str, Hashable]) -> dict[str, str]:
+        """Return source → the line of the drawing, part and feature, on which it stands with its copies.
+
+        Sources of one kind are copies of each other, on identical parts or all around one part.
+
+        Parameters
+        ----------
+        stated
+            Source → what the table states of it; copies of which it states different things have lines of their own.
+
+        Examples
+        --------
+        The bores of disc 1 are finer than those of disc 2, and both discs have one pitch:
+
+        >>> from tolalloc.reducers.family import RV
+        >>> bores = {"disc1.bore1.position": 4, "disc1.bore2.position": 4, "disc2.bore1.position": 6}
+        >>> lines = RV.sources.shared_lines({**bores, "disc1.pitch": 8, "disc2.pitch": 8})
+        >>> [*dict.fromkeys(lines.values())]
+        ['disc1.bore.position', 'disc2.bore1.position', 'disc.pitch']
+        """
+        copies: dict[tuple[ErrorSource, Hashable], list[str]] = {}
+        for name, own in stated.items():
+            if kind := self.of(name):
+                copies.setdefault((kind, own), []).append(name)
+        lines = [kind.line(members) for (kind, _), members in copies.items()]
+        return {
+            name: line if lines.count(line) == 1 else ", ".join(members)
+            for line, members in zip(lines, copies.values(), strict=True)
+            for name in members
+        }
 
     def of_column(self, column: str) -> ErrorSource:
         """Return the kind of the source that a column belongs to.

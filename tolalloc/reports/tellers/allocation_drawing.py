@@ -91,7 +91,7 @@ def dimensions_table(result: AllocationResult) -> Table[_Dimension]:
         Column(header="process", value=lambda row: after.value(row[1][0]), nothing="as today", terminal=6),
         Column(
             header="total-effect index [%]",
-            value=lambda row: parts.get(row[1][0][0].group or row[1][0][0].name, np.nan),
+            value=lambda row: parts.get(row[1][0][0].dimension, np.nan),
             terminal=3,
         ),
         Column(header="cost before [{cost}]", value=lambda row: np.sum([old.cost for old, _ in row[1]])),

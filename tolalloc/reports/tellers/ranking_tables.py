@@ -136,7 +136,7 @@ def dimensions_table(result: RankingResult, found: SobolIndices) -> pd.DataFrame
     """Return the dimensions of the drawing, largest total-effect index first, with what stands on the drawing."""
     by_group: dict[str, list[Source]] = {}
     for source in result.errors.active:
-        by_group.setdefault(source.group or source.name, []).append(source)
+        by_group.setdefault(source.dimension, []).append(source)
     low, high = found.total_interval * 100
     members = [[own for name in joined.split(" + ") for own in by_group.get(name, ())] for joined in found.sources]
     frame = of_positions(
