@@ -37,7 +37,9 @@ from tolalloc.allocation.space.requirement import Requirement
 from tolalloc.allocation.verify.acceptance import (
     AS_GOOD_AS,
     FIRST,
+    Acceptance,
     AcceptanceTest,
+    AlphaSpending,
     accept_cheapest,
     confidence_of_fewer,
 )
@@ -180,15 +182,20 @@ class DrawingQuestion:
             return found
         return found.with_chosen(graded.chosen, (graded.chosen,))
 
-    def accepted(self, found: Candidates) -> Candidates:
-        """Return what the searches found with the cheapest drawing that an acceptance test passes."""
-        test = AcceptanceTest(
+    @property
+    def acceptance_test(self) -> AcceptanceTest:
+        """What tests a design on units that no search has seen."""
+        return AcceptanceTest(
             model=self.model,
             seeds=self.seeds("confirmation"),
             units=self.effort.confirmation_units,
             error=self.effort.error,
             largest_failed_share=self.largest_failed_share,
         )
+
+    def accepted(self, found: Candidates) -> Candidates:
+        """Return what the searches found with the cheapest drawing that an acceptance test passes."""
+        test = self.acceptance_test
         admitted = found.admitted()
         # Where no search ended inside all limits, a test of its best design leads to a safer one.
         promising = {name: own for name, own in admitted.items() if own.met} or {
@@ -201,10 +208,12 @@ class DrawingQuestion:
             space=self.space,
             verifier=partial(self.verifier, "confirmation"),
         )
-        result = accept_cheapest(test, promising, next_candidate, self.effort.gain, self._as_drawn)
-        return found.with_acceptance(result, self.model.drawn_amounts)
+        result = accept_cheapest(test, promising, next_candidate, self.effort.gain, self.as_drawn)
+        tested, missed = len(result.tested), sum(not own.accepted for _, own in result.tested)
+        found = found.with_acceptance(result, self.model.drawn_amounts)
+        return self.shown_as_drawn(found, test, AlphaSpending(number=tested + 1, missed=missed))
 
-    def _as_drawn(self, kind: str, design: VerifiedDesign) -> VerifiedDesign:
+    def as_drawn(self, kind: str, design: VerifiedDesign) -> VerifiedDesign:
         """Return a design with zones and amounts as the drawing states them, verified again if that moves them.
 
         Ladders have the zones that their drawing states, and so has the tolerance table.
@@ -214,7 +223,37 @@ class DrawingQuestion:
         space, stated = design.space.rounded_down(design.design, self.model.drawn_amounts)
         if space is design.space and np.array_equal(stated, design.design):
             return design
-        return self.verifier("rounded", space).verify(stated, design.name)
+        return replace(self.verifier("rounded", space).verify(stated, design.name), unrounded_cost=design.cost)
+
+    def shown_as_drawn(self, found: Candidates, test: AcceptanceTest, spending: AlphaSpending) -> Candidates:
+        """Return candidates that show what the drawing states also where nothing was accepted.
+
+        The least violating design may be one that was not tested. With its zones rounded down it may keep the limits,
+        and is then tested with what is left of the error, or another one may violate them least.
+
+        Parameters
+        ----------
+        found
+            What became of the candidates.
+        test
+            Tests the designs.
+        spending
+            The error that the next design may spend.
+        """
+        for _ in found.admitted():
+            kind, shown = found.shown
+            stated = shown if shown.independent or shown.unrounded_cost else self.as_drawn(kind, shown)
+            if stated is shown:
+                break
+            if stated.met:
+                stated = test.run(stated, spending)
+                spending = spending.after(accepted=stated.accepted)
+            found = found.with_acceptance(Acceptance(drawn=None, tested=((kind, stated),)), self.model.drawn_amounts)
+        return found
+
+    def _at_ratios_of(self, design: VerifiedDesign) -> DesignSpace:
+        """Return the design variables with every setting free and the ratios of zones in a group that a design has."""
+        return replace(self.space, errors=design.space.errors)
 
     def trade(self, free: ZoneAllocation) -> SettingTrade | None:
         """Return the cost of the cheapest zones over the settings; nothing without settings or beyond two."""
@@ -224,13 +263,13 @@ class DrawingQuestion:
             _denser_below(setting.lower, setting.upper, steps)
             for setting, steps in zip(self.space.settings, self.effort.setting_steps, strict=False)
         )
-        return setting_trade(self.quantile(free.chosen.spread), free, values)
+        quantile = replace(self.quantile(free.chosen.spread), space=self._at_ratios_of(free.chosen))
+        return setting_trade(quantile, free, values)
 
     def fronts(self, found: ZoneAllocation | GradedAllocation, checkpoint: Checkpoint | None) -> Fronts:
         """Return what can be had at which cost, around the design that is drawn and on its ladders, if it has any."""
         drawn, graded = found.chosen, found if isinstance(found, GradedAllocation) else None
-        unrounded = replace(self.space, errors=drawn.space.errors)
-        space, ladders = (graded.space, graded.scales) if graded else (unrounded, {})
+        space, ladders = (graded.space, graded.scales) if graded else (self._at_ratios_of(drawn), {})
         effort = self.effort.search.front
         # Where the limit is out of reach, the front lies around what is kept instead.
         around = max(1.0, min(drawn.quantile_bound, float(drawn.sample.values.max())) / drawn.constraints[0].limit)
@@ -248,8 +287,9 @@ class DrawingQuestion:
 
     def robustness(self, free: ZoneAllocation) -> Robustness:
         """Return the answers under changed assumptions."""
-        space = replace(self.space, errors=free.chosen.space.errors)
-        verifier = replace(self.verifier("robustness", space), units=self.effort.stiffness_units)
+        verifier = replace(
+            self.verifier("robustness", self._at_ratios_of(free.chosen)), units=self.effort.stiffness_units
+        )
         seeds = self.seeds("robustness")
         return robustness(verifier, free, self._changed_models(seeds), seeds, self.effort.changed_costs)
 
@@ -264,10 +304,10 @@ class DrawingQuestion:
 
     def prices(self, free: ZoneAllocation) -> YieldLadder | None:
         """Return the price of a good unit over yield targets, if the question prices the others."""
-        price = self.unit_price
+        price, space = self.unit_price, self._at_ratios_of(free.chosen)
         if price is None:
             return None
-        return best_yield(lambda target: cost_at_yield(self.space, free, target), price, self.effort.yields)
+        return best_yield(lambda target: cost_at_yield(space, free, target), price, self.effort.yields)
 
     def shares(self, space: DesignSpace, design: Float[np.ndarray, " variable"]) -> tuple[SobolIndices, SobolIndices]:
         """Return the indices of the leading output at the zones and the settings of a design.

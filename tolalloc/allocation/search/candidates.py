@@ -57,11 +57,18 @@ class Candidates:
         return replace(self._space, errors=design.space.errors).allows(design.design)
 
     @property
+    def shown(self) -> tuple[str, VerifiedDesign]:
+        """Kind and design of the cheapest admitted one that was accepted; of the least violating one if none was."""
+        admitted = self.admitted()
+        accepted = {name: own for name, own in admitted.items() if own.accepted}
+        among = accepted or {name: own for name, own in admitted.items() if not own.met} or admitted
+        found = cheapest_met(tuple(among.values()))
+        return next((name, own) for name, own in among.items() if own is found)
+
+    @property
     def drawn(self) -> VerifiedDesign:
-        """The cheapest admitted design that was accepted; the least violating one if none was."""
-        admitted = tuple(self.admitted().values())
-        accepted = tuple(own for own in admitted if own.accepted)
-        return cheapest_met(accepted or tuple(own for own in admitted if not own.met) or admitted)
+        """The design of `shown`."""
+        return self.shown[1]
 
     def with_acceptance(self, found: Acceptance, drawn_amounts: DrawnAmounts) -> Candidates:
         """Return the candidates with what became of those that were tested."""

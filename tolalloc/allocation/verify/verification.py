@@ -55,6 +55,8 @@ class VerifiedDesign:
     confidence: float  # With which the units show what is compared with the limits, one-sided [-]
     independent: IndependentSample | None = None  # What tested it last, none if it was not tested
     accepted: bool = False  # Whether units that no search has seen showed every requirement, with the stated error
+    # Cost before its zones and amounts were rounded to what the drawing states, none if they were not [cost units]
+    unrounded_cost: float | None = None
 
     @property
     def scales(self) -> Float[np.ndarray, " group"]:

@@ -202,8 +202,15 @@ def _free(result: AllocationResult) -> tuple[str, ...]:
         "confidence": bound.confidence,
     }
     if bound.certified:
-        return (_say("bound_certified", zones="free zones" if graded else "zones", **gaps),)
-    return (_say("bound_local", **gaps),)
+        return (_say("bound_certified", zones="free zones" if graded else "zones", **gaps), *_rounding(found.chosen))
+    return (_say("bound_local", **gaps), *_rounding(found.chosen))
+
+
+def _rounding(design: VerifiedDesign) -> tuple[str, ...]:
+    """Return how much of the distance from the lower bound is due to whole steps, if they cost anything."""
+    if design.unrounded_cost is None or (rounding := design.cost - design.unrounded_cost) < _WRITTEN:
+        return ()
+    return (_say("rounding", rounding=rounding, unrounded=design.unrounded_cost),)
 
 
 def _graded(result: AllocationResult) -> tuple[str, ...]:
