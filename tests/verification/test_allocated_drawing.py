@@ -56,6 +56,10 @@ class Workbook:
         held = self.sheets[sheet][cell].value
         return self.calculated(held[1:], sheet) if isinstance(held, str) and held.startswith("=") else held
 
+    def cells(self, sheet, area):
+        found = [self.value(sheet, cell.coordinate) for row in self.sheets[sheet][area] for cell in row]
+        return np.array(found, dtype=object if isinstance(found[0], str) else float)
+
     def calculated(self, formula, sheet="drawing"):
         def looked_up(found):
             if found["text"]:
@@ -77,9 +81,8 @@ class Workbook:
             "AND": lambda *asked: all(asked),
             "IF": lambda asked, then, other: then if asked else other,
             "value": self.value,
-            "cells": lambda place, area: np.array(
-                [self.value(place, cell.coordinate) for row in self.sheets[place][area] for cell in row], dtype=float
-            ),
+            "COUNTIF": lambda cells, text: int(np.sum(cells == text)),
+            "cells": self.cells,
         }
         return eval(python, {"__builtins__": {}}, known)
 
@@ -221,7 +224,7 @@ def test_the_workbook_says_what_tolalloc_says_of_another_zone(drawn, factor):
 def test_formulas_hold_plain_numbers_and_the_zones_to_change_are_marked(drawn):
     results, folder = drawn
     sheets = load_workbook(folder / "drawing.xlsx")
-    assert sheets.sheetnames == ["drawing", "requirements", "modification", "tolerances"]
+    assert sheets.sheetnames == ["answer", "drawing", "requirements", "modification", "tolerances"]
     formulas = [
         cell.value
         for name in ("drawing", "requirements")
@@ -232,7 +235,7 @@ def test_formulas_hold_plain_numbers_and_the_zones_to_change_are_marked(drawn):
     sides = len(results.chosen.constraints)
     groups = results.drawn.groups
     further = sum(name in groups and not members[0].locked for name, members in results.lines) - len(groups)
-    assert len(formulas) == 4 * len(groups) + 2 * further + 2 * sides + 1 + 3 * sides + 1
+    assert len(formulas) == 5 * len(groups) + 2 * further + 2 * sides + 1 + 3 * sides + 1
     assert not any("np." in formula or "e-" in formula or "nan" in formula for formula in formulas)
     zones = sheets["drawing"]
     marked = {zones.cell(2 + at, 2).fill.fgColor.rgb for at in range(len(results.drawn.groups))}

@@ -13,6 +13,8 @@ from ezdxf import readfile
 from openpyxl import load_workbook
 
 import tolalloc as ta
+from tests.builders import says
+from tolalloc.allocation.search.zone_allocation import REACH_OF_MODELS
 from tolalloc.allocation.space.effort import QUICK_ALLOCATION
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, UnknownNameError
@@ -132,6 +134,42 @@ def test_the_workbook_refuses_a_zone_outside_its_row(folder):
     assert (guard.formula1, guard.formula2) == ("$E2", "$F2")
 
 
+def test_the_first_sheet_has_the_answer(told, answer, folder):
+    book = load_workbook(folder / "drawing.xlsx", data_only=True)
+    assert book.active.title == book.sheetnames[0] == "answer"
+    assert [sheet.title for sheet in book if sheet.sheet_view.tabSelected] == ["answer"]
+    rows = list(book["answer"].iter_rows(values_only=True))
+    assert rows[2][1] == told.sentences[0]
+    assert says(rows[3][1], "allocation.sheet_guard_verified")
+    shown = {row[0]: row[1:] for row in rows}
+    for side, off in zip(answer.chosen.constraints, answer.model_range.off, strict=True):
+        limit, verified, predicted, kept, differs = shown[side.stack.name]
+        assert (limit, verified, kept) == (side.limit, pytest.approx(side.value), "yes")
+        assert predicted == pytest.approx(side.limit + side.sign * float(side.predicted(answer.chosen.design)))
+        assert differs == (pytest.approx(off) if answer.model_range.designs else None)
+    cost = shown["cost [cost units]"]
+    assert cost[1] == pytest.approx(answer.cost) and cost[2] == pytest.approx(answer.cost)
+    assert shown["spring"][:3] == (pytest.approx(answer.chosen.settings[0]), pytest.approx(0.1), "mm")
+
+
+def test_every_sheet_prints_on_a4_as_wide_as_the_page(folder):
+    for sheet in load_workbook(folder / "drawing.xlsx"):
+        assert (int(sheet.page_setup.paperSize), sheet.page_setup.orientation) == (9, "landscape")
+        assert (sheet.page_setup.fitToWidth, sheet.page_setup.fitToHeight) == (1, 0)
+        assert sheet.sheet_properties.pageSetUpPr.fitToPage and sheet.print_title_rows == "$1:$1"
+    assert all(load_workbook(folder / "drawing.xlsx")[name].print_area for name in ("answer", "drawing"))
+
+
+def test_the_range_of_the_weights_is_about_the_verified_zones(answer, folder):
+    sheet = load_workbook(folder / "drawing.xlsx", data_only=True)["drawing"]
+    heads = [cell.value for cell in sheet[1]]
+    zones = answer.drawn.first_zones * answer.chosen.scales / 1e-6
+    columns = [heads.index(name) for name in ("verified zone [µm]", "weights hold from [µm]", "weights hold to [µm]")]
+    for row, zone in enumerate(zones.tolist(), start=2):
+        found = [sheet.cell(row, column + 1).value for column in columns]
+        assert found == pytest.approx([zone, zone / REACH_OF_MODELS, zone * REACH_OF_MODELS])
+
+
 def test_setting_and_sum_stand_in_workbook_and_frames(answer, folder):
     (value,) = answer.chosen.settings
     rows = list(load_workbook(folder / "drawing.xlsx")["settings"].iter_rows(values_only=True))
@@ -181,3 +219,33 @@ def test_a_changed_zone_moves_cost_and_limits_as_the_model_does(answer, folder, 
         predicted = side.limit + side.sign * float(side.predicted(design))
         assert rows[side.stack.name][3] == pytest.approx(predicted, abs=2e-5)
         assert rows[side.stack.name][4] == ("yes" if side.sign * (predicted - side.limit) <= 0 else "no")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("factor", "said", "kept"),
+    [(0.97, "moved", {"yes"}), (0.7, "beyond", {"ask tolalloc whatif"}), (1.4, "beyond", {"ask tolalloc whatif"})],
+)
+def test_the_guard_says_when_a_zone_leaves_the_range_of_the_weights(answer, folder, tmp_path, factor, said, kept):
+    book = load_workbook(folder / "drawing.xlsx")
+    book["drawing"]["B3"] = book["drawing"]["B3"].value * factor
+    moved = tmp_path / "moved"
+    moved.mkdir()
+    book.save(moved / "drawing.xlsx")
+    found = recalculated(moved / "drawing.xlsx", tmp_path)
+    assert says(str(found["answer"]["B4"].value), f"allocation.sheet_guard_{said}")
+    rows = {row[0]: row for row in found["answer"].iter_rows(values_only=True)}
+    assert {rows[side.stack.name][4] for side in answer.chosen.constraints} == kept
+    assert [found["drawing"][f"P{row}"].value for row in (2, 3)] == ["yes", "yes" if said == "moved" else "no"]
+
+
+@pytest.mark.slow
+def test_the_guard_says_when_a_process_holds_no_such_zone(answer, folder, tmp_path):
+    """The smallest zone of a row is raised above its verified one, as an edit around the validation does."""
+    book = load_workbook(folder / "drawing.xlsx")
+    book["drawing"]["E2"] = book["drawing"]["B2"].value * 1.1
+    moved = tmp_path / "moved"
+    moved.mkdir()
+    book.save(moved / "drawing.xlsx")
+    found = recalculated(moved / "drawing.xlsx", tmp_path)
+    assert says(str(found["answer"]["B4"].value), "allocation.sheet_guard_unheld")

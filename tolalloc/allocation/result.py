@@ -14,7 +14,7 @@ from tolalloc.allocation.front.pareto_front import Fronts
 from tolalloc.allocation.front.what_if import Robustness, SettingTrade
 from tolalloc.allocation.search.candidates import Candidates
 from tolalloc.allocation.search.discrete import GradedAllocation
-from tolalloc.allocation.search.zone_allocation import ZoneAllocation
+from tolalloc.allocation.search.zone_allocation import ModelRange, ZoneAllocation, model_range
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.problem import OneSidedConstraint, Solution
 from tolalloc.allocation.space.requirement import AtYield, Check, Requirement
@@ -144,6 +144,13 @@ class AllocationResult:
     def bound_is_certified(self) -> bool:
         """Whether the bound holds for every allowed drawing with free zones rather than near the verified ones."""
         return self.candidates.unrestricted.lower_bound.certified
+
+    @cached_property
+    def model_range(self) -> ModelRange:
+        """Where the local models of the drawing are believed, and how far all that was verified there differs."""
+        tried = (*self.free.proportional_tried, *self.free.tried)
+        tried += (*(self.fixed.tried if self.fixed else ()), *(self.graded.tried if self.graded else ()))
+        return model_range(self.chosen, {id(own): own for own in tried}.values())
 
     @cached_property
     def drawn_sources(self) -> tuple[Source, ...]:

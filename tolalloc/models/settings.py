@@ -81,6 +81,8 @@ class DrawnAmounts:
         Step of every amount on any other drawing; none if it states them as they were found [unit of the amount].
     convention
         What their signs mean, a sentence without its full stop; empty where a name says all.
+    sources
+        Source whose zone is the tolerance of each amount, whether the drawing states it or not; none if there is none.
     """
 
     names: tuple[str, ...]
@@ -88,6 +90,7 @@ class DrawnAmounts:
     steps: tuple[float, ...]
     finest: tuple[float, ...] = ()
     convention: str = ""
+    sources: tuple[str, ...] = ()
 
 
 def require_settings(place: str, known: Iterable[Setting], wanted: Mapping[str, float]) -> None:

@@ -261,6 +261,7 @@ class ReducerModel(Model):
             steps=(0.5, 0.5),
             finest=(0.1, 0.1),
             convention=MODIFICATION_CONVENTION,
+            sources=tuple(self.reducer.modification.deviations),
         )
 
     @property

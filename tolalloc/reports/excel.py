@@ -57,7 +57,8 @@ def write_sheets(sheets: dict[str, pd.DataFrame], path: Path) -> None:
 
 
 def set_up_print(sheet: Worksheet) -> None:
-    """Let a sheet print across, as wide as the paper, with its header on every page."""
+    """Let a sheet print across on A4, as wide as the paper, with its header on every page."""
+    sheet.page_setup.paperSize = Worksheet.PAPERSIZE_A4
     sheet.page_setup.orientation, sheet.page_setup.fitToWidth, sheet.page_setup.fitToHeight = "landscape", 1, 0
     sheet.sheet_properties.pageSetUpPr = PageSetupProperties(fitToPage=True)
     sheet.print_title_rows = "1:1"

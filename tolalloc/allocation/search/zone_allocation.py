@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -141,8 +142,11 @@ def _factor(tried: VerifiedDesign) -> float:
     return float(np.clip(min(factors), 0.4, 2.5))
 
 
-_SIMILAR = (1.25, 1.0)
-"""Ratio of scales, and difference of settings over ten steps of theirs, up to which designs share their models [-]."""
+REACH_OF_MODELS = 1.25
+"""Ratio of zones up to which designs share their models [-]."""
+_LARGEST_LOG = float(np.log(REACH_OF_MODELS)) + 1e-9
+_REACH_OF_SETTINGS = 1.0
+"""Difference of settings, over ten steps of theirs, up to which they do [-]."""
 _REPAIRS = 3
 """Steps more where the last design does not quite keep the limits and is cheaper than any that does [-]."""
 _EXPLAINED = 2.0
@@ -195,10 +199,59 @@ def aimed(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float = 1.0
 
 
 def _is_similar(first: VerifiedDesign, second: VerifiedDesign) -> bool:
-    ratio, distance = _SIMILAR
     scales = np.abs(np.log(first.scales / second.scales)).max(initial=0.0)
     moved = np.abs(first.settings - second.settings) / (10 * first.space.setting_steps)
-    return bool(scales <= np.log(ratio) and moved.max(initial=0.0) <= distance)
+    return bool(scales <= _LARGEST_LOG and moved.max(initial=0.0) <= _REACH_OF_SETTINGS)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelRange:
+    """Where the local models of a design are believed, and what other verified designs there say of them."""
+
+    factor: float  # Ratio of a zone to the verified one up to which they are [-]
+    designs: int  # Other verified designs whose zones and settings all lie in this range [-]
+    # Largest difference of their verified values from what the models predict, noise of the units included, one per
+    # one-sided constraint; not a number without such designs [unit of the output]
+    off: tuple[float, ...]
+
+
+def model_range(chosen: VerifiedDesign, tried: Iterable[VerifiedDesign]) -> ModelRange:
+    """Return where the local models of a design are believed, which is where a search lets designs share them.
+
+    off = max |excess − predicted excess − relief·change of the scales| over the other designs (own derivation).
+
+    Parameters
+    ----------
+    chosen
+        The design.
+    tried
+        Designs that were verified, whatever their members and steps are.
+
+    Examples
+    --------
+    Root sums of squares are exact, so a design 10 % tighter is predicted and one 50 % tighter is not asked.
+
+    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
+    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
+    >>> chosen, near, far = (verifier.verify(verifier.space.uniform(scale), "scaled") for scale in (1.0, 0.9, 0.5))
+    >>> found = model_range(chosen, (chosen, near, far))
+    >>> found.designs, [round(value, 9) for value in found.off]
+    (1, [0.0])
+    """
+    zones, groups, sides = chosen.space.zones(chosen.design), chosen.scales.size, chosen.constraints
+    compared = []
+    for own in tried:
+        ratios = own.space.zones(own.design) / zones
+        same = np.array_equal(own.design, chosen.design) and np.allclose(ratios, 1.0)
+        moved = np.abs(own.settings - chosen.settings) / (10 * chosen.space.setting_steps)
+        if same or np.abs(np.log(ratios)).max() > _LARGEST_LOG or moved.max(initial=0.0) > _REACH_OF_SETTINGS:
+            continue
+        scales = own.space.first_zones * own.scales / chosen.space.first_zones
+        design = np.concatenate([scales, own.design[groups:]])
+        predicted = [float(side.predicted(design) + side.relief @ (scales - chosen.scales)) for side in sides]
+        compared.append(np.abs(np.subtract([side.excess for side in own.constraints], predicted)))
+    off = np.max(compared, axis=0).tolist() if compared else [float("nan")] * len(sides)
+    return ModelRange(factor=REACH_OF_MODELS, designs=len(compared), off=tuple(off))
 
 
 def kept_stacks(chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margin: float) -> tuple[Stack, ...]:

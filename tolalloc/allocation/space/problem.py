@@ -260,6 +260,17 @@ class OneSidedConstraint:
         """The same over the scale [-]."""
         return self.excess / self.scale
 
+    @property
+    def relief(self) -> Float[np.ndarray, " group"]:
+        """By how much a larger zone relieves the limit, 0 or below, which no model of a search rewards.
+
+        Per scale and to first order, mean over the batches [unit of the output]; a smaller zone then costs as much.
+        """
+        groups = self.stack.worst_case.size
+        if self.batches is None:
+            return np.zeros(groups)
+        return np.asarray(np.minimum(self.batches[:, :groups].mean(axis=0), 0.0))
+
     def predicted(self, designs: Float[np.ndarray, "*designs variable"]) -> Float[np.ndarray, "*designs"]:
         """Return the excess that the model predicts, negative inside the limit [unit of the output]."""
         groups = self.stack.worst_case.size

@@ -36,13 +36,7 @@ class AllocationTeller(Teller[AllocationResult]):
     @property
     def title(self) -> str:
         """What the answer is about."""
-        result = self.result
-        key = "title_kept" if result.keeps_table else "title"
-        if not result.met:
-            key = "title_missed"
-        elif texts.examined(result).fault:
-            key = "title_fault"
-        return _say(key, model=self.header.model, name=self.header.name)
+        return texts.title(self.result, self.header)
 
     @property
     def subtitle(self) -> str:

@@ -224,7 +224,7 @@ def write_drawing(result: AllocationResult, header: Header, folder: Path) -> Non
     calculator = calculator_sheets(result, cost_unit)
     others = {**_settings_sheet(result), "tolerances": tolerances_frame(result, cost_unit)}
     write_sheets({**calculator, **others}, folder / "drawing.xlsx")
-    style_calculator(result, calculator, notes, folder / "drawing.xlsx")
+    style_calculator(result, header, calculator, notes, folder / "drawing.xlsx")
     named = [(result.line_name(own), callout(own[1][0])) for own in result.lines]
     write_frames(named, folder / "frames.dxf", notes)
 

@@ -48,25 +48,37 @@ def examined(result: AllocationResult) -> Examination:
     return portrait_of(result.model.at(result.chosen.settings)).examination(result.examination)
 
 
+def title(result: AllocationResult, header: Header) -> str:
+    """Return what the answer is about."""
+    key = "title_kept" if result.keeps_table else "title"
+    if not result.met:
+        key = "title_missed"
+    elif examined(result).fault:
+        key = "title_fault"
+    return _say(key, model=header.model, name=header.name)
+
+
+def verdict(result: AllocationResult) -> tuple[str, ...]:
+    """Return why the drawing cannot be built, if so, and how many units keep the leading limit."""
+    achieved, fault = result.chosen.achieved, examined(result).fault
+    met = _say(
+        "met",
+        verdict=_say("verdict_met" if result.met else "verdict_missed"),
+        share=achieved.estimate,
+        units=achieved.units,
+        simulated=portrait_of(result.model).simulated,
+        stay=_stay(result),
+        required=_required(result),
+        low=100 * achieved.low,
+        high=achieved.high,
+    )
+    return (fault, met) if fault else (met,)
+
+
 def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     """Return the answer in sentences; the first ones stand in the headline of a report."""
-    chosen, achieved = result.chosen, result.chosen.achieved
-    fault = examined(result).fault
-    found = [fault] if fault else []
-    found.append(
-        _say(
-            "met",
-            verdict=_say("verdict_met" if result.met else "verdict_missed"),
-            share=achieved.estimate,
-            units=achieved.units,
-            simulated=portrait_of(result.model).simulated,
-            stay=_stay(result),
-            required=_required(result),
-            low=100 * achieved.low,
-            high=achieved.high,
-        )
-    )
-    found += [*drawn_amounts(result), _cost(result, cost_unit)]
+    chosen = result.chosen
+    found = [*verdict(result), *drawn_amounts(result), _cost(result, cost_unit)]
     if len(result.requirements) > 1:
         found.append(_say("all_limits", share=chosen.joint.estimate))
     if result.met and result.error < _EVEN_ODDS:

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 from openpyxl import load_workbook
-from openpyxl.styles import Border, Font, PatternFill, Side
+from openpyxl.styles import Alignment, Border, Font, PatternFill, Side
 from openpyxl.utils import get_column_letter
 from openpyxl.worksheet.datavalidation import DataValidation
 from openpyxl.worksheet.worksheet import Worksheet
@@ -22,20 +22,26 @@ from openpyxl.worksheet.worksheet import Worksheet
 from tolalloc.allocation.cost.model import Combined, Exponential, Reciprocal, ReciprocalPower, SumOfCosts, Weighted
 from tolalloc.allocation.cost.points import Spline, Tabulated
 from tolalloc.allocation.result import AllocationResult
-from tolalloc.allocation.space.problem import OneSidedConstraint
 from tolalloc.drawings.sources import STEPS, Source, rounded_down
 from tolalloc.drawings.zones import Feature
 from tolalloc.reading.units import MICROMETRE, MILLIMETRE, unit_of
 from tolalloc.reports.excel import Formula, keep_values
 from tolalloc.reports.feature_frame import STEP, FeatureFrame, callout
+from tolalloc.reports.header import Header
+from tolalloc.reports.tellers.allocation_answer_sheet import NAME, add_answer
 from tolalloc.reports.templates import Sentences
 
 _say = Sentences("allocation")
 
 _FIRST = 2
 """Row of the first entry below the header."""
-_WEIGHTS = 13
+_WEIGHTS = 17
 """Column of the first weight; those before it are printed."""
+_NAMES = 34
+_WIDTHS = (_NAMES, 10, 11, 8, 9, 9, 7, 14, 9, 16, 11, 6, 10, 10, 10, 8)
+"""Widths of the printed columns, narrow enough for letters of 2 mm on A4 [letters]."""
+_HELD = "drawing!$P${}:$P${}"
+"""Cells that say of every zone whether the weights hold for it."""
 _AS_VERIFIED = 1e-4
 """Distance up to which a zone is the verified one [µm]."""
 _INPUT = PatternFill("solid", fgColor="FFF2CC")
@@ -53,7 +59,7 @@ def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     space, chosen = result.drawn, result.chosen
     groups, callouts = len(space.groups), [callout(_first_member(result, name)) for name in space.groups]
     scales, zones = chosen.design[:groups], space.first_zones * chosen.design[:groups] / MICROMETRE
-    rows = range(_FIRST, _FIRST + groups)
+    rows, reach = range(_FIRST, _FIRST + groups), result.model_range.factor
     made = [
         feature.processes[at]
         for feature, at in zip(space.features, space.process_positions(chosen.design), strict=True)
@@ -83,12 +89,16 @@ def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
                 for row, name, zone in zip(rows, space.groups, zones.tolist(), strict=True)
             ],
             "datum": [" ".join(own.datums) for own in callouts],
+            "verified zone [µm]": zones,
+            "weights hold from [µm]": zones / reach,
+            "weights hold to [µm]": zones * reach,
+            "weights hold": [
+                Formula(f'=IF(AND(B{row}>=N{row}-0.0001,B{row}<=O{row}+0.0001),"yes","no")', "yes") for row in rows
+            ],
         }
     )
     for side in chosen.constraints:
-        table[f"{side.stack.name}: added per scale [{unit_of(side.stack.name)}]"] = side.stack.worst_case + _relief(
-            side
-        )
+        table[f"{side.stack.name}: added per scale [{unit_of(side.stack.name)}]"] = side.stack.worst_case + side.relief
         table[f"{side.stack.name}: spread per scale [{unit_of(side.stack.name)}]"] = side.stack.root_sum_square
     return pd.concat([table, _further_lines(result)], ignore_index=True) if _further(result) else table
 
@@ -149,17 +159,6 @@ def _written(source: Source, row: int, zone: float) -> Formula:
     return Formula(f"=IF({verified},{number(round(value, 8))},INT({size}/{step}+0.000001)*{step}/1000)", value)
 
 
-def _relief(side: OneSidedConstraint) -> Float[np.ndarray, " group"]:
-    """Return by how much a larger zone relieves a limit, 0 or below, which no model of a search rewards.
-
-    Per scale and to first order [unit of the output]; a smaller zone then costs as much.
-    """
-    groups = side.stack.worst_case.size
-    if side.batches is None:
-        return np.zeros(groups)
-    return np.asarray(np.minimum(side.batches[:, :groups].mean(axis=0), 0.0))
-
-
 def _without_weight(result: AllocationResult) -> tuple[str, ...]:
     """Return of which zones these sheets know hardly more than that a smaller one gains nothing."""
     weights = np.sum([side.stack.worst_case + side.stack.root_sum_square for side in result.chosen.constraints], axis=0)
@@ -172,6 +171,7 @@ def _requirements(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     space, chosen = result.drawn, result.chosen
     first, last = _FIRST, _FIRST + len(space.groups) - 1
     scales, watched = f"drawing!$D${first}:$D${last}", []
+    left, ask = f'COUNTIF({_HELD.format(first, last)},"no")', _say("workbook_ask")
     for at, side in enumerate(chosen.constraints):
         adds, spreads = (get_column_letter(_WEIGHTS + 2 * at + step) for step in (0, 1))
         load = (
@@ -179,7 +179,7 @@ def _requirements(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
             f"+SQRT(SUMPRODUCT((drawing!${spreads}${first}:${spreads}${last}*{scales})^2))"
         )
         rest = float(side.stack.slopes @ chosen.design[len(space.groups) :]) - side.stack.budget
-        rest -= float(_relief(side) @ chosen.scales)
+        rest -= float(side.relief @ chosen.scales)
         upper, row = side.sign > 0, _FIRST + at
         predicted = float(side.limit + side.sign * side.predicted(chosen.design))
         kept = "yes" if side.sign * predicted <= side.sign * side.limit else "no"
@@ -191,7 +191,9 @@ def _requirements(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
                 "predicted for the zones": Formula(
                     f"=B{row}{'+' if upper else '-'}({load}+({number(rest)}))", predicted
                 ),
-                "kept by the model": Formula(f'=IF(D{row}{"<=" if upper else ">="}B{row},"yes","no")', kept),
+                "kept by the model": Formula(
+                    f'=IF({left}>0,"{ask}",IF(D{row}{"<=" if upper else ">="}B{row},"yes","no"))', kept
+                ),
             }
         )
     total = Formula(f"=SUM(drawing!I{first}:I{last})+{number(space.locked_cost)}", chosen.cost)
@@ -199,14 +201,14 @@ def _requirements(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
 
 
 def style_calculator(
-    result: AllocationResult, sheets: Mapping[str, pd.DataFrame], notes: Sequence[str], path: Path
+    result: AllocationResult, header: Header, sheets: Mapping[str, pd.DataFrame], notes: Sequence[str], path: Path
 ) -> None:
-    """Make the written sheets a drawing: cells to change marked and guarded, cost and limits below, notes.
+    """Make the written sheets a drawing: the answer first, cells to change marked and guarded, cost and limits below.
 
     Parameters
     ----------
-    result
-        What the sheets were made of.
+    result, header
+        What the sheets were made of, and what is said of its run.
     sheets
         What `calculator_sheets` made of it.
     notes
@@ -231,11 +233,19 @@ def style_calculator(
     below = (*notes, *_without_weight(result), _say("workbook_change"), _say("workbook_models"))
     rows = len(sheets["drawing"])
     values["drawing"] |= _below(drawing, sheets["requirements"], rows, below)
+    watched = sheets["requirements"]
+    shown = dict(zip(map(str, watched["what"]), watched["predicted for the zones"], strict=True))
+    values[NAME] = add_answer(workbook, result, header, shown)
     drawing.freeze_panes = "C2"
     drawing.print_area = f"A1:{get_column_letter(_WEIGHTS - 1)}{drawing.max_row}"
-    for sheet in (drawing, requirements):
-        for column in range(2, sheet.max_column + 1):
-            sheet.column_dimensions[get_column_letter(column)].width = 16  # a formula is longer than its number
+    requirements.print_area = f"A1:E{requirements.max_row}"
+    requirements.column_dimensions["A"].width = _NAMES
+    for column in range(2, requirements.max_column + 1):
+        requirements.column_dimensions[get_column_letter(column)].width = 16  # a formula is longer than its number
+    for column in range(1, drawing.max_column + 1):
+        width = _WIDTHS[column - 1] if column < _WEIGHTS else 16
+        drawing.column_dimensions[get_column_letter(column)].width = width
+    drawing.row_dimensions[1].height = requirements.row_dimensions[1].height = 45
     workbook.calculation.fullCalcOnLoad = True
     workbook.save(path)
     keep_values(path, values)
@@ -276,7 +286,8 @@ def _below(drawing: Worksheet, watched: pd.DataFrame, rows: int, notes: tuple[st
         drawing.cell(start, column, header).font = Font(bold=True)
     for at, own in enumerate(watched.to_dict("records")):
         row, there = start + 1 + at, _FIRST + at
-        drawing.cell(row, 1, str(own["what"]))
+        drawing.cell(row, 1, str(own["what"])).alignment = Alignment(wrap_text=True, vertical="top")
+        drawing.row_dimensions[row].height = 15.0 * (1 + len(str(own["what"])) // _NAMES)
         for column, place, held in (
             (2, "B", own["limit"]),
             (3, "D", own["predicted for the zones"]),
