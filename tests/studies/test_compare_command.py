@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pandas as pd
 import pytest
+from scipy.stats import norm
 
 import tolalloc as ta
+from tests.builders import says
 from tests.studies.command import refused, tolalloc
+from tolalloc.reports.finished_run import Member, read_run
+from tolalloc.sensitivity.effort import QUICK_RANKING
+from tolalloc.study.answer import Answer
 
 SUMMARY = {
     "reducer": "RV-20E",
@@ -155,3 +161,51 @@ def test_broken_runs_are_refused_in_one_sentence(runs, tmp_path, name, text, wor
 def test_folders_that_are_none_or_in_use_are_refused(runs, tmp_path):
     refused(tolalloc("compare", runs[0], tmp_path / "nowhere"), "no such run folder")
     refused(tolalloc("compare", *runs, "--out", runs[0]), "not empty")
+
+
+def test_each_limit_and_all_at_once_are_compared_where_the_answers_have_them(tmp_path):
+    each = {"yield of peak-to-peak [-]": 0.9987, "yield of lost motion [-]": 0.995, "yield of all limits [-]": 0.9941}
+    several = run_folder(tmp_path / "several", **each)
+    ranked = run_folder(tmp_path / "ranked", asked="ranking", **each | {"yield of all limits [-]": 0.9})
+    old = run_folder(tmp_path / "old", **{"yield of all limits [-]": 0.9987})
+    first, second, _ = ta.compare(several, ranked).sentences
+    for sentence, joint in ((first, 0.9941), (second, 0.9)):
+        assert says(sentence, "comparison.others", joint=joint)
+        assert says(sentence, "comparison.limit", output="lost motion", share=0.995)
+        assert not says(sentence, "comparison.limit", output="peak-to-peak", share=0.9987)
+    (row,) = [
+        own for own in ta.compare(several, ranked).summary["answers"] if own["quantity"].startswith("yield of all")
+    ]
+    assert row["B − A"] == pytest.approx(-0.0941)
+    assert not says(ta.compare(several, old).sentences[1], "comparison.others")
+
+
+def test_runs_of_several_limits_say_the_yield_of_each_and_of_all(tmp_path):
+    """Two outputs that never fail together: what both keep is what both leave."""
+    row = {"plus": 3.0, "minus": -3.0, "unit": "µm", "min": 1.0, "max": 9.0, "cost": 1.0}
+    study = ta.Study(
+        ta.model(lambda a, b: (a + b, a + b), inputs=("a", "b"), outputs=("high [mm]", "low [mm]")),
+        ta.Drawing.of_rows([{"id": name, **row} for name in "ab"]),
+        limits={"high [mm]": ta.Limit(upper=0.002), "low [mm]": ta.Limit(lower=-0.001)},
+        questions=[ta.Ranking()],
+        name="apart",
+    )
+    sobol = ta.SobolEffort(start=16, limit=16, resamples=50)
+    fields = {"trajectories": 2, "derivative_units": 10, "surrogate_units": 96, "moment_units": 100, "level_units": 100}
+    ranking = study.rank(ta.Effort(ranking=replace(QUICK_RANKING, sobol=sobol, **fields)))
+    high, low = ranking.result.yields.values()
+    assert ranking.result.joint.estimate == pytest.approx(high.estimate + low.estimate - 1)
+    share = norm.cdf(2**0.5) - norm.cdf(-(0.5**0.5))
+    assert ranking.result.joint.estimate == pytest.approx(share, abs=0.06)  # four standard errors
+    assert says(ranking.sentences, "ranking.all_limits", share=ranking.result.joint.estimate)
+    said = {name: value for name, value in ranking.summary.items() if name.startswith("yield of ")}
+    run = read_run(run_folder(tmp_path / "run", asked="ranking", **said))
+    assert run.yields == {"high": high.estimate, "low": low.estimate}
+    assert run.joint == ranking.result.joint.estimate
+    checked = ta.check(study, timed=True)
+    assert checked.result.joint.units == 256
+    assert says(checked.sentences, "check.all_limits", share=checked.result.joint.estimate)
+    assert ta.check(study).result.joint is None
+    member = Member(name="apart", folder=run.folder, found=run)
+    table = Answer(kind="series", header=checked.header, result=(member,)).summary
+    assert table["studies"][0]["yield of all limits [-]"] == run.joint

@@ -17,8 +17,9 @@ from tolalloc.allocation.search.discrete import GradedAllocation
 from tolalloc.allocation.search.zone_allocation import ModelRange, ZoneAllocation, model_range
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.problem import OneSidedConstraint, Solution
-from tolalloc.allocation.space.requirement import AtYield, Check, Requirement
+from tolalloc.allocation.space.requirement import AtYield, Check, JointRequirement, Requirement
 from tolalloc.allocation.verify.verification import VerifiedDesign
+from tolalloc.capability.monte_carlo import Yield
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.sources import Source
 from tolalloc.models.model import Model
@@ -121,6 +122,12 @@ class AllocationResult:
     def met(self) -> bool:
         """Whether units that no search has seen show every requirement to be kept, with the stated error."""
         return self.chosen.accepted
+
+    @property
+    def yields(self) -> dict[str, Yield]:
+        """Limited output → share of units of the drawing that keep its limits, the leading one first."""
+        own = (requirement for requirement in self.requirements if not isinstance(requirement, JointRequirement))
+        return {requirement.output: self.chosen.yield_of(requirement) for requirement in own}
 
     @property
     def cost(self) -> float:

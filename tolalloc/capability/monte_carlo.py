@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -355,3 +355,33 @@ def quantile_change(
         rng=generator,
     ).confidence_interval
     return Change(estimate=estimate, low=float(found.low), high=float(found.high))
+
+
+def kept_at_once(evaluation: Evaluation, outputs: Sequence[str], limits: Mapping[str, Limits]) -> Yield:
+    """Return the share of units that keep all limits at once; one without an answer keeps none.
+
+    Parameters
+    ----------
+    evaluation
+        What a response said of random units.
+    outputs
+        Names of its outputs, in their order.
+    limits
+        Output → limits.
+
+    References
+    ----------
+    The interval is that of `proportion`, Clopper & Pearson 1934.
+
+    Examples
+    --------
+    Two units of four keep the first limit and two the second one, one of them both:
+
+    >>> values = np.array([[1.0, 1.0], [1.0, 3.0], [3.0, 1.0], [3.0, 3.0]])
+    >>> own = Evaluation(values=values, status=np.zeros(4, np.uint8))
+    >>> kept_at_once(own, ("a [mm]", "b [mm]"), {"a [mm]": Limits(upper=2.0), "b [mm]": Limits(upper=2.0)}).estimate
+    0.25
+    """
+    kept = [own.kept_by(evaluation.values[:, outputs.index(name)]) for name, own in limits.items()]
+    good = evaluation.good & np.all(kept, axis=0)
+    return proportion(good.size, good.size - int(np.count_nonzero(good)))

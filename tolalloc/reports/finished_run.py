@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tolalloc.capability.monte_carlo import Yield
 from tolalloc.exceptions import InputError
 from tolalloc.reading.file_content import is_file, read_text
 from tolalloc.reading.units import in_cost_units, unit_of
+from tolalloc.reports.wording import quantity
 
 if TYPE_CHECKING:
     import pandas as pd
 
 TOTAL, LOW, HIGH = "total index ST [-]", "ST low 5 % [-]", "ST high 95 % [-]"
+_YIELD, _OF_ALL = "yield of {} [-]", "all limits"
 _RANKED = ("source", "rank [-]", TOTAL, LOW, HIGH)
 _LIMITS = ("limit", "lower limit")
 _ZONED = ("id", "unit", "plus [unit]", "minus [unit]", "cost [cost units]")
@@ -51,6 +54,19 @@ class FinishedRun:
     def currency(self) -> str:
         """What its costs are in; empty where they are cost units, as in runs of versions that knew no other."""
         return str(self.manifest.get("currency", ""))
+
+    @property
+    def yields(self) -> dict[str, float]:
+        """Limited output → share of units that keep its limits, the leading one first; none with one limit alone."""
+        begin, end = _YIELD.split("{}")
+        found = {name[len(begin) : -len(end)]: own for name, own in self.summary.items() if name.startswith(begin)}
+        found.pop(_OF_ALL, None)
+        return found
+
+    @property
+    def joint(self) -> float | None:
+        """Share of units that keep all limits at once; none where the run does not say it."""
+        return self.summary.get(_YIELD.format(_OF_ALL))
 
     @property
     def limits(self) -> dict[str, float]:
@@ -120,6 +136,13 @@ class Member:
         if self.found is None:
             return f"not run: {self.fault}"
         return {None: "ranked", True: "met", False: "NOT met"}[self.met]
+
+
+def told_yields(each: Mapping[str, Yield], joint: Yield) -> dict[str, float]:
+    """Return what a summary says of several limits: the share of units that keep each, and all at once."""
+    several = each if len(each) > 1 else {}
+    shares = {_YIELD.format(quantity(output)): own.estimate for output, own in several.items()}
+    return {**shares, _YIELD.format(_OF_ALL): joint.estimate}
 
 
 def common_currency(runs: Iterable[FinishedRun]) -> str:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from tolalloc.capability.indices import Capability, Limits, QuantileInterval, capability, quantile_interval
-from tolalloc.capability.monte_carlo import MonteCarlo, OneSided, Yield, proportion
+from tolalloc.capability.monte_carlo import MonteCarlo, OneSided, Yield, kept_at_once, proportion
 from tolalloc.capability.yield_at_limit import YieldAtLimit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SamplingDesign
@@ -97,6 +97,16 @@ class RankingResult:
     def capabilities(self) -> tuple[OutputCapability, ...]:
         """Every output with its distribution, capability and yield."""
         return tuple(self._capability(at, output) for at, output in enumerate(self.outputs))
+
+    @cached_property
+    def yields(self) -> dict[str, Yield]:
+        """Limited output → share of the random units that keep its limits, the leading one first."""
+        return {own.output: own.inside for own in self.capabilities if own.inside}
+
+    @cached_property
+    def joint(self) -> Yield:
+        """Share of the random units that keep all limits at once; one without an answer keeps none."""
+        return kept_at_once(self.sample.evaluation, self.outputs, self.limits)
 
     def _capability(self, at: int, output: str) -> OutputCapability:
         evaluation, limits = self.sample.evaluation, self.limits.get(output)

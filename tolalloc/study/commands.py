@@ -14,6 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.capability.monte_carlo import Yield, kept_at_once
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, TolallocError
 from tolalloc.reports.finished_run import FinishedRun, Member, common_currency, read_run
@@ -31,7 +32,9 @@ from tolalloc.study.study import Study, run
 InForce = Callable[[], AbstractContextManager[None]]
 """Lets imports find the modules of one study, and none of another one."""
 _CHECKED = 1000
-"""Random units that a check solves [-]."""
+"""Random units that a check examines [-]."""
+_JUDGED = 256
+"""Those of them whose limited outputs are solved where a check may take its time [-]."""
 
 
 def _with_modules(study: Study | StudyScript | str | Path) -> tuple[Study, InForce]:
@@ -83,14 +86,22 @@ def check(study: Study | str | Path, *, timed: bool = False, script: str = "") -
             notes=asked.drawing.notes if asked.drawing else (),
             examined=model.examined(_random_units(prepared)),
             times=_times(prepared) if timed else (),
+            joint=_kept(prepared) if timed and len(requirements) > 1 else None,
         )
     return Answer(kind="check", header=header, result=result)
 
 
-def _random_units(prepared: Prepared) -> Float[np.ndarray, "unit column"]:
+def _kept(prepared: Prepared) -> Yield:
+    """Return the share of some random units at the zones of the drawing that keep all limits at once."""
+    limits = {own.output: own.limits for own in prepared.requirements}
+    response = prepared.model.reading(tuple(limits))
+    return kept_at_once(response(_random_units(prepared, _JUDGED)), response.outputs, limits)
+
+
+def _random_units(prepared: Prepared, units: int = _CHECKED) -> Float[np.ndarray, "unit column"]:
     """Return the deviations of random units at the zones of the drawing."""
     errors, seeds = prepared.errors, SeedTree(prepared.study.seed).child("check")
-    chunks = seeds.uniform_chunks(_CHECKED, len(errors.columns))
+    chunks = seeds.uniform_chunks(units, len(errors.columns))
     return np.concatenate([errors.deviations(errors.standard_values(uniform), errors.zones) for uniform in chunks])
 
 

@@ -73,6 +73,14 @@ class VerifiedDesign:
         """Whether every requirement is met, as far as these units tell."""
         return all(check.met for check in self.checks)
 
+    def yield_of(self, requirement: Requirement) -> Yield:
+        """Return the share of units that keep the limits of a requirement; one without an answer keeps none."""
+        outputs = self.independent.outputs if self.independent else self.outputs
+        outside = np.logical_not(requirement.limits.kept_by(requirement.read(outputs)))
+        if self.independent:
+            return self.independent.units.yield_of(outside)
+        return proportion(outside.size, int(np.count_nonzero(outside)))
+
     @property
     def constraints(self) -> tuple[OneSidedConstraint, ...]:
         """One-sided constraints of all requirements."""

@@ -10,6 +10,7 @@ from tolalloc.allocation.result import AllocationResult
 from tolalloc.reading.units import unit_of
 from tolalloc.reports.columns import plain
 from tolalloc.reports.document import Section
+from tolalloc.reports.finished_run import told_yields
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.tellers import allocation_figures as figures
@@ -199,7 +200,7 @@ class AllocationTeller(Teller[AllocationResult]):
             "yield [-]": chosen.achieved.estimate,
             "yield interval 95 % [-]": [chosen.achieved.low, chosen.achieved.high],
             "yield lower bound, one-sided 95 % [-]": chosen.achieved.bound,
-            "yield of all limits [-]": chosen.joint.estimate,
+            **told_yields(result.yields, chosen.joint),
             f"{short(result.leading)} kept [{unit_of(result.leading)}]": chosen.quantile_bound,
             **self._costs,
             "blocking requirement": None if result.met else chosen.blocking.requirement.output,

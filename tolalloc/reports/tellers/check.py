@@ -10,12 +10,14 @@ from typing import Any
 
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.requirement import Requirement
+from tolalloc.capability.monte_carlo import Yield
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import doubts
 from tolalloc.models.model import Model
 from tolalloc.reading.units import MICROMETRE
 from tolalloc.reports.document import Section
+from tolalloc.reports.finished_run import told_yields
 from tolalloc.reports.portrait import Examination, Portrait, portrait_of
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.templates import Sentences
@@ -47,6 +49,8 @@ class Checked:
     notes: tuple[str, ...] = ()  # What the drawing says beside its rows
     examined: Mapping[str, float] = field(default_factory=dict)  # Counted of some random units, units in the names
     times: tuple[CheckedTime, ...] = ()  # How long the questions take; none unless asked for
+    # Share of some random units that keep all limits at once; none with one limit alone, or where none were solved
+    joint: Yield | None = None
 
 
 class CheckTeller(Teller[Checked]):
@@ -72,6 +76,7 @@ class CheckTeller(Teller[Checked]):
             lines += [f"  {own}" for own in result.errors.correlation.mappings(result.errors.sources)]
             lines += [f"  {setting.sentence}" for setting in result.model.settings]
             lines += [*self._costs, *self._neglected, *result.notes, *self._examination.sentences]
+            lines += self._all_limits
             quick = _say("quick")
             lines += [f"{f'{quick} ' if own.effort == 'quick' else ''}{own.sentence}" for own in result.times]
         if result.script:
@@ -103,6 +108,8 @@ class CheckTeller(Teller[Checked]):
         found["neglected"] = [*self._zero, *self._portrait.left_out]
         found |= {"examined": list(self._examination.sentences), "but": self._examination.but}
         found["doubted rows"] = self._doubted
+        if result.joint:
+            found |= told_yields({}, result.joint)
         if result.times:
             found["durations"] = {
                 f"{own.effort} {own.kind}": {"units": list(own.units), "seconds": list(own.seconds)}
@@ -133,6 +140,14 @@ class CheckTeller(Teller[Checked]):
             return ()
         said = {"cost": _cost(space), "unit": self.header.cost_unit, "locked": space.locked_cost}
         return (_say("cost_locked" if space.locked_cost else "cost", **said),)
+
+    @property
+    def _all_limits(self) -> tuple[str, ...]:
+        """How many random units of the table keep all limits at once, where some were solved."""
+        joint = self.result.joint
+        if joint is None:
+            return ()
+        return (_say("all_limits", units=joint.units, share=joint.estimate, low=100 * joint.low, high=joint.high),)
 
     @property
     def _neglected(self) -> tuple[str, ...]:

@@ -40,7 +40,15 @@ class ComparisonTeller(Teller[Comparison]):
         return (*kept, _say("moved", sources=", ".join(moved)) if moved else _say("unmoved"))
 
     def _kept(self, label: str, run: FinishedRun) -> str:
-        """Return how many units of a run keep their limits, and at which cost if it allocated."""
+        """Return how many units of a run keep each limit and all at once, and at which cost if it allocated."""
+        kept, (_, *others) = self._leading(label, run), [*run.yields.items()] or [("", 0.0)]
+        if not others or run.joint is None:
+            return kept
+        each = ", ".join(_say("limit", output=output, share=share) for output, share in others)
+        return _say("others", kept=kept, each=each, joint=run.joint)
+
+    def _leading(self, label: str, run: FinishedRun) -> str:
+        """Return how many units of a run keep the limits of the leading output, and at which cost if it allocated."""
         found = run.summary
         # Ranking and allocation of one run may name the same limit differently.
         limits = " and ".join(dict.fromkeys(with_unit(f"{limit:g}", name) for name, limit in run.limits.items()))

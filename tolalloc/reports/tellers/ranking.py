@@ -13,6 +13,7 @@ from tolalloc.drawings.tolerance_table import table_frame
 from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, HeatMap, Series
+from tolalloc.reports.finished_run import told_yields
 from tolalloc.reports.portrait import Portrait, portrait_of
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.tellers import ranking_tables as tables
@@ -79,6 +80,7 @@ class RankingTeller(Teller[RankingResult]):
             *self._uncertain(),
             self._rejects(),
             self._beyond(),
+            *self._all_limits(),
             self._opening(),
             chosen_surrogate(found.choice),
             *self._portrait.remarks,
@@ -252,6 +254,13 @@ class RankingTeller(Teller[RankingResult]):
             allowed=allowed / scale,
             verdict=found.verdict,
         )
+
+    def _all_limits(self) -> Iterator[str]:
+        """Yield the share of units that keep all limits at once, where there are several."""
+        if len(self.result.limits) == 1:
+            return
+        joint, simulated = self.result.joint, self._portrait.simulated
+        yield _say("all_limits", share=joint.estimate, low=100 * joint.low, high=joint.high, simulated=simulated)
 
     def _opening(self) -> str:
         """Return which zone has the least and the most room."""
@@ -456,6 +465,7 @@ class RankingTeller(Teller[RankingResult]):
             "probability beyond the limit [-]": beyond.estimate.probability,
             "yield [-]": beyond.interval.estimate,
             "yield interval 95 % [-]": [beyond.interval.low, beyond.interval.high],
+            **told_yields(result.yields, result.joint),
             "surrogate": chosen_surrogate(result.choice),
             **({self._portrait.uncertain_name: self._effect()} if result.effect else {}),
             "statuses": dict(header.statuses),
