@@ -19,6 +19,7 @@ from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.requirement import Requirement
 from tolalloc.allocation.verify.verification import Verifier
 from tolalloc.capability.indices import Limits
+from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
@@ -162,3 +163,13 @@ def only(units: np.ndarray, model: EquivalentModel, *beginnings: str, without: b
     chosen = np.array([name.startswith(beginnings) is not without for name in model.columns])
     modification = np.array([name.startswith("modification.") for name in model.columns])
     return np.asarray(np.where(chosen | modification, units, 0.0))
+
+
+def with_ovality(drawing: Drawing, amplitude: float) -> Drawing:
+    """Return a drawing whose ring is oval by an amplitude [m]."""
+    errors = drawing.errors
+    sources = tuple(
+        replace(own, systematic=((2, amplitude, 0.0),)) if own.name == "housing.runout" else own
+        for own in errors.sources
+    )
+    return drawing.with_sources(sources)

@@ -59,7 +59,7 @@ def test_a_unit_is_diagnosed_with_the_modification_that_its_drawing_states(bench
     left = own.reducer.modification
     clearances = [left.flank_clearance(own.reducer.cycloid_stage), left.radial_clearance]
     assert np.array(clearances) * 1e6 == pytest.approx([3.5, 8.0])
-    assert len(own.errors.sources) == 48
+    assert len(own.errors.sources) == 50
     silent = Diagnose(curve=bench.curve, reducer="rv20e", tolerances="rv20e_table4").prepare()
     assert silent.reducer == load_reducer("rv20e")
 

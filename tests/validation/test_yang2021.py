@@ -14,9 +14,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.builders import FIRST_STAGE, STANDING, drawn_units, only, table_of_three_cranks
+import tolalloc as ta
+from tests.builders import FIRST_STAGE, STANDING, drawn_units, only, table_of_three_cranks, with_ovality
 from tests.validation_manual import shown
 from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import order_spectrum
@@ -153,3 +155,30 @@ def test_the_constant_contact_stands_for_the_presets_own_in_the_whole_and_not_un
     levels = [0.1, 0.5, 0.9]
     assert np.quantile(constant, levels) == pytest.approx(np.quantile(logarithmic, levels), rel=0.08)
     assert np.abs(constant - logarithmic).max() > 15
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("scale", "oval", "kelvin", "band", "inside"),
+    [
+        (1.0, 0.0, 0.0, (17, 26, 37), False),
+        (1.0, 5e-6, -5.0, (32, 44, 57), False),
+        (1.5, 5e-6, 0.0, (29, 42, 57), False),
+        (1.5, 5e-6, -5.0, (36, 51, 69), True),
+    ],
+)
+def test_prototypes_beside_a_drawing_that_can_be_built(scale, oval, kelvin, band, inside):
+    """Inside 95 % of what leaves a shop only with zones half as wide again, an oval ring and discs colder than it.
+
+    The drawing has the grinding tolerance of the teeth. How oval the rings and how warm the discs were is not printed.
+    """
+    drawing = ta.drawing("rv80e_drawing")
+    wider = tuple(replace(own, zone=scale * own.zone, maximum=2 * own.maximum) for own in drawing.sources)
+    drawing = with_ovality(drawing.with_sources(wider), oval)
+    reducer = ta.reducer("rv80e", neglected=("disc*.tilt",), disc_temperature=kelvin)
+    model, errors = reducer.set_to(drawing.settings).bound(drawing.errors, "test"), drawing.errors
+    uniform = np.concatenate(list(SeedTree(1).uniform_chunks(512, len(errors.columns))))
+    x = errors.deviations(errors.standard_values(uniform), errors.zones)
+    found = np.quantile(model.reading((ta.PEAK_TO_PEAK,))(x).values[:, 0], [0.025, 0.5, 0.975])
+    assert found == pytest.approx(band, abs=2.5)  # the ends of 512 units are known to 1.2" (one standard error)
+    assert bool((found[2] > MEASURED).all() and (found[0] < MEASURED).all()) is inside

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import radians
 from pathlib import Path
 
@@ -10,8 +9,8 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
+from tests.builders import with_ovality
 from tolalloc.cli.start import new
-from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import limited_measure
 from tolalloc.exceptions import InputError
@@ -24,16 +23,6 @@ def table(folder: Path, systematic: str, row: str = "ring.runout,runout,8,0,µm,
     path = folder / "zones.csv"
     path.write_text(f"{HEADER}\n{row},{systematic}\n", encoding="utf-8")
     return path
-
-
-def with_ovality(drawing: Drawing, amplitude: float) -> Drawing:
-    """Return a drawing whose ring is oval by an amplitude [m]."""
-    errors = drawing.errors
-    sources = tuple(
-        replace(own, systematic=((2, amplitude, 0.0),)) if own.name == "housing.runout" else own
-        for own in errors.sources
-    )
-    return drawing.with_sources(sources)
 
 
 def test_mean_of_the_columns_is_the_systematic_wave(tmp_path):

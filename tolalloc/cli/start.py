@@ -166,7 +166,8 @@ def sources_of(reducer: Reducer, complete: bool = False) -> tuple[Source, ...]:
     for name, kind in kinds.items():
         like = known.get(name) or known.get(_NUMBERED.sub(r"\g<1>1", name))
         if like is not None and kind is not None:
-            own = replace(like, name=name, part=name.partition(".")[0])
+            part = like.part if like.name == name else name.partition(".")[0]
+            own = replace(like, name=name, part=part)
             scaled = _scaled(own, kind, reducer, scale)
             found.append((kind.fine + 2 * kind.first_stage, scaled if complete else _reduced(scaled, kind)))
     return tuple(own for _, own in sorted(found, key=lambda ranked: ranked[0]))
@@ -211,7 +212,7 @@ def _scaled(source: Source, kind: ErrorSource, reducer: Reducer, scale: float) -
 
     The length over which an angle is measured grows with the pin circle.
     """
-    nominal = kind.nominal.of(reducer) if kind.nominal else 0.0
+    nominal = kind.nominal.of(reducer) if kind.nominal and not kind.nominal.chosen else 0.0
     zone, least, most = (_rounded(scale * own) for own in (source.zone, source.minimum, source.maximum))
     longer = 2 * reducer.cycloid_stage.pin_circle_radius / MILLIMETRE / RV.new.diameter
     note = "zone, range and cost assumed: those of rv20e_drawing, scaled by ISO 286's tolerance unit"

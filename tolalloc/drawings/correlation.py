@@ -13,8 +13,9 @@ from jaxtyping import Float
 
 from tolalloc.drawings.distributions import ndtri
 from tolalloc.drawings.sources import Source, known_as, meant
-from tolalloc.drawings.table_file import plain_number, read_table_file
+from tolalloc.drawings.table_file import DATA, plain_number, read_table_file
 from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.reading.files import shipped_or_path
 
 _ROUNDING = 1e-10
 """Eigenvalue of a correlation matrix above whose negative it counts as zero [-]."""
@@ -175,7 +176,7 @@ Row = tuple[str, list[str]]
 
 
 def load_correlations(path: Path | str, sources: Sequence[Source]) -> Correlation:
-    """Return the correlations between sources from a CSV (UTF-8) or XLSX file.
+    """Return the correlations between sources from a CSV (UTF-8) or XLSX file, or a shipped one by its name.
 
     Parameters
     ----------
@@ -192,7 +193,7 @@ def load_correlations(path: Path | str, sources: Sequence[Source]) -> Correlatio
     InputError, UnknownNameError
         The file, row and value that are not allowed.
     """
-    rows = _read(Path(path))
+    rows = _read(shipped_or_path(path, DATA, ".correlations.csv", "correlation"))
     is_list = bool(set(LIST_HEADERS[1:]) & set(rows[0][1]))
     pairs = _pairs_of_list(rows, sources) if is_list else _pairs_of_matrix(rows, sources)
     correlation = Correlation(pairs=pairs, origin=str(path))

@@ -212,7 +212,7 @@ def load_drawing(
     --------
     >>> drawing = load_drawing("rv20e_drawing")
     >>> len(drawing.sources), f"{1e6 * drawing.sources[0].zone:.1f} µm", drawing.settings["flank clearance [µm]"]
-    (48, '4.0 µm', 3.5)
+    (50, '4.0 µm', 3.5)
     """
     sources = load_tolerance_table(beside(folder, table), beside(folder, processes), sheet)
     correlation = load_correlations(beside(folder, correlations), sources) if correlations else Correlation()

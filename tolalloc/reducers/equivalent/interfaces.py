@@ -551,11 +551,13 @@ PIN_SOURCES = (
     ),
     ErrorSource(
         name="modification.equidistant",
-        nominal=Nominal(said="its equidistant amount", of=lambda reducer: reducer.modification.equidistant),
+        nominal=Nominal(
+            said="its equidistant amount", of=lambda reducer: reducer.modification.equidistant, chosen=True
+        ),
     ),
     ErrorSource(
         name="modification.shift",
-        nominal=Nominal(said="its shift amount", of=lambda reducer: reducer.modification.shift),
+        nominal=Nominal(said="its shift amount", of=lambda reducer: reducer.modification.shift, chosen=True),
     ),
     ErrorSource(name="housing.runout", shape="waves", place="housing.pins"),
     ErrorSource(name="housing.pitch", shape="waves", place="housing.pins"),

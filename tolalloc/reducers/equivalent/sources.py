@@ -26,6 +26,7 @@ class Nominal:
 
     said: str  # What it is of the reducer, in words
     of: Callable[[Reducer], float]  # The size itself [m]
+    chosen: bool = False  # Whether a study may choose it, so that a table made for a reducer leaves it open
 
 
 @dataclass(frozen=True, kw_only=True)
