@@ -46,7 +46,7 @@ def test_a_table_that_just_fits_is_not_cut(capsys, monkeypatch):
     print_table(frame, "What changes")
     said = capsys.readouterr().out
     assert all(len(line) <= 80 for line in said.splitlines())
-    assert "-0.1123 │" in said and "1.421 │" in said
+    assert "−0.1123 │" in said and "1.421 │" in said
 
 
 def test_a_log_has_a_line_every_few_seconds_and_one_for_each_stage(capsys, monkeypatch):

@@ -137,5 +137,5 @@ def test_a_setting_outside_what_it_may_become_is_not_drawn_though_it_is_cheapest
     assert found.cost > found.fixed.chosen.cost
     (said,) = [sentence for sentence in answer.warnings if sentence.startswith("preload")]
     assert said == (
-        "preload: 0 mm today, not among the -3…-1 mm that it may become; only the table as it is may keep it."
+        "preload: 0 mm today, not among the −3…−1 mm that it may become; only the table as it is may keep it."
     )

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from operator import mul
 
 import numpy as np
+import pandas as pd
 import pytest
 
+import tolalloc as ta
 from tolalloc.capability.experiment import Experiment
+from tolalloc.cli.console import print_table
 from tolalloc.drawings.correlation import Correlation, Pair
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
@@ -16,7 +20,8 @@ from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.drawings.zones import Feature
 from tolalloc.models.model import Evaluation
 from tolalloc.reports.feature_frame import SYMBOLS, FeatureFrame, callout, callout_assumptions, svg_of, written
-from tolalloc.sensitivity.effort import SobolEffort
+from tolalloc.reports.writer import html_table, write_csv
+from tolalloc.sensitivity.effort import QUICK_RANKING, SobolEffort
 from tolalloc.sensitivity.sobol import regrouped, sobol_indices
 
 UM = 1e-6
@@ -121,3 +126,62 @@ def test_a_frame_is_drawn_with_a_box_for_every_cell(characteristic):
     assert picture.count("<rect") == (0 if characteristic == "size" else len(frame.cells))
     assert ">0.01</text>" in picture and ">B</text>" in picture
     assert 'title="' in frame._repr_html_() and "10.04 µm" in frame._repr_html_()
+
+
+@pytest.fixture(scope="module")
+def ranked():
+    """Three pairs of sizes: one of one weight, one of both signs, and one whose places depend on each other."""
+    row = {"plus": 3.0, "minus": -3.0, "unit": "µm", "min": 1.0, "max": 9.0, "cost": 1.0}
+    groups = {"a": "pair", "b": "pair", "c": "signs", "d": "signs", "e": "tied", "f": "tied"}
+    weights = (-2.0, -2.0, -1.0, 3.0, 1.0, 1.0)
+    own = ta.Study(
+        ta.model(lambda *x: sum(map(mul, weights, x)), inputs=tuple(groups), outputs=("gap [mm]",)),
+        ta.Drawing.of_rows(
+            [{"id": name, "group": group, **row} for name, group in groups.items()],
+            correlations=Correlation(pairs=(Pair(one="e", other="f", correlation=0.5),)),
+        ),
+        limits={"gap [mm]": ta.Limit(lower=-0.02, upper=0.02)},
+        questions=[ta.Ranking()],
+        name="lines",
+    )
+    sobol = ta.SobolEffort(start=64, limit=64, resamples=50)
+    fields = {"trajectories": 2, "derivative_units": 100, "surrogate_units": 96, "moment_units": 100}
+    return own.rank(ta.Effort(ranking=replace(QUICK_RANKING, sobol=sobol, level_units=100, **fields)))
+
+
+def test_a_dimension_says_what_a_micrometre_and_the_zones_of_all_its_places_do(ranked):
+    table = ranked.tables["dimensions"].set_index("dimension")
+    sens = table["Sens [mm/µm]"]
+    assert sens["pair"] == pytest.approx(-2e-3)
+    assert sens["signs"] == "-0.001…0.003"
+    per_micrometre = table["rms change per µm in every place [mm/µm]"]
+    assert per_micrometre[["pair", "signs"]].tolist() == pytest.approx([1e-3 * 8**0.5, 1e-3 * 10**0.5], rel=1e-6)
+    # A zone of ±3 µm is ±3σ; 100 units place the mean square of a normal number within 14 %, thrice.
+    by_zone = table["rms change by its zone [mm]"]
+    assert by_zone[["pair", "signs"]].tolist() == pytest.approx([1e-3 * 8**0.5, 1e-3 * 10**0.5], rel=0.21)
+    assert table["rank per µm [-]"][["signs", "pair"]].tolist() == [1, 2]
+
+
+def test_nothing_is_added_up_of_places_that_depend_on_each_other(ranked):
+    tied = ranked.tables["dimensions"].set_index("dimension").loc["tied"]
+    assert tied[["Sens [mm/µm]", "rms change by its zone [mm]", "rank per µm [-]"]].isna().all()
+    assert tied["places [-]"] == 2
+
+
+def test_tables_for_people_have_a_true_minus_and_files_a_hyphen(ranked, tmp_path, capsys):
+    frame = ranked.tables["dimensions"]
+    page = str(html_table(frame))
+    assert ">−0.002<" in page and ">−0.001…0.003<" in page and 'class="number">−0.001' in page
+    print_table(frame[["dimension", "Sens [mm/µm]"]], "dimensions")
+    printed = capsys.readouterr().out
+    assert "−0.002" in printed and "−0.001…0.003" in printed
+    assert "-0.00" not in page + printed
+    write_csv(frame, tmp_path / "dimensions.csv")
+    assert "-0.002" in (text := (tmp_path / "dimensions.csv").read_text(encoding="utf-8"))
+    assert "−" not in text
+
+
+def test_zero_has_no_minus_and_names_keep_their_hyphen():
+    page = str(html_table(pd.DataFrame({"name": ["disc-1", "at least -20 µm"], "x [%]": [-0.0, -12.34]})))
+    assert "<td>disc-1</td>" in page and "at least −20 µm" in page
+    assert ">0.0<" in page and '<td class="number" title="−12.34">−12.3</td>' in page

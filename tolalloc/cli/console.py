@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tolalloc.reports.wording import signed, true_minus
+
 if TYPE_CHECKING:
     import pandas as pd
     from rich.progress import TaskID
@@ -209,10 +211,10 @@ def _widened(least: list[int], most: list[int], room: int) -> list[int]:
 
 
 def _cell(value: object) -> str:
-    """Return a cell with four significant digits; what is not there stays empty."""
+    """Return a cell with four significant digits and a true minus; what is not there stays empty."""
     if isinstance(value, float):
-        return "" if isnan(value) else f"{value:.4g}"
-    return str(value)
+        return "" if isnan(value) else signed(f"{value:.4g}")
+    return true_minus(str(value))
 
 
 def tell(answer: Answer[Any], as_json: bool, *tables: tuple[pd.DataFrame, str]) -> None:

@@ -59,7 +59,8 @@ class Setting(NamedFields):
     def sentence(self) -> str:
         """How it is today, and what it may become."""
         name, _, unit = self.name.rstrip("]").partition(" [")
-        present, allowed = f"{name}: {self.value:.3g} {unit}", f"{self.lower:.3g}…{self.upper:.3g} {unit}"
+        value, lower, upper = (f"{own:.3g}".replace("-", "−") for own in (self.value, self.lower, self.upper))
+        present, allowed = f"{name}: {value} {unit}", f"{lower}…{upper} {unit}"
         if self.out_of_bounds:
             return f"{present} today, not among the {allowed} that it may become; only the table as it is may keep it"
         return f"{present}; {f'may become {allowed}' if self.lower < self.upper else 'locked'}"

@@ -113,6 +113,19 @@ def plain(value: Any) -> Any:
     return None if isinstance(value, float) and not isfinite(value) else value
 
 
+_SAME = 1e-6
+"""Relative difference of two numbers below which a cell has one of them [-]."""
+
+
+def span(low: float, high: float) -> float | str:
+    """Return a cell from one number to another, or the number where they are one.
+
+    >>> span(4.0, 4.0), span(-1.5, 4.0)
+    (4.0, '-1.5…4')
+    """
+    return low if high - low <= _SAME * max(abs(low), abs(high)) else f"{low:.4g}…{high:.4g}"
+
+
 def own_words(members: Callable[[Row], Sequence[Source]]) -> tuple[Column[Row], ...]:
     """Return the columns of own id, drawing and label of a row's sources, which stand where a drawing states any."""
 

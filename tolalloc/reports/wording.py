@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import string
 from collections.abc import Iterable
 from math import floor, log10
@@ -42,6 +43,29 @@ def number(value: Any, spec: str = "") -> str:
         mantissa = mantissa.replace("-", "+" if "+" in spec else "")
     mantissa = mantissa.replace("-", "−").replace("%", " %")
     return f"{mantissa}e{int(exponent)}" if power else mantissa
+
+
+_HYPHEN = re.compile(r"(?<![^\s…(=±,])-(?=\.?\d)")
+
+
+def true_minus(text: str) -> str:
+    """Return a text of a table with a true minus before numbers; a hyphen inside a name or a date stays.
+
+    >>> true_minus("at least -20 µm"), true_minus("-3…-1"), true_minus("disc-1 of 2026-11-26")
+    ('at least −20 µm', '−3…−1', 'disc-1 of 2026-11-26')
+    """
+    return _HYPHEN.sub("−", text)
+
+
+def signed(text: str) -> str:
+    """Return a written number with a true minus, and without one before 0.
+
+    >>> signed("-0.25"), signed("-1e-05"), signed("-0.00"), signed("-inf")
+    ('−0.25', '−1e-05', '0.00', '−inf')
+    """
+    if not text.startswith("-"):
+        return text
+    return f"−{text[1:]}" if any(digit in text.partition("e")[0] for digit in "123456789n") else text[1:]
 
 
 def alike(*values: float, figures: int = 3, most: float = float("inf")) -> tuple[str, ...]:

@@ -24,12 +24,12 @@ from tolalloc.reports.document import Document
 from tolalloc.reports.excel import write_sheets
 from tolalloc.reports.figure import Figure, HeatMap, chart
 from tolalloc.reports.page import as_json, scripts, style
-from tolalloc.reports.wording import words_in
+from tolalloc.reports.wording import signed, true_minus, words_in
 from tolalloc.running.compiled import processor, thread_count
 
 _DECIMALS = {"%": 1, "cost units": 2}
 """Unit → decimals; every other number has four significant digits [-]."""
-_SPAN = re.compile(r"[\d.]+…[\d.]+")
+_SPAN = re.compile(r"[-−]?[\d.]+…[-−]?[\d.]+")
 _POINT = re.compile(r"\.(?=[A-Za-z])")
 _SMALLER = {"several": 8, "many": 12}
 """Class of a table that is set smaller on paper → columns beyond which it is [-]."""
@@ -61,16 +61,16 @@ def _is_number(value: object) -> bool:
 
 
 def written(value: float, unit: str) -> str:
-    """Return a number as a report writes it.
+    """Return a number as a report writes it, with a true minus.
 
-    >>> written(41.6543, "cost units"), written(12.345678, "µm"), written(123456.7, "-")
-    ('41.65', '12.35', '123457')
+    >>> written(41.6543, "cost units"), written(-12.345678, "µm"), written(123456.7, "-")
+    ('41.65', '−12.35', '123457')
     """
     if pd.isna(value):
         return ""
     if unit in _DECIMALS and (value == 0.0 or 0.05 <= abs(value) < 1e6):
-        return f"{value:.{_DECIMALS[unit]}f}"
-    return f"{value:.0f}" if 1e4 <= abs(value) < 1e15 else f"{value:.4g}"
+        return signed(f"{value:.{_DECIMALS[unit]}f}")
+    return signed(f"{value:.0f}" if 1e4 <= abs(value) < 1e15 else f"{value:.4g}")
 
 
 @singledispatch
@@ -78,19 +78,20 @@ def _cell(value: object, unit: str) -> str:  # noqa: ARG001 (only numbers ask fo
     if hasattr(value, "_repr_html_"):
         return f"<td>{value._repr_html_()}</td>"
     # A name such as disc1.bore1.position may be broken behind its points.
-    return f"<td{_NUMBER if _is_number(value) else ''}>{re.sub(_POINT, '.<wbr>', str(escape(value)))}</td>"
+    text = re.sub(_POINT, ".<wbr>", true_minus(str(escape(value))))
+    return f"<td{_NUMBER if _is_number(value) else ''}>{text}</td>"
 
 
 @_cell.register
 def _(value: float, unit: str) -> str:
     text, exact = written(value, unit), f"{value:.10g}"
-    title = f' title="{exact}"' if text and float(text) != float(exact) else ""
+    title = f' title="{signed(exact)}"' if text and float(text.replace("−", "-")) != float(exact) else ""
     return f"<td{_NUMBER}{title}>{text}</td>"
 
 
 @_cell.register
 def _(value: Integral, unit: str) -> str:  # noqa: ARG001
-    return f"<td{_NUMBER}>{value}</td>" if not isinstance(value, bool) else f"<td>{value}</td>"
+    return f"<td{_NUMBER}>{signed(str(value))}</td>" if not isinstance(value, bool) else f"<td>{value}</td>"
 
 
 _LARGE = (24, 15)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,6 +41,44 @@ class LocalDerivatives:
     # Good random units, and those without a usable answer [-]
     units: int
     failed: int
+
+    def of_line(self, members: Sequence[str]) -> LineDerivatives:
+        """Return what all places of one line of a drawing do, whose errors are independent of each other.
+
+        √(Σ rᵢ²) over the places, with the root mean square change rᵢ of each (own derivation).
+
+        Examples
+        --------
+        >>> one, two = np.ones(2), np.array([3.0, 4.0])
+        >>> own = LocalDerivatives(
+        ...     sources=("a", "b"),
+        ...     nominal=0.0,
+        ...     at_nominal=np.array([-1.0, 1.0]),
+        ...     direction=one,
+        ...     root_mean_square=one,
+        ...     by_zone=two,
+        ...     per_micrometre=two,
+        ...     units=1,
+        ...     failed=0,
+        ... )
+        >>> own.of_line(("a", "b")).by_zone, own.of_line(("a",)).at_nominal
+        (5.0, (-1.0, -1.0))
+        """
+        at = [self.sources.index(name) for name in members]
+        return LineDerivatives(
+            at_nominal=(float(self.at_nominal[at].min()), float(self.at_nominal[at].max())),
+            per_micrometre=float(np.linalg.norm(self.per_micrometre[at])),
+            by_zone=float(np.linalg.norm(self.by_zone[at])),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class LineDerivatives:
+    """What the places of one line of a drawing do to the output."""
+
+    at_nominal: tuple[float, float]  # Smallest and largest derivative of its places, as of `LocalDerivatives`
+    per_micrometre: float  # Root mean square change by a micrometre in every place [output/µm]
+    by_zone: float  # The same by what the zones let through [output]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,11 +14,11 @@ export function node(name, attributes = {}, text = null) {
   return made;
 }
 
-// A number as the reports write it: five significant digits at most.
+// A number as the reports write it: five significant digits at most, a true minus.
 export function number(value) {
   if (value === null || !Number.isFinite(value)) return "–";
-  if (Math.abs(value) >= 1e4) return value.toFixed(0);
-  return String(Number(value.toPrecision(5)));
+  const text = Math.abs(value) >= 1e4 ? value.toFixed(0) : String(Number(value.toPrecision(5)));
+  return text.replace(/^-/, "−");
 }
 
 function range(values) {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,7 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.table_file import setting_line
 from tolalloc.drawings.tolerance_table import table_frame
 from tolalloc.reading.units import COST_UNITS, MICROMETRE, unit_of
-from tolalloc.reports.columns import Column, Table, own_words
+from tolalloc.reports.columns import Column, Table, own_words, span
 from tolalloc.reports.excel import write_sheets
 from tolalloc.reports.feature_frame import Frames, callout, write_frames
 from tolalloc.reports.figure import Figure, Series
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 
 _say = Sentences("allocation")
 
-_SAME = 1e-9
-"""Relative difference up to which two zones are the same [-]."""
 _STEP = 0.1
 """Share of a zone by which the figure of effects opens it [-]."""
 
@@ -83,8 +81,8 @@ def dimensions_table(result: AllocationResult) -> Table[_Dimension]:
         *own_words(_after),
         Column(header="places [-]", value=lambda row: len(row[1])),
         Column(header="write [mm]", value=lambda row: frames(_after(row)), terminal=2),
-        Column(header="zone before [µm]", value=lambda row: _span([old.zone / MICROMETRE for old, _ in row[1]])),
-        Column(header="zone [µm]", value=lambda row: _span([new.zone / MICROMETRE for _, new in row[1]])),
+        Column(header="zone before [µm]", value=lambda row: _zones(old for old, _ in row[1])),
+        Column(header="zone [µm]", value=lambda row: _zones(new for _, new in row[1])),
         Column(header="change [%]", value=lambda row: _change(row[1][0])),
         Column(header="grade", value=lambda row: row[1][0][1].grade, nothing="", terminal=5),
         Column(header="process before", value=lambda row: before.value(row[1][0]), nothing="as today"),
@@ -133,10 +131,10 @@ def _processes(result: AllocationResult) -> tuple[Column[_Source], Column[_Sourc
     )
 
 
-def _span(zones: Sequence[float]) -> float | str:
-    """Return the zone of all members, or the smallest and the largest of them."""
-    low, high = min(zones), max(zones)
-    return low if high - low <= _SAME * high else f"{low:.4g}…{high:.4g}"
+def _zones(members: Iterable[Source]) -> float | str:
+    """Return the zone of all members, or the smallest and the largest of them [µm]."""
+    zones = [own.zone / MICROMETRE for own in members]
+    return span(min(zones), max(zones))
 
 
 def _parts(result: AllocationResult) -> dict[str, float]:

@@ -10,11 +10,12 @@ import numpy as np
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import with_own_words
 from tolalloc.reading.units import MICROMETRE, unit_of
-from tolalloc.reports.columns import Column, Table
+from tolalloc.reports.columns import Column, Table, span
 from tolalloc.reports.feature_frame import Frames, callout
 from tolalloc.reports.header import Header
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import quantity
+from tolalloc.sensitivity.derivatives import LineDerivatives
 from tolalloc.sensitivity.inverse import InverseSensitivity
 from tolalloc.sensitivity.ranking import Neighbours
 from tolalloc.sensitivity.result import OutputCapability, RankingResult
@@ -139,6 +140,10 @@ def dimensions_table(result: RankingResult, found: SobolIndices) -> pd.DataFrame
         by_group.setdefault(source.dimension, []).append(source)
     low, high = found.total_interval * 100
     members = [[own for name in joined.split(" + ") for own in by_group.get(name, ())] for joined in found.sources]
+    lines = [_line_derivatives(result, own) for own in members]
+    per_micrometre = np.array([own.per_micrometre if own else np.nan for own in lines])
+    place = {at: rank for rank, at in enumerate(largest_first(np.nan_to_num(per_micrometre)), start=1) if lines[at]}
+    unit = unit_of(result.leading)
     frame = of_positions(
         "dimensions",
         {
@@ -149,10 +154,23 @@ def dimensions_table(result: RankingResult, found: SobolIndices) -> pd.DataFrame
             "low 5 % [%]": low,
             "high 95 % [%]": high,
             "alone (first-order index) [%]": np.maximum(found.first, 0.0) * 100,
+            f"Sens [{unit}/µm]": lambda at: span(*own.at_nominal) if (own := lines[at]) else np.nan,
+            f"rms change per µm in every place [{unit}/µm]": per_micrometre,
+            "rank per µm [-]": lambda at: place.get(at, np.nan),
+            f"rms change by its zone [{unit}]": [own.by_zone if own else np.nan for own in lines],
         },
         found.order,
     ).frame()
     return with_own_words(frame, "dimension", by_group)
+
+
+def _line_derivatives(result: RankingResult, members: Sequence[Source]) -> LineDerivatives | None:
+    """Return what a micrometre of a dimension does; none of what is no length, or where places depend on each other."""
+    names = {own.name for own in members}
+    dependent = any(len(block) > 1 and names & {*block} for block in result.errors.blocks)
+    if not names or dependent or not names <= {*result.local.sources}:
+        return None
+    return result.local.of_line([own.name for own in members])
 
 
 def pairs_table(sobol: SobolIndices) -> Table[int]:

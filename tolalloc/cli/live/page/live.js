@@ -240,7 +240,7 @@ async function begin() {
   study = await ask("study");
   document.title = `${study.name}, live`;
   at("name").textContent = `${study.model}: ${study.name}`;
-  at("conditions").textContent = [...study.conditions.map(([name, value]) => (name.endsWith("]") ? name.replace(/ ?\[(.*)\]$/, ` ${number(value).replace("-", "−")} $1`) : `${name} ${value}`)), `seed ${study.seed}`, ...study.limits].join(" · ");
+  at("conditions").textContent = [...study.conditions.map(([name, value]) => (name.endsWith("]") ? name.replace(/ ?\[(.*)\]$/, ` ${number(value)} $1`) : `${name} ${value}`)), `seed ${study.seed}`, ...study.limits].join(" · ");
   at("currency").textContent = study.currency;
   designs = new Designs(at("designs"), { currency: study.currency, take: (own) => take(own.design) });
   zones = new Zones(study, at("zones"), at("settings"), {
