@@ -83,7 +83,7 @@ def check(study: Study | str | Path, *, timed: bool = False, script: str = "") -
             errors=errors,
             space=space,
             requirements=requirements,
-            notes=asked.drawing.notes if asked.drawing else (),
+            notes=prepared.notes,
             examined=model.examined(_random_units(prepared)),
             times=_times(prepared) if timed else (),
             joint=_kept(prepared) if timed and len(requirements) > 1 else None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -19,6 +20,9 @@ from tolalloc.reports.portrait import portrait_of
 from tolalloc.running.chunks import Mapper
 from tolalloc.running.progress import RunRecord
 from tolalloc.study.problem import Limit, Problem
+
+_SHARED = "Rows without a group are one line where identical parts have the same zone, limits and price: {lines}."
+"""What is said of the lines that `Prepared.errors` made, with the number of rows of each."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,6 +64,15 @@ class Prepared:
         lines: Mapping[str, str] = source.shared_lines(stated) if isinstance(source, HasCopies) else {}
         found = (replace(own, group=own.group or lines.get(own.name, own.name)) for own in self._stated.sources)
         return replace(self._stated, sources=tuple(found))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader must know of the drawing: that of its table, and which rows share a line without a group."""
+        stated = self.study.drawing.notes if self.study.drawing else ()
+        rows = zip(self._stated.sources, self.errors.sources, strict=True)
+        lines = Counter(own.group for before, own in rows if not before.group)
+        shared = ", ".join(f"{line} ({rows})" for line, rows in lines.items() if rows > 1)
+        return (*stated, *((_SHARED.format(lines=shared),) if shared else ()))
 
     @cached_property
     def model(self) -> Model:
@@ -183,7 +196,7 @@ class Prepared:
             currency=self.currency,
             assumptions=(
                 *portrait_of(self.model).assumptions,
-                *(self.study.drawing.notes if self.study.drawing else ()),
+                *self.notes,
             ),
         )
 
