@@ -116,6 +116,10 @@ COMPUTES_NOTHING = {
     # asks others one after the other and passes on what they say
     "reducers.cycloid.solvers.pins.pin_forces": "passes on",
     "reducers.dynamics.solvers.stepping.advance": "passes on",
+    "allocation.space.requirement.spread_constraints": "passes on",
+    "allocation.space.joint_yield.divided": "passes on",
+    "allocation.space.joint_yield.tightened": "passes on",
+    "allocation.space.joint_yield.limited_by": "passes on",
     "reducers.equivalent.solvers.pressing.press": "passes on",
     "reducers.equivalent.solvers.simd.above": "passes on",
     "reducers.equivalent.solvers.simd.choose": "passes on",

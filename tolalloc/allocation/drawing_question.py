@@ -166,9 +166,10 @@ class DrawingQuestion:
     def graded(self, free: ZoneAllocation, fixed: ZoneAllocation | None) -> GradedAllocation:
         """Return the cheaper allocation on ladders of zones, with the settings free or as they are."""
         steps = self.effort.graded_steps
-        found = [allocate_grades(self.verifier("graded", self.space), free.chosen, steps)]
+        found = [allocate_grades(self.verifier("graded", self.space).dividing_as(free.chosen), free.chosen, steps)]
         if fixed and self.space.holds_present_settings:
-            found.append(allocate_grades(self.verifier("graded alone", self.space.fixed), fixed.chosen, steps))
+            alone = self.verifier("graded alone", self.space.fixed).dividing_as(fixed.chosen)
+            found.append(allocate_grades(alone, fixed.chosen, steps))
         best = cheapest_met(tuple(own.chosen for own in found))
         return next(own for own in found if own.chosen is best)
 
@@ -223,7 +224,8 @@ class DrawingQuestion:
         space, stated = design.space.rounded_down(design.design, self.model.drawn_amounts)
         if space is design.space and np.array_equal(stated, design.design):
             return design
-        return replace(self.verifier("rounded", space).verify(stated, design.name), unrounded_cost=design.cost)
+        verifier = self.verifier("rounded", space).dividing_as(design)
+        return replace(verifier.verify(stated, design.name), unrounded_cost=design.cost)
 
     def shown_as_drawn(self, found: Candidates, test: AcceptanceTest, spending: AlphaSpending) -> Candidates:
         """Return candidates that show what the drawing states also where nothing was accepted.
@@ -287,9 +289,8 @@ class DrawingQuestion:
 
     def robustness(self, free: ZoneAllocation) -> Robustness:
         """Return the answers under changed assumptions."""
-        verifier = replace(
-            self.verifier("robustness", self._at_ratios_of(free.chosen)), units=self.effort.stiffness_units
-        )
+        verifier = self.verifier("robustness", self._at_ratios_of(free.chosen)).dividing_as(free.chosen)
+        verifier = replace(verifier, units=self.effort.stiffness_units)
         seeds = self.seeds("robustness")
         return robustness(verifier, free, self._changed_models(seeds), seeds, self.effort.changed_costs)
 

@@ -16,8 +16,9 @@ from tolalloc.allocation.search.candidates import Candidates
 from tolalloc.allocation.search.discrete import GradedAllocation
 from tolalloc.allocation.search.zone_allocation import ModelRange, ZoneAllocation, model_range
 from tolalloc.allocation.space.design_space import DesignSpace
+from tolalloc.allocation.space.joint_yield import JointRequirement
 from tolalloc.allocation.space.problem import OneSidedConstraint, Solution
-from tolalloc.allocation.space.requirement import AtYield, Check, JointRequirement, Requirement
+from tolalloc.allocation.space.requirement import AtYield, Check, Requirement
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.capability.monte_carlo import Yield
 from tolalloc.drawings.drawing import Drawing

@@ -11,7 +11,8 @@ from functools import cached_property
 from tolalloc.allocation.cost.process_costs import ProcessesOfSources, currency_of_costs, load_process_costs, priced
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import AllocationEffort
-from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, JointRequirement, Requirement
+from tolalloc.allocation.space.joint_yield import JointRequirement
+from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, Requirement
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.model import HasCopies, Model
@@ -19,7 +20,7 @@ from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.running.chunks import Mapper
 from tolalloc.running.progress import RunRecord
-from tolalloc.study.problem import Limit, Problem
+from tolalloc.study.problem import COMMON, Limit, Problem
 
 _SHARED = "Rows without a group are one line where identical parts have the same zone, limits and price: {lines}."
 """What is said of the lines that `Prepared.errors` made, with the number of rows of each."""
@@ -109,20 +110,33 @@ class Prepared:
             )
         if not asked:
             raise InputError(f"{self.place}: every limit is None; limit one output at least, the leading one first.")
+        own_joint = self.study.joint if isinstance(self.study.joint, AtYield) else None
         own = {
             name: Limit(upper=upper) for name, upper in self.model.own_limits.items() if name not in self.study.limits
         }
         return tuple(
-            Requirement(output=name, limits=limit.limits, guarantee=limit.show or self.study.joint or limit.guarantee)
+            Requirement(output=name, limits=limit.limits, guarantee=limit.show or own_joint or limit.guarantee)
             for name, limit in {**asked, **own}.items()
         )
 
     @property
+    def joint(self) -> AtYield | None:
+        """What all limits at once must be shown for, unless told otherwise the one yield that all of them ask for.
+
+        A limit that the model has of its own, which nobody wrote, is kept at once with them and has no say in it.
+        """
+        if self.study.joint != COMMON:
+            return self.study.joint
+        stated = [limit.guarantee for limit in self.study.limits.values() if limit is not None]
+        first = stated[0]
+        return first if isinstance(first, AtYield) and all(own == first for own in stated) else None
+
+    @property
     def requirements_with_joint(self) -> tuple[Requirement, ...]:
         """What the study limits, and last that a share of the units keeps all limits at once, if it asks for that."""
-        if self.study.joint is None or len(self.requirements) == 1:
+        if len(self.requirements) == 1 or self.joint is None:
             return self.requirements
-        return (*self.requirements, JointRequirement.of(self.requirements, self.study.joint))
+        return (*self.requirements, JointRequirement.of(self.requirements, self.joint))
 
     @property
     def target(self) -> float:

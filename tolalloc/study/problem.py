@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from tolalloc.drawings.drawing import Drawing
     from tolalloc.models.model import ModelSource
 
+COMMON: Literal["common"] = "common"
+"""What is asked of all limits at once is what each of them asks for, where that is one yield."""
 _TITLE_BLOCK = ("drawing number", "revision", "author")
 _TITLES = ", ".join(_TITLE_BLOCK)
 _LONGEST_TEXT = 60
@@ -140,8 +142,9 @@ class Problem(NamedFields):
         Name of an output with its unit → `Limit`; the first one is the leading output, which fronts and prices follow.
         None lifts a limit that the model has of its own: no unit of a reducer may be preloaded, `PRELOAD`.
     joint
-        Share of units that must keep all limits at once, ``AtYield(target=…)``; a limit that says nothing else of its
-        own need only be kept by them.
+        Share of units that must keep all limits at once. ``"common"``: the yield that all limits ask for, each alone
+        where they ask for different things. ``AtYield(target=…)``: that yield; a limit that says nothing else of its
+        own need only be kept by them. None: each limit alone.
     name
         Name of the study and of its run folder.
     seed
@@ -164,7 +167,10 @@ class Problem(NamedFields):
         Mapping[str, Limit | None],
         mapped("a dictionary of outputs and their ta.Limit(...)", Rule("", lambda _: True)),
     ] = field(default_factory=dict)
-    joint: Annotated[AtYield | None, or_none(a(AtYield, "ta.AtYield(...) or None"))] = None
+    joint: Annotated[
+        AtYield | Literal["common"] | None,
+        Rule("ta.AtYield(...), 'common' or None", lambda given: given in (COMMON, None) or isinstance(given, AtYield)),
+    ] = COMMON
     name: Annotated[
         str, Rule("100 letters, digits, '_', '-', '.' and blanks, or less", lambda name: _is_name(name))
     ] = "study"

@@ -75,8 +75,9 @@ class Study(Problem):
         Name of an output with its unit → `Limit`; the first one is the leading output, which fronts and prices follow.
         None lifts a limit that the model has of its own: no unit of a reducer may be preloaded, `PRELOAD`.
     joint
-        Share of units that must keep all limits at once, ``AtYield(target=…)``; a limit that says nothing else of its
-        own need only be kept by them.
+        Share of units that must keep all limits at once. ``"common"``: the yield that all limits ask for, each alone
+        where they ask for different things. ``AtYield(target=…)``: that yield; a limit that says nothing else of its
+        own need only be kept by them. None: each limit alone.
     questions
         What is asked, in the order of the report.
     name

@@ -166,7 +166,7 @@ class NextCandidate:
         if design is None or tested.space.cost(design) > worth:
             return None
         space = self.space if kind == FREE else tested.space
-        return kind, self.verifier(space).verify(design, f"attempt {spending.number}")
+        return kind, self.verifier(space).dividing_as(tested).verify(design, f"attempt {spending.number}")
 
     def _errors_inside(self, tested: VerifiedDesign, spending: AlphaSpending, worth: float) -> float:
         """Return how far inside what must be shown the next design is aimed [standard errors of both samples]."""
@@ -184,7 +184,7 @@ def _still_kept(tried: tuple[VerifiedDesign, ...], tested: VerifiedDesign) -> tu
     """
     return tuple(
         own
-        for own in tried
+        for own in (own.divided(tested.parts) for own in tried)
         if own.met
         and own.cost > tested.cost
         and all(

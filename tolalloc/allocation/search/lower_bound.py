@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.search import process_choice
+from tolalloc.allocation.space.joint_yield import JointRequirement
 from tolalloc.allocation.space.output_sample import LimitedSample
 from tolalloc.allocation.space.problem import OneSidedConstraint, Solution, Stack, root_sum_square_stack
 from tolalloc.allocation.space.requirement import Check, QuantileBound, RootSumSquare, Sampled
@@ -112,7 +113,7 @@ def _is_certified(design: VerifiedDesign) -> bool:
     shared = design.space.shared
     if np.any(shared.upper > shared.lower):
         return False
-    return all(_is_exact(check, design) for check in design.checks)
+    return all(_is_exact(check, design) for check in _alone(design))
 
 
 def _is_exact(check: Check, design: VerifiedDesign) -> bool:
@@ -131,9 +132,9 @@ def _is_exact(check: Check, design: VerifiedDesign) -> bool:
 
 def _weaker(design: VerifiedDesign) -> list[tuple[OneSidedConstraint, Stack]]:
     """Return every one-sided constraint with the stack that a design keeps that keeps the limit, the error counted."""
-    constraints = len(design.constraints)
+    constraints = sum(len(check.constraints) for check in _alone(design))
     found = []
-    for check in design.checks:
+    for check in _alone(design):
         bounds: tuple[QuantileBound, ...] = ()
         if isinstance(check.requirement.guarantee, Sampled):
             confidence = 1 - (1 - CONFIDENCE) / (2 * constraints)  # the other half is that of the derivatives
@@ -145,6 +146,11 @@ def _weaker(design: VerifiedDesign) -> list[tuple[OneSidedConstraint, Stack]]:
                 budget = load - excess + _ROUNDING * (abs(load) + abs(excess))
                 found.append((constraint, replace(_touching(constraint, design), budget=budget)))
     return found
+
+
+def _alone(design: VerifiedDesign) -> tuple[Check, ...]:
+    """Return the checks of every limit alone: what keeps all of them at once keeps each of them."""
+    return tuple(check for check in design.checks if not isinstance(check.requirement, JointRequirement))
 
 
 def _sample(design: VerifiedDesign, check: Check) -> LimitedSample:
@@ -183,4 +189,4 @@ def _derivative_error(
         loads = [float(own.load(each[:groups], each[groups:])) for each in (other, design.design)]
         changes.append(loads[0] - loads[1])
     error = float(np.std(changes, ddof=1)) / np.sqrt(len(changes)) if len(changes) > 1 else 0.0
-    return float(norm.ppf(1 - (1 - CONFIDENCE) / (2 * len(design.constraints)))) * error
+    return float(norm.ppf(1 - (1 - CONFIDENCE) / (2 * sum(len(check.constraints) for check in _alone(design))))) * error

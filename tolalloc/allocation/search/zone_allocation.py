@@ -68,8 +68,8 @@ class Programs:
         processes: Int[np.ndarray, " group"],
         around: Float[np.ndarray, " variable"],
         reach: float,
-    ) -> Float[np.ndarray, " variable"]:
-        """Return the cheapest design near another one, or the one there that violates the stacks least.
+    ) -> tuple[Float[np.ndarray, " variable"], Float[np.ndarray, " stack"]]:
+        """Return the cheapest design near another one, or the one there that violates the stacks least; with prices.
 
         Parameters
         ----------
@@ -81,6 +81,12 @@ class Programs:
             A design.
         reach
             Factor by which variables may change, as far as their ranges go [-].
+
+        Returns
+        -------
+        tuple
+            The design, and the shadow price of every stack, zero where the stacks are violated [cost units per unit of
+            the stack].
         """
         program, groups, shared = self.of(processes), len(self.space.groups), self.space.shared
         low, high = (np.clip(around[:groups] * by, program.lower, program.upper) for by in (1 / reach, reach))
@@ -92,7 +98,8 @@ class Programs:
             upper=np.minimum(shared.upper, centre + size * (reach - 1)),
         )
         found = program.solve(stacks, low, high, near) or program.least_infeasible(stacks, low, high, near)
-        return np.concatenate([found.zones, found.shared])
+        prices = found.prices if isinstance(found, Solution) else np.zeros(len(stacks))
+        return np.concatenate([found.zones, found.shared]), prices
 
 
 _LEAST_RISE = 1e-6
@@ -124,7 +131,7 @@ def scale_in_proportion(verifier: Verifier, steps: int) -> tuple[VerifiedDesign,
     tried: list[VerifiedDesign] = []
     for step in range(steps):
         # The stream of random units keeps the name that it had.
-        tried.append(verifier.verify(space.uniform(scale), f"by hand {step + 1}"))
+        tried.append(verifier.verify(space.uniform(scale), f"by hand {step + 1}").evenly_divided())
         factor = _factor(tried[-1])
         if tried[-1].met and factor < 1 + SETTLED:
             break
@@ -149,6 +156,8 @@ _REACH_OF_SETTINGS = 1.0
 """Difference of settings, over ten steps of theirs, up to which they do [-]."""
 _REPAIRS = 3
 """Steps more where the last design does not quite keep the limits and is cheaper than any that does [-]."""
+_DIVIDING_STEPS, _DIVISIONS = 2, 4
+"""Steps that divide the failures of a joint yield anew, and how many divisions each of them tries [-]."""
 _EXPLAINED = 2.0
 """Standard errors by which a verified value may be off its prediction for the region to keep its size [-]."""
 
@@ -183,7 +192,7 @@ def aimed(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float = 1.0
     >>> [stack.budget for stack in aimed(design, [design])]
     [5.0]
     """
-    similar = [item for item in tried if _is_similar(item, last)]
+    similar = [item.divided(last.parts) for item in tried if _is_similar(item, last)]
     stacks = []
     for at, constraint in enumerate(last.constraints):
         found = [
@@ -304,7 +313,7 @@ def step_from(
     processes = last.space.process_positions(last.design)
     return Programs(last.space, len(last.constraints)).step(
         aimed(last, [*tried, last], margin), processes, last.design, reach
-    )
+    )[0]
 
 
 def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach: float) -> tuple[VerifiedDesign, ...]:
@@ -323,6 +332,9 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
 
     Notes
     -----
+    Where all limits are kept at once, the failures that this allows are divided among the limits by what they cost, in
+    each of the first two steps.
+
     Where the units of a step are further from the prediction than chance explains, by more than two standard errors of
     both, the next step reaches less: the square root of the factor, 1.25 at least.
 
@@ -344,12 +356,14 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
     space, tried = verifier.space, [start]
     programs, processes = Programs(space, len(start.constraints)), space.process_positions(start.design)
     for step in range(steps + _REPAIRS):
-        last = tried[-1]
         if step >= steps and not _is_worth_mending(tried):
             break
-        stacks = aimed(last, tried)
-        processes = programs.choose(stacks, processes)
-        found = programs.step(stacks, processes, last.design, reach)
+        processes = programs.choose(aimed(tried[-1], tried), processes)
+        if step < _DIVIDING_STEPS:
+            tried[-1] = _divided(programs, tried, processes, reach)
+        last = tried[-1]
+        verifier = verifier.dividing_as(last)
+        found, _ = programs.step(aimed(last, tried), processes, last.design, reach)
         settled = space.cost(found) > (1 - SETTLED) * last.cost if last.met else np.allclose(found, last.design)
         if step > 0 and settled:
             break
@@ -357,6 +371,28 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
         if not _explains(last, tried[-1]):
             reach = max(1.25, float(np.sqrt(reach)))
     return tuple(tried[1:])
+
+
+def _divided(
+    programs: Programs, tried: list[VerifiedDesign], processes: Int[np.ndarray, " group"], reach: float
+) -> VerifiedDesign:
+    """Return the last design with the failures of a joint yield divided as its models find them cheapest.
+
+    A division that prices ask for is gone half-way to, then a quarter and so on where the program gets no cheaper: the
+    prices of limits that fail together tell nothing of how far to go.
+    """
+    last, way = tried[-1], 0.5
+    if len(last.parts) < 2:
+        return last
+    found, prices = programs.step(aimed(last, tried), processes, last.design, reach)
+    for _ in range(_DIVISIONS):
+        other = last.divided_towards(prices, way)
+        step, charged = programs.step(aimed(other, tried), processes, other.design, reach)
+        if prices.any() and charged.any() and last.space.cost(step) < last.space.cost(found):
+            last, found, prices = other, step, charged
+        else:
+            way /= 2
+    return last
 
 
 def _is_worth_mending(tried: list[VerifiedDesign]) -> bool:
@@ -438,10 +474,10 @@ class ZoneAllocation:
     @property
     def prices(self) -> dict[str, float]:
         """Limited side → cost saved per unit by which its limit is relaxed [cost units per unit of the output]."""
-        return {
-            constraint.stack.name: float(price)
-            for constraint, price in zip(self.chosen.constraints, self.optimum.prices, strict=True)
-        }
+        found: dict[str, float] = {}
+        for constraint, price in zip(self.chosen.constraints, self.optimum.prices, strict=True):
+            found[constraint.stack.name] = found.get(constraint.stack.name, 0.0) + float(price)
+        return found
 
     @property
     def saving(self) -> float:
@@ -454,7 +490,7 @@ class ZoneAllocation:
 
         The quantile grows nearly in proportion to a common scale of all zones, and the cost falls with it.
         """
-        unused = min(1.0, self.proportional.quantile_bound / self.limit)
+        unused = min(1.0, self.proportional.constraints[0].value / self.limit)
         return 1 - self.chosen.cost / (self.proportional.cost * unused)
 
 
@@ -522,9 +558,9 @@ def allocate(
     """
     first, space = start or cheapest_met(proportional_tried), verifier.space
     # Proportional scaling has no bounds; a start that keeps them is an answer like any other.
-    tried = ((first,) if space.allows(first.design) else ()) + step_to_optimum(
-        verifier, first, effort.steps, effort.reach
-    )
+    stepped = step_to_optimum(verifier, first, effort.steps, effort.reach)
+    tried = ((first,) if space.allows(first.design) else ()) + stepped
+    tried = tuple(own.divided(stepped[-1].parts) for own in tried)
     chosen = cheapest_met(tried)
     return ZoneAllocation(
         limit=verifier.limit,

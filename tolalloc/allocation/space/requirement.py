@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Annotated, ClassVar, Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -257,7 +256,7 @@ class AtYield(NamedFields):
 
     def constraints(self, sample: OutputSample, limits: Limits) -> tuple[OneSidedConstraint, ...]:
         """Return every one-sided constraint, the upper one first."""
-        return _spread_constraints(sample, self.bounds(sample.limited(limits), sample.confidence), limits)
+        return spread_constraints(sample, self.bounds(sample.limited(limits), sample.confidence), limits)
 
     def bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what units show of every limit, or what its law does where they keep to it."""
@@ -328,7 +327,7 @@ class AtCpk(NamedFields):
 
     def constraints(self, sample: OutputSample, limits: Limits) -> tuple[OneSidedConstraint, ...]:
         """Return every one-sided constraint, the upper one first."""
-        return _spread_constraints(sample, self.bounds(sample.limited(limits), sample.confidence), limits)
+        return spread_constraints(sample, self.bounds(sample.limited(limits), sample.confidence), limits)
 
     def bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what units show of every limit."""
@@ -365,10 +364,10 @@ class AtCpk(NamedFields):
         return float(needed), float(np.sqrt(variance))
 
 
-def _spread_constraints(
+def spread_constraints(
     sample: OutputSample, bounds: tuple[QuantileBound, ...], limits: Limits
 ) -> tuple[OneSidedConstraint, ...]:
-    """Return the constraints of what spreads, each with its local model."""
+    """Return the constraints of what spreads at what is compared with the limits, each with its local model."""
     return tuple(_spread_constraint(sample, bound, limits) for bound in bounds)
 
 
@@ -503,10 +502,6 @@ def _left(distance: float, locked: float) -> float:
     return float(np.sqrt(max(distance**2 - locked**2, 0.0))) if distance > locked else distance - locked
 
 
-JOINT = "largest excess over all limits [-]"
-"""What a yield of all limits at once limits: the excess over a limit, relative to it, below zero in a good unit."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Requirement:
     """Limits of an output and what must be shown of them."""
@@ -541,87 +536,18 @@ class Requirement:
 
 
 @dataclass(frozen=True, kw_only=True)
-class JointRequirement(Requirement):
-    """The limits of several requirements, which so many units keep all at once.
-
-    Notes
-    -----
-    What is limited is the largest excess of a unit over any limit, relative to the limit, which is at most zero in a
-    good unit. Its derivative is that of the limit that is exceeded most.
-    """
-
-    requirements: tuple[Requirement, ...]  # Whose limits must be kept at once
-
-    @classmethod
-    def of(cls, requirements: tuple[Requirement, ...], shown: AtYield) -> JointRequirement:
-        """Return the requirement that a share of the units keeps the limits of all others."""
-        return cls(output=JOINT, limits=Limits(upper=0.0), guarantee=shown, requirements=requirements)
-
-    @property
-    def sentence(self) -> str:
-        """The requirement in words."""
-        return f"all limits at once, shown for {self.guarantee.words}"
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names of the outputs of the model that it reads."""
-        return tuple(own.output for own in self.requirements)
-
-    def read(self, values: Mapping[str, Float[np.ndarray, " unit"]]) -> Float[np.ndarray, " unit"]:
-        """Return the largest excess of every unit [-]."""
-        return np.asarray(self.excesses(values).max(axis=0))
-
-    def excesses(self, values: Mapping[str, Float[np.ndarray, " unit"]]) -> Float[np.ndarray, "side unit"]:
-        """Return how far every unit lies beyond every limit, relative to it [-]."""
-        return np.array(
-            [
-                sign * (values[own.output] - limit) / (abs(limit) or 1.0)
-                for own in self.requirements
-                for sign, limit in own.limits.turned
-            ]
-        )
-
-    def sample(self, units: DesignSample, confidence: float) -> OutputSample:
-        """Return what units say of it."""
-        return JointSample(units=units, output=self.output, confidence=confidence, requirement=self)
-
-
-@dataclass(frozen=True, kw_only=True)
-class JointSample(OutputSample):
-    """What random units of a design say of all limits at once."""
-
-    requirement: JointRequirement  # The limits
-
-    @cached_property
-    def values(self) -> Float[np.ndarray, " good"]:
-        """The largest excess of the units that have all outputs [-]."""
-        found = self.requirement.read({own: self.units.values(own) for own in self.requirement.outputs})
-        return np.asarray(found[np.isfinite(found)])
-
-    def derived(self) -> tuple[Float[np.ndarray, " known"], Float[np.ndarray, "known variable"]]:
-        """Return the largest excess of some units and its derivative by every variable [-]."""
-        first = {own: self.units.of_first(own) for own in self.requirement.outputs}
-        units = min(values.size for values, _ in first.values())
-        excesses = self.requirement.excesses({own: values[:units] for own, (values, _) in first.items()})
-        slopes = np.array(
-            [
-                sign * first[own.output][1][:units] / (abs(limit) or 1.0)
-                for own in self.requirement.requirements
-                for sign, limit in own.limits.turned
-            ]
-        )
-        known = np.isfinite(excesses).all(axis=0) & np.isfinite(slopes).all(axis=(0, 2))
-        nearest = excesses[:, known].argmax(axis=0)
-        at = np.arange(nearest.size)
-        return excesses[:, known][nearest, at], slopes[:, known][nearest, at]
-
-
-@dataclass(frozen=True, kw_only=True)
 class Check:
     """How a verified design stands against one requirement."""
 
     requirement: Requirement  # The requirement
     constraints: tuple[OneSidedConstraint, ...]  # One for each of its limits, the upper one first
+    # What a search keeps in their place, where more is asked of all requirements at once than of each alone
+    tightened: tuple[OneSidedConstraint, ...] | None = None
+
+    @property
+    def steering(self) -> tuple[OneSidedConstraint, ...]:
+        """The constraints that a search keeps."""
+        return self.constraints if self.tightened is None else self.tightened
 
     @property
     def met(self) -> bool:

@@ -10,8 +10,9 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.space.design_space import DesignSpace
+from tolalloc.allocation.space.joint_yield import JointRequirement, tightened
 from tolalloc.allocation.space.problem import OneSidedConstraint
-from tolalloc.allocation.space.requirement import AtYield, Check, QuantileBound, Sampled
+from tolalloc.allocation.space.requirement import AtYield, Check, QuantileBound, Requirement, Sampled
 from tolalloc.allocation.verify.independent_sample import IndependentSample, Screen, SolvedPart, UnitSolver
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
@@ -283,7 +284,9 @@ class AcceptanceTest:
         if self.model.is_fast or len(design.laws) == len(design.checks):
             return None
         with one_blas_thread():  # the same units are near for any number of threads
-            requirements = tuple(check.requirement for check in design.checks)
+            # A unit fails one limit at least if it fails all limits at once.
+            own = (check.requirement for check in design.checks)
+            requirements = tuple(own for own in own if not isinstance(own, JointRequirement))
             return Screen.through(requirements, design.outputs, design.sample.redraw)
 
     def _planned(self, design: VerifiedDesign, screen: Screen | None, spending: AlphaSpending) -> Drawn:
@@ -349,12 +352,30 @@ def _checks(design: VerifiedDesign, independent: IndependentSample, confidence: 
     found = []
     for check in design.checks:
         bounds = _bounds(design, check, independent, confidence)
-        values = check.requirement.read(independent.outputs)
-        good = values[np.isfinite(values)]
-        constraints = zip(check.constraints, bounds, strict=True) if bounds else ()
-        moved = tuple(_moved(own, bound, design, bound.turned(good)) for own, bound in constraints)
-        found.append(replace(check, constraints=moved) if bounds else check)
-    return tuple(found)
+        found.append(
+            replace(check, constraints=_read(design, check.requirement, check.constraints, bounds, independent))
+            if bounds
+            else check
+        )
+    return tightened(
+        tuple(found),
+        lambda requirement: independent.limited(requirement, design.laws.get(requirement.output)),
+        confidence,
+        lambda check, bounds, _: _read(design, check.requirement, check.steering[-len(bounds) :], bounds, independent),
+    )
+
+
+def _read(
+    design: VerifiedDesign,
+    requirement: Requirement,
+    sides: tuple[OneSidedConstraint, ...],
+    bounds: tuple[QuantileBound, ...],
+    independent: IndependentSample,
+) -> tuple[OneSidedConstraint, ...]:
+    """Return the constraints of a requirement at other values of what is compared with the limits."""
+    values = requirement.read(independent.outputs)
+    good = values[np.isfinite(values)]
+    return tuple(_moved(own, bound, design, bound.turned(good)) for own, bound in zip(sides, bounds, strict=True))
 
 
 def _bounds(

@@ -9,9 +9,10 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.space.design_space import DesignSpace
+from tolalloc.allocation.space.joint_yield import JointCheck, divided, limited_by, tightened
 from tolalloc.allocation.space.output_sample import DesignSample
 from tolalloc.allocation.space.problem import OneSidedConstraint
-from tolalloc.allocation.space.requirement import Check, Guarantee, Requirement, RootSumSquare
+from tolalloc.allocation.space.requirement import Check, Guarantee, Requirement, RootSumSquare, spread_constraints
 from tolalloc.allocation.verify.independent_sample import IndependentSample
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.capability.indices import Limits
@@ -83,8 +84,13 @@ class VerifiedDesign:
 
     @property
     def constraints(self) -> tuple[OneSidedConstraint, ...]:
-        """One-sided constraints of all requirements."""
-        return tuple(constraint for check in self.checks for constraint in check.constraints)
+        """One-sided constraints that a search keeps: of all requirements, tightened where they are kept at once."""
+        return tuple(constraint for check in self.checks for constraint in check.steering)
+
+    @property
+    def limited_sides(self) -> tuple[tuple[Check, OneSidedConstraint], ...]:
+        """Every limited side as its requirement asks for it, with the requirement's check."""
+        return tuple((check, constraint) for check in self.checks for constraint in check.constraints)
 
     @property
     def laws(self) -> dict[str, LinearLaw]:
@@ -116,9 +122,35 @@ class VerifiedDesign:
 
     @property
     def spread(self) -> float:
-        """Distance of that from the mean of the sample over its standard deviation [-]."""
+        """Distance of what a search compares with its limit from the mean, over the standard deviation [-]."""
         values = self.sample.values
-        return float((self.quantile_bound - values.mean()) / values.std(ddof=1))
+        return float((self.constraints[0].value - values.mean()) / values.std(ddof=1))
+
+    @property
+    def jointly(self) -> JointCheck | None:
+        """How the design stands against all limits at once, none where that was not asked."""
+        last = self.checks[-1]
+        return last if isinstance(last, JointCheck) else None
+
+    @property
+    def parts(self) -> tuple[float, ...]:
+        """Parts of the failures that a joint yield allows, one for each limited output; none without one [-]."""
+        return self.jointly.joint.parts if self.jointly else ()
+
+    def divided(self, parts: tuple[float, ...]) -> VerifiedDesign:
+        """Return the design with those failures in other parts, as far as its tails tell."""
+        return self if parts == self.parts else replace(self, checks=divided(self.checks, parts))
+
+    def evenly_divided(self) -> VerifiedDesign:
+        """Return the design with those failures divided as often as each limit fails."""
+        return self.divided(self.jointly.parts_as_failing()) if self.jointly else self
+
+    def divided_towards(self, prices: Float[np.ndarray, " side"], way: float) -> VerifiedDesign:
+        """Return the design with those failures divided nearer to what the prices of its constraints ask for."""
+        if self.jointly is None:
+            return self
+        sides = tuple(len(check.steering) for check in self.checks[:-1])
+        return self.divided(self.jointly.parts_towards(sides, prices, way))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,6 +183,10 @@ class Verifier:
         limits = self.requirements[0].limits
         return float(limits.upper if limits.upper is not None else limits.lower or 0.0)
 
+    def dividing_as(self, design: VerifiedDesign) -> Verifier:
+        """Return the verifier that divides the failures which a joint yield allows as a design does."""
+        return replace(self, requirements=tuple(check.requirement for check in design.checks))
+
     def verify(self, design: Float[np.ndarray, " variable"], name: str) -> VerifiedDesign:
         """Return the design with what random units of its own say of it.
 
@@ -173,8 +209,12 @@ class Verifier:
         )
         for own in sample.samples:
             require_few_failures(own, name, self.largest_failed_share)
-        checks = tuple(
-            requirement.check(requirement.sample(sample, self.confidence)) for requirement in self.requirements
+        read = tuple(requirement.sample(sample, self.confidence) for requirement in self.requirements)
+        checks = tightened(
+            tuple(requirement.check(own) for requirement, own in zip(self.requirements, read, strict=True)),
+            limited_by(sample),
+            self.confidence,
+            lambda check, bounds, at: spread_constraints(read[at], bounds, check.requirement.limits),
         )
         values = {output: sample.values(output) for output in outputs}
         kept = np.array([requirement.limits.kept_by(requirement.read(values)) for requirement in self.requirements])

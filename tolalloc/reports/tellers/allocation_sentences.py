@@ -8,8 +8,10 @@ from tolalloc.allocation.front.what_if import COST_CHANGE, SAME
 from tolalloc.allocation.result import AllocationResult, limit_price, unit_quantile
 from tolalloc.allocation.search.candidates import ALONE
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
-from tolalloc.allocation.space.requirement import AtYield
+from tolalloc.allocation.space.joint_yield import JointRequirement
+from tolalloc.allocation.space.requirement import AtYield, Guarantee
 from tolalloc.allocation.verify.verification import VerifiedDesign
+from tolalloc.capability.monte_carlo import Yield
 from tolalloc.reports.feature_frame import callout_assumptions
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import Examination, portrait_of
@@ -59,27 +61,16 @@ def title(result: AllocationResult, header: Header) -> str:
 
 
 def verdict(result: AllocationResult) -> tuple[str, ...]:
-    """Return why the drawing cannot be built, if so, and how many units keep the leading limit."""
-    achieved, fault = result.chosen.achieved, examined(result).fault
-    met = _say(
-        "met",
-        verdict=_say("verdict_met" if result.met else "verdict_missed"),
-        share=achieved.estimate,
-        units=achieved.units,
-        simulated=portrait_of(result.model).simulated,
-        stay=_stay(result),
-        required=_required(result),
-        low=100 * achieved.low,
-        high=achieved.high,
-    )
-    return (fault, met) if fault else (met,)
+    """Return why the drawing cannot be built, if so, and how many units keep its limits."""
+    fault = examined(result).fault
+    return (fault, _verdict(result)) if fault else (_verdict(result),)
 
 
 def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     """Return the answer in sentences; the first ones stand in the headline of a report."""
     chosen = result.chosen
     found = [*verdict(result), *drawn_amounts(result), _cost(result, cost_unit)]
-    if len(result.requirements) > 1:
+    if len(result.requirements) > 1 and not chosen.jointly:
         found.append(_say("all_limits", share=chosen.joint.estimate))
     if result.met and result.error < _EVEN_ODDS:
         found.append(_say("error", error=result.error))
@@ -93,6 +84,27 @@ def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
         *_good_unit(result, cost_unit),
         *_settled(result),
         *portrait_of(result.model.at(chosen.settings)).remarks,
+    )
+
+
+def _verdict(result: AllocationResult) -> str:
+    """Return whether the drawing keeps its limits, and the yield that shows it: of all limits where that was asked."""
+    chosen, check = result.chosen, result.chosen.checks[0]
+    key, achieved, said = "met", chosen.achieved, {"stay": _stay(result)}
+    if chosen.jointly:
+        key, achieved, check = "met_jointly", chosen.joint, chosen.checks[-1]
+        alone = (_say("each", output=short(name), share=own.estimate) for name, own in result.yields.items())
+        said = {"each": "; ".join(alone)}
+    return _say(
+        key,
+        verdict=_say("verdict_met" if result.met else "verdict_missed"),
+        share=achieved.estimate,
+        units=achieved.units,
+        simulated=portrait_of(result.model).simulated,
+        required=_required(result, check.requirement.guarantee, achieved),
+        low=100 * achieved.low,
+        high=achieved.high,
+        **said,
     )
 
 
@@ -132,9 +144,8 @@ def _stay(result: AllocationResult) -> str:
     return _say(key, lower=limits.lower, upper=upper)
 
 
-def _required(result: AllocationResult) -> str:
-    """Return what was required of the leading output."""
-    guarantee, achieved = result.requirements[0].guarantee, result.chosen.achieved
+def _required(result: AllocationResult, guarantee: Guarantee, achieved: Yield) -> str:
+    """Return what was required beside what was achieved."""
     if not isinstance(guarantee, AtYield):
         return _say("required_other", words=guarantee.words)
     near = result.met and achieved.estimate < guarantee.target <= achieved.high
@@ -173,6 +184,8 @@ def _solved(design: VerifiedDesign) -> tuple[str, ...]:
 def missed(design: VerifiedDesign) -> str:
     """Return which limit blocks a design that is not met, and by how much."""
     check, side = design.blocking, design.blocking.tightest
+    if isinstance(check.requirement, JointRequirement):
+        return _say("missed_jointly", share=design.joint.estimate, shown=check.requirement.guarantee.words)
     return _say(
         "missed" if np.isfinite(side.value) else "missed_unanswered",
         output=quantity(check.requirement.output),

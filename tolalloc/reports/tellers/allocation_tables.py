@@ -29,12 +29,12 @@ def requirements_table(result: AllocationResult) -> Table[_Limited]:
     """Return every limited side with what each design was shown to keep, and what the limit costs."""
 
     def price(row: _Limited) -> tuple[float, str]:
-        side, own = row[1], result.free.prices[row[1].stack.name]
+        side, own = row[1], result.free.prices.get(row[1].stack.name, 0.0)
         return limit_price(side, own if own * side.scale > solver_noise(result.free.optimum) else 0.0)
 
     def kept(label: str, design: VerifiedDesign) -> Column[_Limited]:
         header = f"kept: {label} [{unit}]"
-        return Column(header=header, value=lambda row: design.constraints[row[0]].value)
+        return Column(header=header, value=lambda row: design.limited_sides[row[0]][1].value)
 
     unit = " or ".join(dict.fromkeys(unit_of(own.output) for own in result.requirements))
     columns: list[Column[_Limited]] = [
@@ -45,6 +45,7 @@ def requirements_table(result: AllocationResult) -> Table[_Limited]:
             header=f"quantile of the units [{unit}]",
             value=lambda row: unit_quantile(result.chosen, row[2]),
         ),
+        Column(header="units within [%]", value=lambda row: 100 * result.chosen.yield_of(row[2].requirement).estimate),
         *(kept(label, design) for label, design in designs(result).items()),
         Column(header=f"slack [{unit}]", value=lambda row: -row[1].excess),
         Column(header=f"standard error of it [{unit}]", value=lambda row: row[1].standard_error),
@@ -52,11 +53,7 @@ def requirements_table(result: AllocationResult) -> Table[_Limited]:
         Column(header="for each", value=lambda row: price(row)[1]),
         Column(header="OK", value=lambda row: "yes" if row[1].excess <= 0 else "no"),
     ]
-    checks = result.chosen.checks
-    rows = [
-        (number, side, next(check for check in checks if side in check.constraints))
-        for number, side in enumerate(result.chosen.constraints)
-    ]
+    rows = [(number, side, check) for number, (check, side) in enumerate(result.chosen.limited_sides)]
     return Table(name="requirements", columns=columns, rows=rows)
 
 
