@@ -12,6 +12,10 @@ import pytest
 import tolalloc as ta
 from tests.studies.command import tolalloc
 from tests.studies.scripts import study_script
+from tolalloc.allocation.space.requirement import Requirement
+from tolalloc.allocation.verify.verification import Verifier
+from tolalloc.capability.indices import Limits
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.reducers.choice import ReducerChoice
 from tolalloc.reducers.equivalent.perfect import preload, rated_pin_force
@@ -34,6 +38,27 @@ def test_no_pin_may_press_harder_without_torque_than_the_rated_torque_makes_it()
     assert preloaded.limits.upper == rated_pin_force(asked.model.reducer)
     # Printed stiffnesses are fifty times a catalogue's; what presses with them means nothing.
     assert [own.output for own in prepared("rv20e_liu2020").requirements] == [ta.PEAK_TO_PEAK]
+
+
+def test_every_design_is_held_to_the_pin_force_at_its_own_modification():
+    """And its model says how the distance from the limit changes with the clearances."""
+    reducer = ta.reducer("rv20e", flank_clearance=(1.0, 8.0), radial_clearance=(3.0, 30.0))
+    asked = Prepared(study=ta.Study(reducer, ta.drawing("rv20e_drawing"), limits=LIMITS, joint=None))
+    model, space, settings = asked.model, asked.space, np.array([6.0, 20.0])
+    shown = tuple(replace(own, guarantee=ta.AtYield(0.9)) for own in asked.requirements)
+    verifier = Verifier(space=space, model=model, requirements=shown, seeds=SeedTree(1), units=64, confidence=0.5)
+    design = verifier.verify(np.append(np.ones(len(space.groups)), settings), "other teeth")
+    (limited,) = design.checks[-1].constraints
+    force = rated_pin_force(model.at(settings).reducer_in_force)
+    assert limited.limit == force
+    assert abs(force - rated_pin_force(model.reducer)) > 100.0
+    fixed = Requirement(output=ta.PRELOAD, limits=Limits(upper=force), guarantee=ta.AtYield(0.9))
+    other = replace(verifier, requirements=(shown[0], fixed)).verify(design.design, "other teeth")
+    (stated,) = other.checks[-1].constraints
+    step = space.setting_steps[1]
+    ends = [rated_pin_force(model.at(settings + np.array([0.0, way * step])).reducer_in_force) for way in (-1, 1)]
+    slopes = [own.stack.slopes[1] for own in (limited, stated)]
+    assert slopes[0] - slopes[1] == pytest.approx(-(ends[1] - ends[0]) / (2 * step))
 
 
 def test_a_study_may_say_otherwise():

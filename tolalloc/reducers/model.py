@@ -335,8 +335,8 @@ class ReducerModel(Model):
 
     @cached_property
     def rated_pin_force(self) -> float:
-        """Largest pin force of the perfect reducer under its rated torque [N]."""
-        return rated_pin_force(self.reducer)
+        """Largest pin force of the perfect reducer with the modification in force under its rated torque [N]."""
+        return rated_pin_force(self.reducer_in_force)
 
     def examined(self, x: Float[np.ndarray, "sample column"]) -> Mapping[str, float]:
         """Return how many random units are preloaded or have no radial clearance, by how much, and what turns them.

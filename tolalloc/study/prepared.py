@@ -12,7 +12,7 @@ from tolalloc.allocation.cost.process_costs import ProcessesOfSources, currency_
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import AllocationEffort
 from tolalloc.allocation.space.joint_yield import JointRequirement
-from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, Requirement
+from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, OwnLimit, Requirement
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.model import HasCopies, Model
@@ -115,7 +115,9 @@ class Prepared:
             name: Limit(upper=upper) for name, upper in self.model.own_limits.items() if name not in self.study.limits
         }
         return tuple(
-            Requirement(output=name, limits=limit.limits, guarantee=limit.show or own_joint or limit.guarantee)
+            (Requirement if name in asked else OwnLimit)(
+                output=name, limits=limit.limits, guarantee=limit.show or own_joint or limit.guarantee
+            )
             for name, limit in {**asked, **own}.items()
         )
 

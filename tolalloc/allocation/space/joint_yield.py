@@ -13,6 +13,7 @@ from tolalloc.allocation.space.problem import OneSidedConstraint, Stack
 from tolalloc.allocation.space.requirement import AtYield, Check, QuantileBound, Requirement
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.near_limit import largest_first
+from tolalloc.models.model import Model
 
 JOINT = "largest excess over all limits [-]"
 """What a yield of all limits at once limits: the excess over a limit, relative to it, below zero in a good unit."""
@@ -82,6 +83,12 @@ class JointRequirement(Requirement):
             for sign, limit in own.limits.turned
         ]
         return np.asarray(np.max(excesses, axis=0))
+
+    def at(
+        self, model: Model, settings: Float[np.ndarray, " setting"], steps: Float[np.ndarray, " setting"]
+    ) -> JointRequirement:
+        """Return the requirement with every limit as it is at settings of a model."""
+        return replace(self, requirements=tuple(own.at(model, settings, steps) for own in self.requirements))
 
     def check(self, sample: OutputSample) -> Check:
         """Return whether all limits are kept at once; the search is steered by the limits."""

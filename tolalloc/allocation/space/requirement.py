@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -16,6 +16,7 @@ from tolalloc.capability.linear_function import LinearLaw
 from tolalloc.capability.monte_carlo import CONFIDENCE, allowed_rejections
 from tolalloc.capability.near_limit import largest_first
 from tolalloc.exceptions import InputError
+from tolalloc.models.model import Model
 from tolalloc.reading.named_fields import NamedFields, is_number, number
 
 USUAL_YIELD = 0.9973
@@ -530,9 +531,67 @@ class Requirement:
         """Return what units say of it."""
         return OutputSample(units=units, output=self.output, confidence=confidence)
 
+    def at(
+        self,
+        model: Model,  # noqa: ARG002
+        settings: Float[np.ndarray, " setting"],  # noqa: ARG002
+        steps: Float[np.ndarray, " setting"],  # noqa: ARG002
+    ) -> Requirement:
+        """Return the requirement as it is at settings of a model, with steps of differences; what is stated stays."""
+        return self
+
     def check(self, sample: OutputSample) -> Check:
         """Return how a design stands against the requirement."""
         return Check(requirement=self, constraints=self.guarantee.constraints(sample, self.limits))
+
+
+@dataclass(frozen=True, kw_only=True)
+class OwnLimit(Requirement):
+    """An upper limit that the model has of its own, such as the pin force of the rated torque, which its settings move.
+
+    Notes
+    -----
+    Every design is held to the limit at its own settings, solved there; the excess falls with a setting by the
+    derivative of the limit, of central differences.
+    """
+
+    slopes: tuple[
+        float, ...
+    ] = ()  # Change of the limit with every setting [unit of the output per unit of the setting]
+
+    def at(
+        self, model: Model, settings: Float[np.ndarray, " setting"], steps: Float[np.ndarray, " setting"]
+    ) -> OwnLimit:
+        """Return the requirement with the limit at other settings."""
+        if settings.size == 0:
+            return self
+
+        def limit(own: Float[np.ndarray, " setting"]) -> float:
+            return float(model.at(own).own_limits[self.output])
+
+        slopes = (
+            (limit(settings + step) - limit(settings - step)) / (2 * size)
+            for step, size in zip(np.diag(steps), steps.tolist(), strict=True)
+        )
+        return replace(self, limits=Limits(upper=limit(settings)), slopes=tuple(slopes))
+
+    def sample(self, units: DesignSample, confidence: float) -> OutputSample:
+        """Return what units say of the output above its limit."""
+        return _OfOwnLimit(units=units, output=self.output, confidence=confidence, slopes=self.slopes)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _OfOwnLimit(OutputSample):
+    """What units say of an output whose limit moves with the settings."""
+
+    slopes: tuple[float, ...]  # Of the limit [unit of the output per unit of the setting]
+
+    def derived(self) -> tuple[Float[np.ndarray, " known"], Float[np.ndarray, "known variable"]]:
+        """Return the output of some units and the derivative, by every variable, of its distance from the limit."""
+        values, slopes = self.units.derived(self.output)
+        moved = np.zeros(slopes.shape[1])
+        moved[self.groups : self.groups + len(self.slopes)] = self.slopes
+        return values, slopes - moved
 
 
 @dataclass(frozen=True, kw_only=True)

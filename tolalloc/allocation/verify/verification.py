@@ -196,7 +196,9 @@ class Verifier:
             More units failed.
         """
         seeds, errors = self.seeds.child(name), self.space.errors
-        outputs = tuple(dict.fromkeys(name for requirement in self.requirements for name in requirement.outputs))
+        settings = self.space.settings_of(design)
+        requirements = tuple(own.at(self.model, settings, self.space.setting_steps) for own in self.requirements)
+        outputs = tuple(dict.fromkeys(name for requirement in requirements for name in requirement.outputs))
         sample = DesignSample(
             space=self.space,
             model=self.model,
@@ -209,15 +211,15 @@ class Verifier:
         )
         for own in sample.samples:
             require_few_failures(own, name, self.largest_failed_share)
-        read = tuple(requirement.sample(sample, self.confidence) for requirement in self.requirements)
+        read = tuple(requirement.sample(sample, self.confidence) for requirement in requirements)
         checks = tightened(
-            tuple(requirement.check(own) for requirement, own in zip(self.requirements, read, strict=True)),
+            tuple(requirement.check(own) for requirement, own in zip(requirements, read, strict=True)),
             limited_by(sample),
             self.confidence,
             lambda check, bounds, at: spread_constraints(read[at], bounds, check.requirement.limits),
         )
         values = {output: sample.values(output) for output in outputs}
-        kept = np.array([requirement.limits.kept_by(requirement.read(values)) for requirement in self.requirements])
+        kept = np.array([requirement.limits.kept_by(requirement.read(values)) for requirement in requirements])
         return VerifiedDesign(
             name=name,
             space=self.space,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from math import pi
 
 import numpy as np
@@ -113,6 +114,7 @@ def preload(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) 
     )
 
 
+@lru_cache(maxsize=256)
 def rated_pin_force(reducer: Reducer) -> float:
     """Return the largest force of a pin of the perfect reducer under its rated torque [N].
 
