@@ -8,7 +8,6 @@ import subprocess
 from dataclasses import replace
 from math import exp, floor, sqrt
 
-import ezdxf
 import numpy as np
 import pytest
 from openpyxl import load_workbook
@@ -16,6 +15,7 @@ from typer.testing import CliRunner
 
 import tolalloc as ta
 from tests.builders import prepared, source
+from tests.sheets import cells, frames
 from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.cost.model import Combined, Exponential, Reciprocal, ReciprocalPower, SumOfCosts, Weighted
 from tolalloc.allocation.cost.points import Points, Spline, Tabulated
@@ -284,10 +284,8 @@ def test_every_line_of_the_drawing_states_the_one_verified_zone_of_its_members(d
         whole = 2e3 * stated if frame.characteristic == "size" else 1e3 * stated
         assert -1e-6 < zone - whole < 2e-2 + 1e-6
         assert frame.zone.lstrip("±⌀") == f"{stated:.5f}".rstrip("0").rstrip(".")
-    frames = ezdxf.readfile(folder / "frames.dxf")
-    shown = [entity.dxf.name for entity in frames.modelspace().query("INSERT")]
-    assert len(shown) == len(results.lines)
-    assert all(len(frames.blocks[name]) >= 1 for name in shown)
+    inspected = [row[0] for row in cells(folder / "frames.dxf", "TABLE") if row[1:2] and row[1] in ("Fp", "Fr")]
+    assert {*frames(folder / "frames.dxf"), *inspected} == {results.line_name(line) for line in results.lines}
 
 
 @pytest.mark.slow

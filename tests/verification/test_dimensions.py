@@ -97,7 +97,9 @@ def test_a_zone_is_written_in_hundredths_of_a_micrometre_and_never_wider(zone, t
     ("changes", "shown"),
     [
         ({"name": "disc1.bore1.position", "feature": Feature.POSITION}, "⌖ ⌀0.006 A"),
-        ({"name": "housing.runout", "feature": Feature.RUNOUT, "spectrum": ((1, 1.0),)}, "↗ 0.006 A"),
+        ({"name": "housing.runout", "feature": Feature.RUNOUT, "spectrum": ((1, 1.0),)}, "Fr 0.006"),
+        ({"name": "shaft", "feature": Feature.RUNOUT, "spectrum": ((1, 1.0),)}, "↗ 0.006 A"),
+        ({"name": "disc1.each_tooth.pitch"}, "±0.003"),
         ({"name": "housing.pitch", "feature": Feature.PITCH, "spectrum": ((1, 1.0),)}, "Fp 0.006"),
         ({"name": "pin.diameter"}, "±0.003"),
         ({"name": "pin.diameter", "middle": -2.26 * UM}, "+0.00074 / −0.00526"),
@@ -108,7 +110,7 @@ def test_a_zone_is_written_in_hundredths_of_a_micrometre_and_never_wider(zone, t
 def test_a_source_has_the_frame_of_its_feature(changes, shown):
     own = source(**changes)
     assert str(callout(own)) == shown
-    is_certain = own.name not in ("carrier.tilt", "sun.eccentricity")
+    is_certain = own.name not in ("carrier.tilt", "sun.eccentricity", "housing.runout", "housing.pitch")
     has_datum = shown.endswith(" A")  # no table names one
     assert len(callout_assumptions((own,))) == has_datum + (not is_certain)
 
@@ -116,14 +118,19 @@ def test_a_source_has_the_frame_of_its_feature(changes, shown):
 def test_every_source_of_the_shipped_tables_has_a_frame():
     sources = load_tolerance_table("rv20e_all_sources")
     frames = [callout(own) for own in sources if own.zone]
-    assert {frame.characteristic for frame in frames} == set(SYMBOLS)
+    assert {frame.characteristic for frame in frames} == set(SYMBOLS) - {"circular run-out"}
+
+
+def test_inspection_data_of_teeth_are_no_frames_of_iso_1101():
+    framed = {name for name in SYMBOLS if FeatureFrame(name, "0.01").is_framed}
+    assert framed == {"position", "coaxiality", "circular run-out", "parallelism"}
 
 
 @pytest.mark.parametrize("characteristic", SYMBOLS)
 def test_a_frame_is_drawn_with_a_box_for_every_cell(characteristic):
     frame = FeatureFrame(characteristic, "0.01", ("A", "B"), "10.04 µm")
     picture = svg_of(frame)
-    assert picture.count("<rect") == (0 if characteristic == "size" else len(frame.cells))
+    assert picture.count("<rect") == (len(frame.cells) if frame.is_framed else 0)
     assert ">0.01</text>" in picture and ">B</text>" in picture
     assert 'title="' in frame._repr_html_() and "10.04 µm" in frame._repr_html_()
 

@@ -14,10 +14,13 @@ from openpyxl import load_workbook
 
 import tolalloc as ta
 from tests.builders import says
+from tests.sheets import cells, frames, paragraphs
 from tolalloc.allocation.search.zone_allocation import REACH_OF_MODELS
 from tolalloc.allocation.space.effort import QUICK_ALLOCATION
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.reports.drawing_sheet import LAYERS
+from tolalloc.reports.feature_frame import callout
 from tolalloc.study.prepared import Prepared
 from tolalloc.study.problem import Effort
 
@@ -42,6 +45,7 @@ def gap(a, b, c, d, spring):
 
 def study(**changed) -> ta.Study:
     own = {"limits": {GAP: ta.Limit(lower=14.9, upper=15.15, show=ta.AtYield(0.9973))}, "name": "drawn", "seed": 1}
+    own["title_block"] = {"drawing number": "X-17"}
     setting = ta.Setting(name=SPRING, value=0.1, lower=-0.5, upper=0.5, step=0.01)
     return ta.Study(
         ta.model(gap, inputs=("a", "b", "c", "d"), outputs=(GAP,), settings=(setting,)),
@@ -173,13 +177,31 @@ def test_the_range_of_the_weights_is_about_the_verified_zones(answer, folder):
 def test_setting_and_sum_stand_in_workbook_and_frames(answer, folder):
     (value,) = answer.chosen.settings
     rows = list(load_workbook(folder / "drawing.xlsx")["settings"].iter_rows(values_only=True))
-    assert rows[0] == ("what", "value [unit]", "before [unit]", "unit")
-    assert rows[1] == ("spring", pytest.approx(value), pytest.approx(0.1), "mm")
+    assert rows[0] == ("what", "value [unit]", "before [unit]", "unit", "tolerance ± [µm]")
+    assert rows[1] == ("spring", pytest.approx(value), pytest.approx(0.1), "mm", None)
     printed = [str(row[0].value) for row in load_workbook(folder / "drawing.xlsx")["drawing"].iter_rows()]
     said = f"The drawing holds with these settings only: spring {value:.2f} mm".replace("-", "−")
     assert any(text.startswith(said) for text in printed)
-    texts = [own.dxf.text for own in readfile(folder / "frames.dxf").modelspace().query("TEXT")]
-    assert any(text.startswith(said) for text in texts)
+    assert any(text.startswith(said) for text in paragraphs(folder / "frames.dxf"))
+    assert ["spring", f"{value:.2f}".replace("-", "−"), "", "mm", ""] in cells(folder / "frames.dxf", "TABLE")
+
+
+def test_the_sheet_has_layers_and_a_title_block_that_invents_nothing(told, answer, folder):
+    drawing = readfile(folder / "frames.dxf")
+    assert not drawing.audit().has_errors
+    assert set(LAYERS) <= {layer.dxf.name for layer in drawing.layers}
+    used = {own.dxf.layer for own in drawing.modelspace()}
+    assert used == set(LAYERS) - {"SIGN_PICTURE"}  # an own function says nothing of grinding
+    fields = {text for row in cells(folder / "frames.dxf", "TITLE_BLOCK") for text in row}
+    assert {"drawing number X-17", "author", "revision", "material", "study drawn"} <= fields
+    assert f"study hash {told.header.digest[:12]}" in fields
+    shown = frames(folder / "frames.dxf")
+    assert shown == {answer.line_name(own): str(callout(own[1][0])) for own in answer.lines}
+
+
+def test_the_table_says_what_the_title_block_states(folder):
+    comments = [line for line in (folder / "allocation.csv").read_text("utf-8").splitlines() if line.startswith("# ")]
+    assert says(comments, "allocation.table_block", fields="drawing number X-17")
 
 
 def recalculated(path, tmp_path):

@@ -35,6 +35,16 @@ _ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
+class Amount:
+    """What must be made with the zones: an amount that a drawing states of the settings, or a setting itself."""
+
+    name: str  # With its unit
+    value: float  # On the drawing [unit of the name]
+    before: float  # In the tolerance table [unit of the name]
+    tolerance: float | None = None  # Half of the zone that the table states for it, if it does [m]
+
+
+@dataclass(frozen=True, kw_only=True)
 class AllocationResult:
     """The cheapest drawing that keeps every requirement.
 
@@ -185,6 +195,28 @@ class AllocationResult:
         """Return whether the process cost table knows a source; where it does not, no process was chosen."""
         alone = (today(source),)
         return self.space.processes.get(source.name, alone) != alone
+
+    @cached_property
+    def amounts(self) -> tuple[Amount, ...]:
+        """Amounts that are made with the zones, and the settings that they come from; none without settings."""
+        if not self.space.settings:
+            return ()
+        drawn, names = self.model.drawn_amounts, self.space.shared.names
+        value, before = (
+            {
+                **dict(zip(names, design.settings.tolist(), strict=True)),
+                **dict(zip(drawn.names, (drawn.by_setting @ design.settings).tolist(), strict=True)),
+            }
+            for design in (self.chosen, self.free.baseline)
+        )
+        zones = {own.name: own.zone for own in self.drawn_sources}
+        tolerances = {
+            name: zones.get(source, 0.0) / 2 for name, source in zip(drawn.names, drawn.sources, strict=False)
+        }
+        return tuple(
+            Amount(name=name, value=value[name], before=before[name], tolerance=tolerances.get(name) or None)
+            for name in dict.fromkeys([*drawn.names, *names])
+        )
 
     @cached_property
     def dimensions(self) -> dict[str, tuple[Source, ...]]:

@@ -1,12 +1,10 @@
-"""A tolerance as a drawing shows it: its frame with symbol, zone and datum, as text, as SVG and as DXF."""
+"""A tolerance as a drawing shows it: its frame with symbol, zone and datum, as text and as SVG."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from math import ceil, floor
-from pathlib import Path
 
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import PHASE, ROTATION, TILT, Feature
@@ -19,14 +17,19 @@ SYMBOLS = {
     "circular run-out": "↗",
     "parallelism": "∥",
     "cumulative pitch": "Fp",
+    "tooth run-out": "Fr",
+    "single tooth": "",
     "size": "",
 }
-"""Characteristic → its symbol of ISO 1101; the pitch has the letters of ISO 1328-1, a size has deviations alone."""
+"""Characteristic → its symbol of ISO 1101; pitch and run-out of teeth have the letters of ISO 1328, sizes and single
+teeth have deviations alone."""
+INSPECTED = ("cumulative pitch", "tooth run-out", "single tooth")
+"""Characteristics that are inspection data of a gear part, which stand in a table and in no frame."""
+_DEVIATIONS = ("size", "single tooth")
+"""Characteristics of which limit deviations are written."""
 
-_HEIGHT, _LETTER = 20.0, 9.0
+HEIGHT, _LETTER = 20.0, 9.0
 """Height of a frame and width of a letter in it [px]."""
-_SCALE = 7.0 / _HEIGHT
-"""Height of a frame on paper is 7 mm, for letters of 3.5 mm [mm/px]."""
 
 STEP = 0.01 * MICROMETRE
 """Finest step in which a drawing writes a zone [m]; an allocated zone has the step of its row already."""
@@ -47,6 +50,11 @@ _OF_ANGLE = {
     (Feature.SIZE, "phase"): PHASE,
 }
 """Feature and last part of the name of an angle that no reducer declares."""
+
+_TEETH = (
+    "Fp and Fr are named after ISO 1328, which is about involute gears: for cycloid discs and the ring of pins their "
+    "definitions are taken over, over one turn about axis A"
+)
 
 Lines = tuple[tuple[tuple[float, float], ...], ...]
 
@@ -82,6 +90,16 @@ class FeatureFrame:
         """What stands in the boxes of the frame, from the left."""
         return tuple(cell for cell in (self.symbol, self.zone, *self.datums) if cell)
 
+    @property
+    def is_framed(self) -> bool:
+        """Whether it is a frame of ISO 1101, and not limit deviations or inspection data of a gear part."""
+        return self.characteristic not in ("size", *INSPECTED)
+
+    @property
+    def is_deviation(self) -> bool:
+        """Whether limit deviations are written."""
+        return self.characteristic in _DEVIATIONS
+
     def __str__(self) -> str:
         return " ".join(self.cells)
 
@@ -103,6 +121,11 @@ class Frames(tuple[FeatureFrame, ...]):
 def _found(source: Source) -> tuple[str, str]:
     """Return the characteristic of a source, and what of it is assumed."""
     kind = RV.sources.of(source.name)
+    if kind is not None and kind.each == "tooth":
+        return "single tooth", ""
+    if kind is not None and kind.shape == "waves" and source.feature in (Feature.PITCH, Feature.RUNOUT):
+        name = "tooth run-out" if source.feature is Feature.RUNOUT else _OF_FEATURE[source.feature]
+        return name, "" if kind.first_stage else _TEETH
     if kind is None:
         own = _OF_ANGLE.get((source.feature, source.name.rpartition(".")[2]))
     else:
@@ -125,15 +148,15 @@ def callout(source: Source) -> FeatureFrame:
 
     References
     ----------
-    ISO 1101 (symbols), ISO 1328-1 (total cumulative pitch deviation), ISO 129-1 (limit deviations).
+    ISO 1101 (symbols), ISO 1328-1 and -2 (total cumulative pitch deviation, run-out), ISO 129-1 (limit deviations).
     """
     characteristic, _ = _found(source)
     exact = f"{source.zone / MICROMETRE:.6g} µm"
-    if characteristic == "size":
-        return FeatureFrame("size", _deviations(source), exact=exact)
+    if characteristic in _DEVIATIONS:
+        return FeatureFrame(characteristic, _deviations(source), exact=exact)
     round_zone = source.feature is Feature.POSITION
     over = f"/{source.over / MILLIMETRE:g}" if source.over else ""
-    datums = () if characteristic == "cumulative pitch" else ("A",)
+    datums = () if characteristic in INSPECTED else ("A",)
     return FeatureFrame(characteristic, f"{'⌀' if round_zone else ''}{written(source.zone)}{over}", datums, exact)
 
 
@@ -170,12 +193,12 @@ def drawn_symbol(characteristic: str) -> tuple[Lines, tuple[float, ...]]:
     return lines.get(characteristic, ()), circles.get(characteristic, ())
 
 
-def _boxes(frame: FeatureFrame) -> list[tuple[float, float, str]]:
+def boxes(frame: FeatureFrame) -> list[tuple[float, float, str]]:
     """Return left edge, width [px] and text of every box; no text where a symbol is drawn."""
     found, left = [], 0.5
     is_drawn = any(drawn_symbol(frame.characteristic))
     for at, cell in enumerate(frame.cells):
-        width = _HEIGHT if at == 0 and is_drawn else max(_HEIGHT, _LETTER * len(cell) + 8.0)
+        width = HEIGHT if at == 0 and is_drawn else max(HEIGHT, _LETTER * len(cell) + 8.0)
         found.append((left, width, "" if at == 0 and is_drawn else cell))
         left += width
     return found
@@ -183,12 +206,11 @@ def _boxes(frame: FeatureFrame) -> list[tuple[float, float, str]]:
 
 def svg_of(frame: FeatureFrame) -> str:
     """Return the frame as a picture that stands in a line of text."""
-    boxes, height = _boxes(frame), _HEIGHT
-    right = boxes[-1][0] + boxes[-1][1]
-    is_size = frame.characteristic == "size"
+    cells, height = boxes(frame), HEIGHT
+    right = cells[-1][0] + cells[-1][1]
     parts = []
-    for left, width, text in boxes:
-        if not is_size:
+    for left, width, text in cells:
+        if frame.is_framed:
             parts.append(f'<rect x="{left:g}" y="0.5" width="{width:g}" height="{height:g}"/>')
         if text:
             parts.append(
@@ -203,43 +225,3 @@ def svg_of(frame: FeatureFrame) -> str:
     style = 'fill="none" stroke="currentColor" text-anchor="middle" style="font: 14px sans-serif"'
     label = f'role="img" aria-label="{escape(str(frame))}"'
     return f'<svg xmlns="http://www.w3.org/2000/svg" {size} {label} {style}>{"".join(parts)}</svg>'
-
-
-def write_frames(frames: Sequence[tuple[str, FeatureFrame]], path: Path, notes: Sequence[str] = ()) -> None:
-    """Write named frames below each other into a DXF file in millimetres, one block each, to be put on a drawing.
-
-    Parameters
-    ----------
-    frames
-        Name of the dimension and its frame.
-    path
-        File, replaced if it is there.
-    notes
-        What must be said beside the frames, a line each below them, such as the tooth modification.
-    """
-    from tolalloc.reports.drawing_files import centre, new_drawing
-
-    drawing = new_drawing()
-    drawing.styles.add("FRAME", font="DejaVuSans.ttf")
-    space, tall = drawing.modelspace(), _HEIGHT * _SCALE
-    for number, (name, frame) in enumerate(frames):
-        block = drawing.blocks.new(f"FRAME_{number + 1}")
-        for left, width, text in _boxes(frame):
-            x, wide = (left - 0.5) * _SCALE, width * _SCALE
-            if frame.characteristic != "size":
-                block.add_lwpolyline([(x, 0), (x + wide, 0), (x + wide, tall), (x, tall)], close=True)
-            if text:
-                middle = (x + wide / 2, tall / 2)
-                centre(block.add_text(text, height=tall / 2, dxfattribs={"style": "FRAME"}), middle)
-        lines, circles = drawn_symbol(frame.characteristic)
-        for line in lines:
-            block.add_lwpolyline([(x * tall, y * tall) for x, y in line])
-        for radius in circles:
-            block.add_circle((tall / 2, tall / 2), radius * tall)
-        at = -1.6 * tall * number
-        space.add_blockref(block.name, (60.0, at))
-        space.add_text(name, height=tall / 2, dxfattribs={"style": "FRAME"}).set_placement((0.0, at + tall / 4))
-    for below, note in enumerate(notes, start=len(frames)):
-        at = -1.6 * tall * below
-        space.add_text(note, height=tall / 2, dxfattribs={"style": "FRAME"}).set_placement((0.0, at + tall / 4))
-    drawing.saveas(path)

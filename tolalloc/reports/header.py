@@ -34,6 +34,8 @@ class Header:
         Seconds and units of each stage.
     currency
         What costs are in by the user's own files, such as EUR; empty where they are cost units.
+    title_block
+        Drawing number, revision and author, as far as the study states them.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Header:
     statuses: Mapping[str, int] = field(default_factory=dict)
     stages: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     currency: str = ""
+    title_block: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def cost_unit(self) -> str:

@@ -13,6 +13,7 @@ from jaxtyping import Float
 from tolalloc.models.model import Model, Units
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure
+from tolalloc.reports.sign_sketch import SignSketch
 
 if TYPE_CHECKING:
     from tolalloc.drawings.error_model import ErrorModel
@@ -104,6 +105,15 @@ class Portrait(Generic[Own]):
     def amounts(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, float]:
         """Return what the settings mean on the drawing, units in the names."""
         return {setting.name: float(value) for setting, value in zip(self.model.settings, values, strict=True)}
+
+    def effects(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, str]:  # noqa: ARG002
+        """Return what an amount of these settings does to the part, or a setting means; nothing unless a model says."""
+        return {}
+
+    @property
+    def sign_sketches(self) -> tuple[SignSketch, ...]:
+        """Which way negative amounts are ground, as small pictures; none unless a model has any."""
+        return ()
 
     def cautions(self, values: Float[np.ndarray, " setting"]) -> tuple[str, ...]:  # noqa: ARG002
         """Return what a reader must know of these settings."""

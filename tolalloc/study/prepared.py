@@ -210,6 +210,7 @@ class Prepared:
             digest=self.digest,
             conditions=self.model.conditions,
             currency=self.currency,
+            title_block=self.study.title_block,
             assumptions=(
                 *portrait_of(self.model).assumptions,
                 *self.notes,

@@ -29,6 +29,7 @@ from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.portrait import Examination, Portrait, sections_of
 from tolalloc.reports.scene_record import scene_record
+from tolalloc.reports.sign_sketch import SignSketch
 from tolalloc.reports.wording import number
 
 if TYPE_CHECKING:
@@ -121,6 +122,21 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
             RADIAL: float(values[1]),
         }
 
+    def effects(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, str]:
+        """Return what the sign of each amount does to the teeth, and where the clearances are measured."""
+        modification = self.model.modification(values)
+        return {
+            "equidistant Δr_rp [µm]": _effect(modification.equidistant, "wheel larger", "wheel smaller"),
+            "shift Δr_p [µm]": _effect(-modification.shift, "wheel deeper in the disc", "wheel farther out"),
+            FLANK: "target: nominal gap where cos φ = K1",
+            RADIAL: "target: nominal gap at tip and root",
+        }
+
+    @property
+    def sign_sketches(self) -> tuple[SignSketch, ...]:
+        """The grinding wheel smaller, and on a smaller circle."""
+        return _SIGN_SKETCHES
+
     def cautions(self, values: Float[np.ndarray, " setting"]) -> tuple[str, ...]:
         """Return what a reader must know of a large modification, and of a stiffness far from any catalogue."""
         model = self.model
@@ -155,6 +171,31 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
     ) -> tuple[Section, ...]:
         """Return the moving picture of a unit, coloured by its sources' shares."""
         return sections_of("The reducer", lambda: _moving(self.model, errors, x, shares, unit))
+
+
+_SIGN_SKETCHES = (
+    SignSketch(
+        caption="Δr_rp negative (drawn): the wheel, of radius r_rp + Δr_rp, is smaller than the pin and leaves "
+        "material on the teeth. Positive: it is larger and removes material.",
+        nominal=(0.0, 9.0),
+        changed=(0.0, 7.0),
+        arrow=(-9.0, -7.0),
+    ),
+    SignSketch(
+        caption="Δr_p negative (drawn): the wheel runs on the circle R_p + Δr_p, smaller than the pin circle, and "
+        "removes material from the teeth. Positive: on a larger circle it leaves material.",
+        nominal=(0.0, 9.0),
+        changed=(-2.0, 9.0),
+        arrow=(0.0, -2.0),
+    ),
+)
+
+
+def _effect(removed: float, more: str, less: str) -> str:
+    """Return what an amount does that removes so much along the normal at tip and root, or leaves it if negative."""
+    if removed == 0.0:
+        return "none"
+    return f"{more}: removes material" if removed > 0.0 else f"{less}: leaves material"
 
 
 # What every report says

@@ -178,16 +178,13 @@ def _kept(sign: int, limit: float, predicted: Formula | float | None) -> str:
 
 def _amounts(rows: AnswerSheet, result: AllocationResult) -> None:
     """Write the amounts that must be made with the zones, each with its tolerance where the table states one."""
-    if not result.space.settings:
+    if not result.amounts:
         return
-    drawn, zones = result.model.drawn_amounts, {own.name: own for own in result.drawn_sources}
-    now, before = (drawn.by_setting @ own.settings for own in (result.chosen, result.free.baseline))
     rows.space()
     rows.line(*_say("sheet_amounts").split("|"), bold=True)
-    for at, name in enumerate(drawn.names):
-        source = zones.get(drawn.sources[at]) if drawn.sources else None
-        tolerance = source.zone / 2 / MICROMETRE if source and source.zone else None
-        rows.line(quantity(name), float(now[at]), float(before[at]), unit_of(name), tolerance, number="0.00##")
+    for own in result.amounts:
+        tolerance = own.tolerance and own.tolerance / MICROMETRE
+        rows.line(quantity(own.name), own.value, own.before, unit_of(own.name), tolerance, number="0.00##")
     for text in texts.amounts_convention(result):
         rows.across(text)
 

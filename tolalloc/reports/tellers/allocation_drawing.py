@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,15 +17,17 @@ from tolalloc.drawings.table_file import setting_line
 from tolalloc.drawings.tolerance_table import table_frame
 from tolalloc.reading.units import COST_UNITS, MICROMETRE, unit_of
 from tolalloc.reports.columns import Column, Table, own_words, span
+from tolalloc.reports.drawing_sheet import write_sheet
 from tolalloc.reports.excel import write_sheets
-from tolalloc.reports.feature_frame import Frames, callout, write_frames
+from tolalloc.reports.feature_frame import Frames, callout
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.tellers.allocation_sentences import amounts_convention, drawn_amounts
+from tolalloc.reports.tellers.allocation_sheet import drawing_sheet
 from tolalloc.reports.tellers.allocation_workbook import calculator_sheets, style_calculator
 from tolalloc.reports.templates import Sentences
-from tolalloc.reports.wording import short, with_unit
+from tolalloc.reports.wording import quantity, short, with_unit
 from tolalloc.reports.writer import write_csv
 
 if TYPE_CHECKING:
@@ -218,23 +221,26 @@ def write_drawing(result: AllocationResult, header: Header, folder: Path) -> Non
     cost_unit, notes = header.cost_unit, (*drawn_amounts(result), *amounts_convention(result))
     write_csv(table_frame(result.drawn_sources, folder, cost_unit), folder / "allocation.csv")
     with (folder / "allocation.csv").open("a", encoding="utf-8") as file:
-        file.write("".join(f"{line}\n" for line in _table_comments(result, header.digest, notes)))
+        file.write("".join(f"{line}\n" for line in _table_comments(result, header, notes)))
     calculator = calculator_sheets(result, cost_unit)
     others = {**_settings_sheet(result), "tolerances": tolerances_frame(result, cost_unit)}
     write_sheets({**calculator, **others}, folder / "drawing.xlsx")
     style_calculator(result, header, calculator, notes, folder / "drawing.xlsx")
-    named = [(result.line_name(own), callout(own[1][0])) for own in result.lines]
-    write_frames(named, folder / "frames.dxf", notes)
+    write_sheet(drawing_sheet(result, header, date.today()), folder / "frames.dxf")
 
 
-def _table_comments(result: AllocationResult, digest: str, notes: Sequence[str]) -> list[str]:
+def _table_comments(result: AllocationResult, header: Header, notes: Sequence[str]) -> list[str]:
     """Return what a table says below its rows: of which study it is, what it costs, and the settings that belong to it.
 
     Without commas and semicolons, so that no program that reads the rows parts them into cells.
     """
     paid = sum(result.process_changes.values())
     once = _say("table_once", paid=paid) if paid else ""
-    said = [_say("table_study", name=result.name, digest=digest[:12], cost=result.cost, once=once), *notes]
+    said = [_say("table_study", name=result.name, digest=header.digest[:12], cost=result.cost, once=once)]
+    if header.title_block:
+        fields = (f"{label} {text}" for label, text in header.title_block.items())
+        said.append(_say("table_block", fields="; ".join(fields)))
+    said += notes
     values = zip(result.space.shared.names, result.chosen.settings.tolist(), strict=True)
     lines = [f"# {sentence}".replace(",", " and").replace(";", " -") for sentence in said]
     return [*lines, *(setting_line(name, value) for name, value in values)]
@@ -242,26 +248,19 @@ def _table_comments(result: AllocationResult, digest: str, notes: Sequence[str])
 
 def _settings_sheet(result: AllocationResult) -> dict[str, pd.DataFrame]:
     """Return a sheet of the settings that belong to the drawing and of what is made for them; none without any."""
-    if not result.space.settings:
+    if not result.amounts:
         return {}
     import pandas as pd
 
-    drawn, names = result.model.drawn_amounts, result.space.shared.names
-    value, before = (
-        {
-            **dict(zip(names, design.settings, strict=True)),
-            **dict(zip(drawn.names, drawn.by_setting @ design.settings, strict=True)),
-        }
-        for design in (result.chosen, result.free.baseline)
-    )
     rows: list[dict[str, object]] = [
         {
-            "what": name.split(" [")[0],
-            "value [unit]": float(value[name]),
-            "before [unit]": float(before[name]),
-            "unit": unit_of(name),
+            "what": quantity(own.name),
+            "value [unit]": own.value,
+            "before [unit]": own.before,
+            "unit": unit_of(own.name),
+            "tolerance ± [µm]": own.tolerance and own.tolerance / MICROMETRE,
         }
-        for name in dict.fromkeys([*drawn.names, *names])
+        for own in result.amounts
     ]
     rows += [{"what": sentence} for sentence in amounts_convention(result)]
     return {portrait_of(result.model).settings_word: pd.DataFrame(rows)}

@@ -275,7 +275,7 @@ def _mark(result: AllocationResult, drawing: Worksheet) -> None:
 
 def _written_as(frame: FeatureFrame) -> str:
     """Return the format of a number that looks as on the drawing, whatever the language of its reader."""
-    sign = "±" if frame.characteristic == "size" else "⌀" if frame.zone.startswith("⌀") else ""
+    sign = "±" if frame.is_deviation else "⌀" if frame.zone.startswith("⌀") else ""
     return f'"{sign}"0.0000#' if sign else "0.0000#"
 
 
