@@ -73,12 +73,16 @@ class FeatureFrame:
         Letters of the datums, the first one first.
     exact
         The zone that the drawing was verified with, in words.
+    place
+        Where the zone holds if the feature does not say so, such as ``at R 0.9`` in millimetres; it stands beside the
+        frame.
     """
 
     characteristic: str
     zone: str
     datums: tuple[str, ...] = ()
     exact: str = ""
+    place: str = ""
 
     @property
     def symbol(self) -> str:
@@ -101,11 +105,13 @@ class FeatureFrame:
         return self.characteristic in _DEVIATIONS
 
     def __str__(self) -> str:
-        return " ".join(self.cells)
+        return " ".join(filter(None, (*self.cells, self.place)))
 
     def _repr_html_(self) -> str:
         said = escape(f"{self.characteristic}: {self.exact or self.zone}")
-        return f'<span class="frame" title="{said}">{svg_of(self)}</span>'
+        return (
+            f'<span class="frame" title="{said}">{svg_of(self)}{f" {escape(self.place)}" if self.place else ""}</span>'
+        )
 
 
 class Frames(tuple[FeatureFrame, ...]):
@@ -155,9 +161,14 @@ def callout(source: Source) -> FeatureFrame:
     if characteristic in _DEVIATIONS:
         return FeatureFrame(characteristic, _deviations(source), exact=exact)
     round_zone = source.feature is Feature.POSITION
-    over = f"/{source.over / MILLIMETRE:g}" if source.over else ""
+    over, place = "", ""
+    if source.over and characteristic == "position":
+        place = f"at R {source.over / MILLIMETRE:g}"  # A turn about the axis; only a tilt is by length
+    elif source.over:
+        over = f"/{source.over / MILLIMETRE:g}"
     datums = () if characteristic in INSPECTED else ("A",)
-    return FeatureFrame(characteristic, f"{'⌀' if round_zone else ''}{written(source.zone)}{over}", datums, exact)
+    zone = f"{'⌀' if round_zone else ''}{written(source.zone)}{over}"
+    return FeatureFrame(characteristic, zone, datums, exact, place)
 
 
 def _deviations(source: Source) -> str:

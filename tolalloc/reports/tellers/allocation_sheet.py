@@ -9,7 +9,7 @@ from tolalloc.allocation.result import AllocationResult
 from tolalloc.drawings.sources import Source
 from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.drawing_sheet import DrawingSheet, SheetTable
-from tolalloc.reports.feature_frame import INSPECTED, callout
+from tolalloc.reports.feature_frame import INSPECTED, FeatureFrame, callout
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.tellers.allocation_sentences import amounts_convention, drawn_amounts, examined, verdict
@@ -28,7 +28,7 @@ def drawing_sheet(result: AllocationResult, header: Header, today: date) -> Draw
     framed, inspected = _lines(result)
     model = portrait_of(result.model)
     return DrawingSheet(
-        frames=tuple((result.line_name(own), callout(own[1][0])) for own in framed),
+        frames=tuple(_framed(result.line_name(own), callout(own[1][0])) for own in framed),
         tables=(*_inspection(result, inspected), *_amounts(result), *_datums([*framed, *inspected])),
         sketches=model.sign_sketches if result.amounts else (),
         notes=(*drawn_amounts(result), *amounts_convention(result), verdict(result)[-1]),
@@ -45,6 +45,11 @@ def _lines(result: AllocationResult) -> tuple[list[_Line], list[_Line]]:
     lines = [own for own in result.lines if own[1][0].name not in beside]
     inspected = [own for own in lines if callout(own[1][0]).characteristic in INSPECTED]
     return [own for own in lines if own not in inspected], inspected
+
+
+def _framed(name: str, frame: FeatureFrame) -> tuple[str, FeatureFrame]:
+    """Return a frame beside the name of its dimension, which says where the zone holds."""
+    return (f"{name}, {frame.place}" if frame.place else name), frame
 
 
 def _table(key: str, rows: Sequence[tuple[str, ...]], widths: tuple[float, ...]) -> SheetTable:

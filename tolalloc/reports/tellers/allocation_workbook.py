@@ -23,13 +23,13 @@ from tolalloc.allocation.cost.model import Combined, Exponential, Reciprocal, Re
 from tolalloc.allocation.cost.points import Spline, Tabulated
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.drawings.sources import STEPS, Source, rounded_down
-from tolalloc.drawings.zones import Feature
 from tolalloc.reading.units import MICROMETRE, MILLIMETRE, unit_of
 from tolalloc.reports.excel import Formula, keep_values
 from tolalloc.reports.feature_frame import STEP, FeatureFrame, callout
 from tolalloc.reports.header import Header
 from tolalloc.reports.tellers.allocation_answer_sheet import NAME, add_answer
 from tolalloc.reports.templates import Sentences
+from tolalloc.reports.wording import number as signed
 
 _say = Sentences("allocation")
 
@@ -83,7 +83,7 @@ def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
                 )
                 for process, row, scale in zip(made, rows, scales, strict=True)
             ],
-            "characteristic": [f"{own.symbol} {own.characteristic}".strip() for own in callouts],
+            "characteristic": [_characteristic(_first_member(result, name)) for name in space.groups],
             "write [mm]": [
                 _written(_first_member(result, name), row, zone)
                 for row, name, zone in zip(rows, space.groups, zones.tolist(), strict=True)
@@ -101,6 +101,16 @@ def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
         table[f"{side.stack.name}: added per scale [{unit_of(side.stack.name)}]"] = side.stack.worst_case + side.relief
         table[f"{side.stack.name}: spread per scale [{unit_of(side.stack.name)}]"] = side.stack.root_sum_square
     return pd.concat([table, _further_lines(result)], ignore_index=True) if _further(result) else table
+
+
+def _characteristic(source: Source) -> str:
+    """Return symbol and name of a characteristic, and the length, radius or middle that its zone belongs to."""
+    frame = callout(source)
+    _, _, length = frame.zone.partition("/") if frame.is_framed else ("", "", "")
+    where = f"over {length} mm" if length else f"{frame.place} mm" if frame.place else ""
+    if frame.is_deviation and source.middle:
+        where = f"about nominal {signed(source.middle / MILLIMETRE, '+.5f')} mm"
+    return " ".join(filter(None, (frame.symbol, frame.characteristic, where)))
 
 
 def _further(result: AllocationResult) -> list[tuple[str, tuple[Source, ...]]]:
@@ -136,7 +146,7 @@ def _further_lines(result: AllocationResult) -> pd.DataFrame:
             {
                 "group": result.line_name(line),
                 "zone to change [µm]": Formula(f"=B{first[name]}*{ratio}", zone),
-                "characteristic": f"{own.symbol} {own.characteristic}".strip(),
+                "characteristic": _characteristic(members[0]),
                 "write [mm]": _written(members[0], row, zone),
                 "datum": " ".join(own.datums),
             }
@@ -146,13 +156,14 @@ def _further_lines(result: AllocationResult) -> pd.DataFrame:
 
 def _written(source: Source, row: int, zone: float) -> Formula:
     """Return what the drawing states of a zone [µm] in a row: rounded down to its step, half of it for a size [mm]."""
-    size = f"B{row}/2" if source.feature is Feature.SIZE else f"B{row}"
+    halved = callout(source).is_deviation
+    size = f"B{row}/2" if halved else f"B{row}"
     step = number(source.step / MICROMETRE)
     if not source.step:
         step = number(STEPS[-1][1])
         for end, own in reversed(STEPS[:-1]):
             step = f"IF({size}<{number(end)},{number(own)},{step})"
-    half = zone / 2 if source.feature is Feature.SIZE else zone
+    half = zone / 2 if halved else zone
     # What was verified is stated as it is, a grade or a smallest zone too.
     value = rounded_down(half * MICROMETRE, STEP) / MILLIMETRE
     verified = f"AND({size}>{number(half - _AS_VERIFIED)},{size}<{number(half + _AS_VERIFIED)})"
