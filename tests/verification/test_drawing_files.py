@@ -174,6 +174,16 @@ def test_the_range_of_the_weights_is_about_the_verified_zones(answer, folder):
         assert found == pytest.approx([zone, zone / REACH_OF_MODELS, zone * REACH_OF_MODELS])
 
 
+def test_the_workbook_has_every_line_of_the_drawing(answer, folder):
+    sheet = load_workbook(folder / "drawing.xlsx", data_only=True)["drawing"]
+    rows = {row[0]: row for row in sheet.iter_rows(min_row=2, values_only=True)}
+    for line in answer.lines:
+        row, own = rows[answer.line_name(line)], line[1][0]
+        assert row[1] == pytest.approx(own.zone * 1e6)
+        assert row[6] == ("locked" if own.locked else "yes")
+        assert callout(own).zone == f"±{row[10]:.5f}".rstrip("0")
+
+
 def test_setting_and_sum_stand_in_workbook_and_frames(answer, folder):
     (value,) = answer.chosen.settings
     rows = list(load_workbook(folder / "drawing.xlsx")["settings"].iter_rows(values_only=True))

@@ -35,7 +35,7 @@ _MARGIN, _GAP = 10.0, 6.0
 """Border of the sheet, and free space between parts of it [mm]."""
 _WIDTH = 180.0
 """Width of tables and title block, that of ISO 7200 [mm]."""
-_CELL, _ACROSS = 10.0, 3
+_CELL, _ACROSS = 9.0, 3
 """Height of a field of the title block [mm], and fields beside each other [-]."""
 _NAMES = 34
 """Letters of a name before it is wrapped [-]."""
@@ -63,7 +63,7 @@ class SheetTable:
     @property
     def heights(self) -> list[float]:
         """Heights of the rows, the header first [mm]."""
-        return [max(map(len, row)) * _TEXT * _LINE + 1.5 for row in self.cells]
+        return [max(map(len, row)) * _TEXT * _LINE + 1.0 for row in self.cells]
 
     @property
     def height(self) -> float:

@@ -94,7 +94,7 @@ def _datums(lines: list[_Line]) -> tuple[SheetTable, ...]:
                 alike = parts.setdefault(own.part.rstrip("0123456789"), [])
                 alike += [] if own.part in alike else [own.part]
     rows = [(", ".join(own), _AXIS, _say("table_datum_axis"), "") for own in parts.values()]
-    return (_table("table_datums", rows, (60.0, 14.0, 60.0, 46.0)),) if rows else ()
+    return (_table("table_datums", rows, (50.0, 14.0, 70.0, 46.0)),) if rows else ()
 
 
 def _title_block(result: AllocationResult, header: Header, today: date) -> tuple[tuple[str, str], ...]:

@@ -37,8 +37,9 @@ _FIRST = 2
 """Row of the first entry below the header."""
 _WEIGHTS = 17
 """Column of the first weight; those before it are printed."""
-_NAMES = 34
-_WIDTHS = (_NAMES, 10, 11, 8, 9, 9, 7, 14, 9, 16, 11, 6, 10, 10, 10, 8)
+_NAMES, _LINE = 34, 15.0
+"""Letters of a line in the first column [-], and height of a line [pt]."""
+_WIDTHS = (_NAMES, 10, 10, 8, 9, 9, 7, 14, 9, 29, 10, 6, 9, 9, 9, 8)
 """Widths of the printed columns, narrow enough for letters of 2 mm on A4 [letters]."""
 _HELD = "drawing!$P${}:$P${}"
 """Cells that say of every zone whether the weights hold for it."""
@@ -100,7 +101,7 @@ def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     for side in chosen.constraints:
         table[f"{side.stack.name}: added per scale [{unit_of(side.stack.name)}]"] = side.stack.worst_case + side.relief
         table[f"{side.stack.name}: spread per scale [{unit_of(side.stack.name)}]"] = side.stack.root_sum_square
-    return pd.concat([table, _further_lines(result)], ignore_index=True) if _further(result) else table
+    return pd.concat([table, *_further_lines(result), *_other_lines(result)], ignore_index=True)
 
 
 def _characteristic(source: Source) -> str:
@@ -134,8 +135,37 @@ def _first_line(result: AllocationResult, group: str) -> str:
     return result.line_name(next(line for line in result.lines if first in line[1]))
 
 
-def _further_lines(result: AllocationResult) -> pd.DataFrame:
-    """Return one row for every line whose zone follows that of its group, which adds nothing to cost and limits."""
+def _others(result: AllocationResult) -> list[tuple[str, tuple[Source, ...]]]:
+    """Return the lines of the drawing whose zones are locked."""
+    changed = {_first_line(result, name) for name in result.drawn.groups}
+    changed |= {result.line_name(line) for line in _further(result)}
+    return [line for line in result.lines if result.line_name(line) not in changed]
+
+
+def _other_lines(result: AllocationResult) -> list[pd.DataFrame]:
+    """Return one row for every line whose zones are locked, for the drawing to be whole; nothing without any."""
+    rows = []
+    for line in _others(result):
+        own = line[1][0]
+        half = own.zone / 2 if callout(own).is_deviation else own.zone
+        rows.append(
+            {
+                "group": result.line_name(line),
+                "zone to change [µm]": own.zone / MICROMETRE,
+                "inside": _say("workbook_locked"),
+                "characteristic": _characteristic(own),
+                "write [mm]": rounded_down(half, STEP) / MILLIMETRE,
+                "datum": " ".join(callout(own).datums),
+            }
+        )
+    return [pd.DataFrame(rows)] if rows else []
+
+
+def _further_lines(result: AllocationResult) -> list[pd.DataFrame]:
+    """Return one row for every line whose zone follows that of its group, which adds nothing to cost and limits.
+
+    Nothing without any.
+    """
     first = {name: _FIRST + at for at, name in enumerate(result.drawn.groups)}
     rows = []
     for row, line in enumerate(_further(result), start=_FIRST + len(first)):
@@ -151,7 +181,7 @@ def _further_lines(result: AllocationResult) -> pd.DataFrame:
                 "datum": " ".join(own.datums),
             }
         )
-    return pd.DataFrame(rows)
+    return [pd.DataFrame(rows)] if rows else []
 
 
 def _written(source: Source, row: int, zone: float) -> Formula:
@@ -256,7 +286,10 @@ def style_calculator(
     for column in range(1, drawing.max_column + 1):
         width = _WIDTHS[column - 1] if column < _WEIGHTS else 16
         drawing.column_dimensions[get_column_letter(column)].width = width
-    drawing.row_dimensions[1].height = requirements.row_dimensions[1].height = 45
+    for row in range(_FIRST, _FIRST + rows):
+        drawing.cell(row, 1).alignment = Alignment(wrap_text=True, vertical="top")
+        drawing.row_dimensions[row].height = _LINE * (1 + len(str(drawing.cell(row, 1).value)) // _NAMES)
+    drawing.row_dimensions[1].height = requirements.row_dimensions[1].height = 4 * _LINE
     workbook.calculation.fullCalcOnLoad = True
     workbook.save(path)
     keep_values(path, values)
@@ -280,7 +313,8 @@ def _mark(result: AllocationResult, drawing: Worksheet) -> None:
         guard.add(drawing.cell(row, 2))
         drawing.cell(row, 4).number_format = "0.000"
         drawing.cell(row, 11).number_format = _written_as(callout(_first_member(result, name)))
-    for row, (_, members) in enumerate(_further(result), start=_FIRST + len(result.drawn.groups)):
+    below = [*_further(result), *_others(result)]
+    for row, (_, members) in enumerate(below, start=_FIRST + len(result.drawn.groups)):
         drawing.cell(row, 11).number_format = _written_as(callout(members[0]))
 
 
@@ -298,7 +332,7 @@ def _below(drawing: Worksheet, watched: pd.DataFrame, rows: int, notes: tuple[st
     for at, own in enumerate(watched.to_dict("records")):
         row, there = start + 1 + at, _FIRST + at
         drawing.cell(row, 1, str(own["what"])).alignment = Alignment(wrap_text=True, vertical="top")
-        drawing.row_dimensions[row].height = 15.0 * (1 + len(str(own["what"])) // _NAMES)
+        drawing.row_dimensions[row].height = _LINE * (1 + len(str(own["what"])) // _NAMES)
         for column, place, held in (
             (2, "B", own["limit"]),
             (3, "D", own["predicted for the zones"]),
