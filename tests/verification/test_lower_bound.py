@@ -167,6 +167,20 @@ def test_units_near_a_limit_bound_it_from_below_as_plain_ones_do():
     assert 0 < above / 300 < 0.05 + 3 * np.sqrt(0.05 * 0.95 / 300)
 
 
+def test_units_near_another_limit_say_little_of_a_limit_and_plain_ones_bound_it():
+    """Of 4,000 drawn units many are near another limit and hardly more near this one than may lie beyond it."""
+    generator, above, least = np.random.default_rng(10), 0, []
+    for _ in range(300):
+        drawn, other = generator.standard_normal((2, 4000))
+        whatever, near = np.arange(4000) < 500, (drawn > 2.6) | (other > 1.5)
+        solved = whatever | near
+        units = SolvedUnits(drawn=Drawn(units=4000, whatever=500), near=near[solved], whatever=whatever[solved])
+        least.append(units.least_excess(drawn[solved], 0.99, 0.95))
+        above += least[-1] > norm.ppf(0.99)
+    assert above / 300 < 0.05 + 3 * np.sqrt(0.05 * 0.95 / 300)
+    assert min(least) > 1.6  # by the near ones alone it is 1.1 in the middle
+
+
 def test_units_that_leave_the_law_move_the_level_outwards():
     """50 of 10,000 units leave it: up to 0.63 % may (95 %), so 2 % beyond the limit are shown as 1.37 % of the law."""
     rows = {"a": (0.0, 0.1, 1.0), "b": (0.0, 0.1, 3.0)}

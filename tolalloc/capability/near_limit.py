@@ -218,7 +218,8 @@ class SolvedUnits:
         """Return how far the share that a yield leaves lies beyond a limit at least [unit of the excess].
 
         With one-sided confidence; the parameters are those of `kept_excess`, whose other end it is. Far units may only
-        add to what lies beyond, so the near ones alone bound it; plain units where too few are near.
+        add to what lies beyond, so the near ones alone bound it; plain units bound it, too. The better of both counts,
+        each with half of the error: of units near several limits few may be near this one.
 
         Returns
         -------
@@ -227,11 +228,14 @@ class SolvedUnits:
         """
         from scipy.stats import binom
 
-        for units, own in ((self.drawn.units, self.near), (self.drawn.whatever, self.whatever)):
-            passed = int(binom.ppf(confidence, units, 1.0 - target))
+        samples = [(self.drawn.units, self.near), (self.drawn.whatever, self.whatever)]
+        samples = samples if self.drawn.whatever < self.drawn.units else samples[:1]
+        found = [-np.inf]
+        for units, own in samples:
+            passed = int(binom.ppf(1 - (1 - confidence) / len(samples), units, 1.0 - target))
             if np.count_nonzero(own) > passed:
-                return float(excess[own][largest_first(excess[own], passed + 1)[-1]])
-        return -np.inf
+                found.append(float(excess[own][largest_first(excess[own], passed + 1)[-1]]))
+        return max(found)
 
     def yield_of(self, is_beyond: Bool[np.ndarray, " solved"]) -> Yield:
         """Return the yield if these units lie beyond the limits."""
