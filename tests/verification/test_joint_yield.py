@@ -92,7 +92,7 @@ def test_two_limits_are_kept_at_once_at_hardly_more_than_the_least_cost(answers,
 @pytest.mark.parametrize("name", STUDIES)
 def test_other_random_numbers_find_hardly_another_cost(name, seed):
     made, optimum = STUDIES[name]
-    found = made(seed=seed).allocate().result
+    found = made(seed=seed, effort="quick").allocate().result
     assert found.met
     assert true_yield(found.chosen.scales) >= TARGET - 1e-4
     assert optimum * 0.998 < found.cost < optimum * 1.02
@@ -102,7 +102,7 @@ def test_other_random_numbers_find_hardly_another_cost(name, seed):
 @pytest.mark.parametrize("name", STUDIES)
 def test_a_quick_answer_and_an_explicit_joint_yield_go_the_same_way(name):
     made, optimum = STUDIES[name]
-    for seed in range(1, 4):
+    for seed in range(1, 3):
         found = made(seed=seed, effort="quick", joint=ta.AtYield(TARGET)).allocate().result
         assert found.met
         assert true_yield(found.chosen.scales) >= TARGET - 1e-4
