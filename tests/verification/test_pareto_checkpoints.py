@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from stack_front import StackProblem, stack_problem
 
-from tolalloc.allocation.front.checkpoint import Checkpoint
 from tolalloc.allocation.front.genetic import search
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
+from tolalloc.models.checkpoint import Checkpoint
 
 POPULATION = 80
 
@@ -83,7 +83,7 @@ def test_a_search_resumed_in_another_process_has_the_same_bits(tmp_path, stack):
     script = (
         "import sys, hashlib, numpy as np; from pathlib import Path; sys.path.insert(0, sys.argv[1])\n"
         "from stack_front import stack_problem\n"
-        "from tolalloc.allocation.front.checkpoint import Checkpoint\n"
+        "from tolalloc.models.checkpoint import Checkpoint\n"
         "from tolalloc.allocation.front.genetic import search\n"
         "from tolalloc.drawings.seeds import SeedTree\n"
         f"found = search(stack_problem(), np.empty((0, 12)), SeedTree(0), *{SMALL}, "

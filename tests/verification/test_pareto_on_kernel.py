@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from tolalloc import PEAK_TO_PEAK
-from tolalloc.allocation.front.checkpoint import CachedResponse, Checkpoint
 from tolalloc.allocation.front.genetic import nondominated
 from tolalloc.allocation.front.pareto_front import pareto_front
 from tolalloc.allocation.front.pareto_problem import DesignProblem
@@ -18,6 +17,7 @@ from tolalloc.allocation.space.effort import FrontEffort
 from tolalloc.allocation.space.problem import OneSidedConstraint, Stack
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
+from tolalloc.models.checkpoint import CachedResponse, Checkpoint
 from tolalloc.reducers.settings import RADIAL
 from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
 

@@ -11,7 +11,6 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice, YieldLadder, best_yield
-from tolalloc.allocation.front.checkpoint import CachedResponse, Checkpoint
 from tolalloc.allocation.front.pareto_front import Fronts, exact_front, searched_front
 from tolalloc.allocation.front.what_if import (
     QuantileResponse,
@@ -47,6 +46,7 @@ from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, ch
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
+from tolalloc.models.checkpoint import CachedResponse, Checkpoint
 from tolalloc.models.model import Model
 from tolalloc.running.blas import one_blas_thread
 from tolalloc.running.progress import RunRecord

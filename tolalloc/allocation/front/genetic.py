@@ -20,10 +20,10 @@ from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 from pymoo.util.ref_dirs import get_reference_directions
 from scipy.stats import qmc
 
-from tolalloc.allocation.front.checkpoint import CachedAnswers, Checkpoint
 from tolalloc.allocation.front.pareto_problem import Genes, Objectives, ParetoProblem, SearchedDesigns, spread_over
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
+from tolalloc.models.checkpoint import CachedAnswers, Checkpoint
 
 _MARGIN = 0.49
 """How far the operators may leave the range of an integer gene, so that its ends are drawn as often as the rest [-]."""

@@ -8,7 +8,6 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import qmc
 
-from tolalloc.allocation.front.checkpoint import CachedResponse
 from tolalloc.allocation.front.pareto_problem import (
     DesignProblem,
     Ladders,
@@ -27,6 +26,7 @@ from tolalloc.allocation.space.problem import OneSidedConstraint, Solution, Stac
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import SolveError
+from tolalloc.models.checkpoint import CachedResponse
 from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2, Baseline, RegressionCandidate, gaussian_process
 from tolalloc.sensitivity.surrogate.validation import FOLDS, Score, answers_of, cross_validate
 
