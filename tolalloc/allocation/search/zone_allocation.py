@@ -140,9 +140,12 @@ def scale_in_proportion(verifier: Verifier, steps: int) -> tuple[VerifiedDesign,
 
 
 def _factor(tried: VerifiedDesign) -> float:
-    """Return the common factor of all scales that takes a design to its limits [-]."""
+    """Return the common factor of all scales that takes a design to its limits, each kept alone [-].
+
+    What keeps all limits at once by so few units is too uncertain to tighten all zones for it; the search comes to it.
+    """
     factors = []
-    for constraint in tried.constraints:
+    for constraint in tried.alone:
         rise = float(constraint.stack.load(tried.scales, np.zeros(tried.settings.size)))
         budget = -float(constraint.predicted(tried.design)) - constraint.standard_error
         factors.append(1 + budget / max(rise, _LEAST_RISE * constraint.scale))

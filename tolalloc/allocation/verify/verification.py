@@ -93,6 +93,11 @@ class VerifiedDesign:
         return tuple((check, constraint) for check in self.checks for constraint in check.constraints)
 
     @property
+    def alone(self) -> tuple[OneSidedConstraint, ...]:
+        """One-sided constraints of every limit as if it were the only one."""
+        return tuple(side for check, side in self.limited_sides if not isinstance(check, JointCheck))
+
+    @property
     def laws(self) -> dict[str, LinearLaw]:
         """Law of every limited output that is linear, at the zones of the design."""
         zones = self.space.zones(self.design)
