@@ -223,7 +223,7 @@ class ModelRange:
     factor: float  # Ratio of a zone to the verified one up to which they are [-]
     designs: int  # Other verified designs whose zones and settings all lie in this range [-]
     # Largest difference of their verified values from what the models predict, noise of the units included, one per
-    # one-sided constraint; not a number without such designs [unit of the output]
+    # limited side alone; not a number without such designs [unit of the output]
     off: tuple[float, ...]
 
 
@@ -250,7 +250,7 @@ def model_range(chosen: VerifiedDesign, tried: Iterable[VerifiedDesign]) -> Mode
     >>> found.designs, [round(value, 9) for value in found.off]
     (1, [0.0])
     """
-    zones, groups, sides = chosen.space.zones(chosen.design), chosen.scales.size, chosen.constraints
+    zones, groups, sides = chosen.space.zones(chosen.design), chosen.scales.size, chosen.alone
     compared = []
     for own in tried:
         ratios = own.space.zones(own.design) / zones
@@ -261,7 +261,7 @@ def model_range(chosen: VerifiedDesign, tried: Iterable[VerifiedDesign]) -> Mode
         scales = own.space.first_zones * own.scales / chosen.space.first_zones
         design = np.concatenate([scales, own.design[groups:]])
         predicted = [float(side.predicted(design) + side.relief @ (scales - chosen.scales)) for side in sides]
-        compared.append(np.abs(np.subtract([side.excess for side in own.constraints], predicted)))
+        compared.append(np.abs(np.subtract([side.excess for side in own.alone], predicted)))
     off = np.max(compared, axis=0).tolist() if compared else [float("nan")] * len(sides)
     return ModelRange(factor=REACH_OF_MODELS, designs=len(compared), off=tuple(off))
 

@@ -147,7 +147,7 @@ def _limits(
     rows.space()
     rows.line(*_say("sheet_limits").split("|"), bold=True)
     first = rows.row + 1
-    for at, (side, off) in enumerate(zip(result.chosen.constraints, held.off, strict=True), start=2):
+    for at, (side, off) in enumerate(zip(result.chosen.alone, held.off, strict=True), start=2):
         name = side.stack.name
         rows.line(
             name,
@@ -159,7 +159,7 @@ def _limits(
             number="0.0000" if unit_of(name) == "mm" else "0.00##",
         )
     cost = f"cost [{cost_unit}]"
-    rows.line(cost, None, result.cost, _linked("D", len(result.chosen.constraints) + 2, predicted[cost]), number="0.00")
+    rows.line(cost, None, result.cost, _linked("D", len(result.chosen.alone) + 2, predicted[cost]), number="0.00")
     place = f"E{first}:E{rows.row}"
     rows.sheet.conditional_formatting.add(place, CellIsRule(operator="equal", formula=['"yes"'], fill=_GOOD))
     rows.sheet.conditional_formatting.add(place, FormulaRule(formula=[f'AND(E{first}<>"",E{first}<>"yes")'], fill=_BAD))

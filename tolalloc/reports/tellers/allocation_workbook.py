@@ -98,7 +98,7 @@ def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
             ],
         }
     )
-    for side in chosen.constraints:
+    for side in chosen.alone:
         table[f"{side.stack.name}: added per scale [{unit_of(side.stack.name)}]"] = side.stack.worst_case + side.relief
         table[f"{side.stack.name}: spread per scale [{unit_of(side.stack.name)}]"] = side.stack.root_sum_square
     return pd.concat([table, *_further_lines(result), *_other_lines(result)], ignore_index=True)
@@ -202,7 +202,7 @@ def _written(source: Source, row: int, zone: float) -> Formula:
 
 def _without_weight(result: AllocationResult) -> tuple[str, ...]:
     """Return of which zones these sheets know hardly more than that a smaller one gains nothing."""
-    weights = np.sum([side.stack.worst_case + side.stack.root_sum_square for side in result.chosen.constraints], axis=0)
+    weights = np.sum([side.stack.worst_case + side.stack.root_sum_square for side in result.chosen.alone], axis=0)
     names = [group for group, weight in zip(result.drawn.groups, weights.tolist(), strict=True) if weight == 0.0]
     return (_say("workbook_weightless", groups=", ".join(names)),) if names else ()
 
@@ -213,7 +213,7 @@ def _requirements(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     first, last = _FIRST, _FIRST + len(space.groups) - 1
     scales, watched = f"drawing!$D${first}:$D${last}", []
     left, ask = f'COUNTIF({_HELD.format(first, last)},"no")', _say("workbook_ask")
-    for at, side in enumerate(chosen.constraints):
+    for at, side in enumerate(chosen.alone):
         adds, spreads = (get_column_letter(_WEIGHTS + 2 * at + step) for step in (0, 1))
         load = (
             f"SUMPRODUCT(drawing!${adds}${first}:${adds}${last},{scales})"
@@ -271,7 +271,8 @@ def style_calculator(
         }
         for name, frame in sheets.items()
     }
-    below = (*notes, *_without_weight(result), _say("workbook_change"), _say("workbook_models"))
+    jointly = (_say("workbook_jointly"),) if result.chosen.jointly else ()
+    below = (*notes, *_without_weight(result), *jointly, _say("workbook_change"), _say("workbook_models"))
     rows = len(sheets["drawing"])
     values["drawing"] |= _below(drawing, sheets["requirements"], rows, below)
     watched = sheets["requirements"]
