@@ -44,14 +44,14 @@ def test_every_design_is_held_to_the_pin_force_at_its_own_modification():
     """And its model says how the distance from the limit changes with the clearances."""
     reducer = ta.reducer("rv20e", flank_clearance=(1.0, 8.0), radial_clearance=(3.0, 30.0))
     asked = Prepared(study=ta.Study(reducer, ta.drawing("rv20e_drawing"), limits=LIMITS, joint=None))
-    model, space, settings = asked.model, asked.space, np.array([6.0, 20.0])
+    model, space, settings = asked.model, asked.space, np.array([1.5, 5.0])
     shown = tuple(replace(own, guarantee=ta.AtYield(0.9)) for own in asked.requirements)
     verifier = Verifier(space=space, model=model, requirements=shown, seeds=SeedTree(1), units=64, confidence=0.5)
     design = verifier.verify(np.append(np.ones(len(space.groups)), settings), "other teeth")
     (limited,) = design.checks[-1].constraints
     force = rated_pin_force(model.at(settings).reducer_in_force)
     assert limited.limit == force
-    assert abs(force - rated_pin_force(model.reducer)) > 100.0
+    assert force < model.own_limits[ta.PRELOAD] - 40.0
     fixed = Requirement(output=ta.PRELOAD, limits=Limits(upper=force), guarantee=ta.AtYield(0.9))
     other = replace(verifier, requirements=(shown[0], fixed)).verify(design.design, "other teeth")
     (stated,) = other.checks[-1].constraints
@@ -148,3 +148,12 @@ def test_no_load_torque_is_said_at_output_and_motor_beside_the_one_that_the_cata
 
 def test_a_model_of_a_user_is_in_order_without_a_but():
     assert tolalloc("check", "studies/choi2000_clutch.py").stdout.splitlines()[-1].endswith(" is in order.")
+
+
+def test_teeth_that_rated_torque_presses_harder_allow_no_more_preload():
+    reducer = ta.reducer("rv20e", flank_clearance=(1.0, 8.0), radial_clearance=(3.0, 30.0))
+    asked = Prepared(study=ta.Study(reducer, ta.drawing("rv20e_drawing"), limits=LIMITS, joint=None))
+    own, settings = asked.requirements[-1], np.array([2.0, 30.0])
+    moved = own.at(asked.model, settings, asked.space.setting_steps)
+    assert rated_pin_force(asked.model.at(settings).reducer_in_force) > own.limits.upper + 200.0
+    assert (moved.limits.upper, moved.slopes) == (own.limits.upper, (0.0, 0.0))

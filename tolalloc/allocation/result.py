@@ -137,8 +137,8 @@ class AllocationResult:
     @property
     def yields(self) -> dict[str, Yield]:
         """Limited output → share of units of the drawing that keep its limits, the leading one first."""
-        own = (requirement for requirement in self.requirements if not isinstance(requirement, JointRequirement))
-        return {requirement.output: self.chosen.yield_of(requirement) for requirement in own}
+        own = (check.requirement for check in self.chosen.checks)
+        return {asked.output: self.chosen.yield_of(asked) for asked in own if not isinstance(asked, JointRequirement)}
 
     @property
     def cost(self) -> float:

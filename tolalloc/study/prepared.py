@@ -12,7 +12,8 @@ from tolalloc.allocation.cost.process_costs import ProcessesOfSources, currency_
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import AllocationEffort
 from tolalloc.allocation.space.joint_yield import JointRequirement
-from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, OwnLimit, Requirement
+from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, Guarantee, OwnLimit, Requirement
+from tolalloc.capability.indices import Limits
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.model import HasCopies, Model
@@ -111,15 +112,19 @@ class Prepared:
         if not asked:
             raise InputError(f"{self.place}: every limit is None; limit one output at least, the leading one first.")
         own_joint = self.study.joint if isinstance(self.study.joint, AtYield) else None
-        own = {
-            name: Limit(upper=upper) for name, upper in self.model.own_limits.items() if name not in self.study.limits
-        }
-        return tuple(
-            (Requirement if name in asked else OwnLimit)(
-                output=name, limits=limit.limits, guarantee=limit.show or own_joint or limit.guarantee
-            )
-            for name, limit in {**asked, **own}.items()
+
+        def shown(limit: Limit) -> Guarantee:
+            return limit.show or own_joint or limit.guarantee
+
+        stated = (
+            Requirement(output=name, limits=limit.limits, guarantee=shown(limit)) for name, limit in asked.items()
         )
+        own = (
+            OwnLimit(output=name, limits=Limits(upper=upper), guarantee=shown(Limit(upper=upper)), most=upper)
+            for name, upper in self.model.own_limits.items()
+            if name not in self.study.limits
+        )
+        return (*stated, *own)
 
     @property
     def joint(self) -> AtYield | None:

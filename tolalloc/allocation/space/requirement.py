@@ -551,9 +551,12 @@ class OwnLimit(Requirement):
 
     Notes
     -----
-    Every design is held to the limit at its own settings, solved there; the excess falls with a setting by the
-    derivative of the limit, of central differences.
+    Every design is held to the limit at its own settings, solved there, and to no more than that at the settings of the
+    study: a modification under which rated torque presses harder is no reason to press harder without torque. The
+    excess falls with a setting by the derivative of the limit, of central differences.
     """
+
+    most: float  # Limit at the settings of the study [unit of the output]
 
     slopes: tuple[
         float, ...
@@ -567,7 +570,7 @@ class OwnLimit(Requirement):
             return self
 
         def limit(own: Float[np.ndarray, " setting"]) -> float:
-            return float(model.at(own).own_limits[self.output])
+            return min(float(model.at(own).own_limits[self.output]), self.most)
 
         slopes = (
             (limit(settings + step) - limit(settings - step)) / (2 * size)
