@@ -69,7 +69,8 @@ def test_a_study_runs_and_writes_its_report(script, tmp_path):
         assert result.returncode == 0, result.stderr
         page = (folder / "report.html").read_text(encoding="utf-8")
         assert page
-        for paper in pdf.PAPERS if can_print() else ():
+        papers = pdf.PAPERS if script.stem == "rv20e_allocation" else pdf.PAPERS[:1]
+        for paper in papers if can_print() else ():
             assert not lost(folder / "report.html", tmp_path, paper)
         summary = (folder / "summary.json").read_text(encoding="utf-8")
         assert page.count("<h2>") >= (3 if script.stem in SECTIONED else 0)

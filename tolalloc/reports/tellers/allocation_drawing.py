@@ -115,8 +115,8 @@ def _after(row: _Dimension) -> list[Source]:
 
 
 def _change(row: _Source) -> float:
-    """Return the change of a zone [%]."""
-    return (row[1].zone / row[0].zone - 1) * 100
+    """Return the change of a zone, 0 where only the last bits of a product differ [%]."""
+    return round((row[1].zone / row[0].zone - 1) * 100, 8) + 0.0
 
 
 def _processes(result: AllocationResult) -> tuple[Column[_Source], Column[_Source]]:
