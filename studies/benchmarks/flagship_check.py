@@ -75,7 +75,10 @@ def drawn(known: Prepared, model: ReducerModel, units: int, seed: int) -> dict[s
         count = min(AT_ONCE, units - first)
         uniform = generator.random((count, len(errors.columns)))
         x = errors.deviations(errors.standard_values(uniform), errors.zones)
-        rows = numeric.deviations(reducer, dict(zip(errors.columns, x.T, strict=True)))
+        named = dict(zip(errors.columns, x.T, strict=True))
+        # The table's rows deviate from the amounts in force; plain functions take the amounts themselves.
+        amounts = {name: amount + named.get(name, 0.0) for name, amount in reducer.modification.deviations.items()}
+        rows = numeric.deviations(reducer, {**named, **amounts})
         part = independent(reducer, rows) | solved(model, x, (ta.FRICTION_TORQUE, PRELOAD))
         if first < FRICTION_UNITS:
             part |= solved(model, x[: FRICTION_UNITS - first], (EFFICIENCY, TORSIONAL_STIFFNESS))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from tolalloc.allocation.space.output_sample import DesignSample, LimitedSample, OutputSample
 from tolalloc.allocation.space.problem import OneSidedConstraint, Stack
@@ -223,7 +223,7 @@ def _overlap(
         weights = units.stand_for
     room = max(allowed, 0.5) if wider == 1.0 else wider * joint.failures * drawn
 
-    def beyond(overlap: float) -> Float[np.ndarray, " unit"]:
+    def beyond(overlap: float) -> Bool[np.ndarray, " unit"]:
         limits = [tail.excess(joint.share(at, overlap, wider)) for at, tail in enumerate(tails)]
         return np.asarray((excesses > np.array(limits)[:, np.newaxis]).any(axis=0))
 
