@@ -167,7 +167,7 @@ def drawn(request, tmp_path_factory):
 
 
 def cost_cell(results):
-    return f"D{2 + len(results.chosen.constraints)}"
+    return f"D{2 + len(results.chosen.alone)}"
 
 
 def scaled(results, workbook, position, factor):
@@ -183,7 +183,7 @@ def test_the_workbook_says_what_tolalloc_says_of_the_drawing(drawn):
     results, folder = drawn
     workbook = Workbook(folder / "drawing.xlsx")
     assert workbook.value("requirements", cost_cell(results)) == pytest.approx(results.chosen.cost)
-    for row, side in enumerate(results.chosen.constraints, start=2):
+    for row, side in enumerate(results.chosen.alone, start=2):
         assert workbook.value("requirements", f"A{row}") == side.stack.name
         told = workbook.value("requirements", f"D{row}")
         assert told == pytest.approx(side.limit + side.sign * side.predicted(results.chosen.design))
@@ -210,7 +210,7 @@ def test_the_workbook_says_what_tolalloc_says_of_another_zone(drawn, factor):
         design = scaled(results, workbook, position, factor)
         cost = space.problem(()).cost(design[:-2], made) + space.locked_cost
         assert workbook.value("requirements", cost_cell(results)) == pytest.approx(cost)
-        for row, side in enumerate(results.chosen.constraints, start=2):
+        for row, side in enumerate(results.chosen.alone, start=2):
             told = workbook.value("requirements", f"D{row}")
             assert told == pytest.approx(
                 side.limit + side.sign * (side.predicted(design) + relief(results, side, design))
@@ -232,7 +232,7 @@ def test_formulas_hold_plain_numbers_and_the_zones_to_change_are_marked(drawn):
         for cell in row
         if isinstance(cell.value, str) and cell.value.startswith("=")
     ]
-    sides = len(results.chosen.constraints)
+    sides = len(results.chosen.alone)
     groups = results.drawn.groups
     further = sum(name in groups and not members[0].locked for name, members in results.lines) - len(groups)
     assert len(formulas) == 5 * len(groups) + 2 * further + 2 * sides + 1 + 3 * sides + 1

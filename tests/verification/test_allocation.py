@@ -283,7 +283,7 @@ def test_a_step_keeps_every_local_model_and_the_region(three):
     verifier, found = three
     stacks = aimed(found, [found])
     processes = verifier.space.process_positions(found.design)
-    step = Programs(verifier.space, 4).step(stacks, processes, found.design, 2.5)
+    step, _ = Programs(verifier.space, 4).step(stacks, processes, found.design, 2.5)
     assert max(stack.load(step[:-2], step[-2:]) - stack.budget for stack in stacks) < 1e-6
     assert (step <= found.design * 2.5 * (1 + 1e-9)).all()
     assert step[-1] > found.design[-1]  # 8 µm are too few for a radial clearance above 2 µm
@@ -308,7 +308,7 @@ def test_locked_clearances_stay(three, prepared):
     settings = zip(prepared.space.settings, found.settings, strict=True)
     locked = replace(prepared.space, settings=tuple(replace(own, lower=at, upper=at) for own, at in settings))
     stacks = aimed(found, [found])
-    step = Programs(locked, 4).step(stacks, locked.process_positions(found.design), found.design, 2.5)
+    step, _ = Programs(locked, 4).step(stacks, locked.process_positions(found.design), found.design, 2.5)
     np.testing.assert_allclose(step[-2:], found.design[-2:], rtol=1e-12)
 
 

@@ -87,7 +87,8 @@ def bench_files(reducer: Reducer, errors: ErrorModel, deviations: Float[np.ndarr
     angle = 2 * np.pi * np.arange(_READINGS) / _READINGS
     curves = twisted(-rated, angle, "curve")
     loops = np.concatenate([twisted(float(level) * rated, np.zeros(1), "loop") for level in _LEVELS], axis=1)
-    files = {"bench_units.csv": _parts(errors, deviations)}
+    built = deviations + [true.modification.deviations.get(column, 0.0) for column in errors.columns]
+    files = {"bench_units.csv": _parts(errors, built)}
     for unit, (curve, loop) in enumerate(zip(curves, loops, strict=True), start=1):
         for kind, first, along, read in (
             ("curve", "angle [deg]", angle / DEGREE, curve),
@@ -100,7 +101,7 @@ def bench_files(reducer: Reducer, errors: ErrorModel, deviations: Float[np.ndarr
 
 
 def _parts(errors: ErrorModel, deviations: Float[np.ndarray, "unit column"]) -> str:
-    """Return the errors of the parts, a row per unit."""
+    """Return the errors of the parts, a row per unit; amounts of modification are whole ones, as in a unit file."""
     columns = errors.columns
     units = [
         BuiltUnit(name=str(unit), source="simulated", deviations=dict(zip(columns, map(float, row), strict=True)))

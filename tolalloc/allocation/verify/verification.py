@@ -106,8 +106,11 @@ class VerifiedDesign:
 
     @property
     def blocking(self) -> Check:
-        """The requirement with the largest relative excess."""
-        return max(self.checks, key=lambda check: check.tightest.relative_excess)
+        """The limit with the largest relative excess; all limits at once only where each one alone is kept."""
+        last = self.jointly
+        alone = self.checks[: -1 if last else None]
+        found = max(alone, key=lambda check: check.tightest.relative_excess)
+        return last if last and found.tightest.excess <= 0 else found
 
     @property
     def quantile_bound(self) -> float:
