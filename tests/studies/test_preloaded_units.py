@@ -20,6 +20,7 @@ from tolalloc.exceptions import InputError
 from tolalloc.reducers.choice import ReducerChoice
 from tolalloc.reducers.equivalent.perfect import preload, rated_pin_force
 from tolalloc.reducers.model import ReducerModel
+from tolalloc.reducers.reducer.idle_torque import IdleTorque
 from tolalloc.reports.portrait import Examination, portrait_of
 from tolalloc.reports.wording import number
 from tolalloc.study.prepared import Prepared
@@ -133,17 +134,19 @@ def test_no_load_torque_is_said_at_output_and_motor_beside_the_one_that_the_cata
         x = asked.errors.deviations(asked.errors.standard_values(uniform), scale * asked.errors.zones)
         return asked.model, x, portrait_of(asked.model).examination(asked.model.examined(x))
 
-    model, x, said = examined(0.75, 1.0)
+    model, x, said = examined(2.75, 1.0)
+    idle = IdleTorque.of(model.reducer).together
     torque = preload(model.kernel.model, model.kernel.errors(x)).friction_torque
     half, most = np.median(torque), np.quantile(torque, 0.9973)
-    for value in (half, most, most / 105, 0.75, 100 * most / 167):
+    for value in (half, most, most / 105, idle, 100 * most / 167):
         assert number(float(value), ".2g") in said.fault
-    assert number(0.75, ".3g") in said.but
+    assert "(assumed)" in said.fault
+    assert number(2.75, ".3g") in said.but
     # A drawing whose pins press little is held to the catalogue's torque, too, and to nothing where it states none.
-    _, _, little = examined(5e-4, 1e-3)
-    assert "0.0005" in little.but and little.fault
+    _, _, little = examined(idle + 5e-4, 1e-3)
+    assert number(idle + 5e-4, ".3g") in little.but and little.fault
     assert examined(None, 1e-3)[2].but == ""
-    assert model.own_limits == {ta.PRELOAD: model.rated_pin_force, ta.FRICTION_TORQUE: 0.75}
+    assert model.own_limits == {ta.PRELOAD: model.rated_pin_force, ta.FRICTION_TORQUE: 2.75 - idle}
 
 
 def test_a_model_of_a_user_is_in_order_without_a_but():

@@ -28,9 +28,10 @@ from tolalloc.reducers.equivalent.hysteresis import (
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import Solved
 from tolalloc.reducers.equivalent.perfect import preload
-from tolalloc.reducers.reducer.bearings import CONTACTS, Friction, loss_factor
+from tolalloc.reducers.reducer.bearings import CONTACTS, CRANK_BEARINGS, Friction, loss_factor
 from tolalloc.reducers.reducer.design import Clearances
 from tolalloc.reducers.reducer.files import PRESETS, load_reducer
+from tolalloc.reducers.reducer.idle_torque import IdleTorque
 
 ANGLES = TURN_ANGLES[::3]
 NONE = Friction(**dict.fromkeys(CONTACTS, 0.0))
@@ -235,3 +236,35 @@ def test_a_file_states_its_own_coefficients(tmp_path):
     path.write_text(text + "\n[friction]\npins = 0.6\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"friction\.pins is 0\.6"):
         load_reducer(path)
+
+
+def test_seals_grease_and_preload_by_hand():
+    """RV-20E: an output bearing of 93.6 mm; needles on 13.4 mm turn at 600/min, where ν·n is 60,000 mm²/s/min."""
+    reducer = load_reducer("rv20e")
+    found, cranks = IdleTorque.of(reducer), 1e-10 * 60_000 ** (2 / 3) * 13.4**3 * 40
+    assert found.seals == pytest.approx(0.4 * 100 * np.pi * 0.0936 * 0.0936 / 2)
+    assert found.grease == pytest.approx((4 * 12 + 4 * 6) * cranks + 2 * 160e-10 * 93.6**3)
+    model, errors = ground(reducer)
+    pressed = friction_torques(Solved.of(model.equilibria(errors, -1e-6, ANGLES[:1])))
+    bearings = sum(float(pressed[name][0, 0]) for name in (*CRANK_BEARINGS, "carrier_bearing"))
+    assert found.preload == pytest.approx(bearings, rel=1e-4)
+
+
+def test_a_file_states_what_seals_and_grease_take_and_a_catalogue_leaves_room_for_them(tmp_path):
+    text = (PRESETS / "rv20e.reducer.toml").read_text(encoding="utf-8")
+    path = tmp_path / "mine.toml"
+    path.write_text(text + "\n[friction]\nseals_nm = 4.5\ngrease_nm = 0\n", encoding="utf-8")
+    found = IdleTorque.of(load_reducer(path))
+    assert (found.seals, found.grease, found.turning) == (4.5, 0.0, 4.5)
+    stated = text.replace("[catalogue]", "[catalogue]\nno_load_torque_nm = 1.5")
+    assert stated != text
+    path.write_text(stated, encoding="utf-8")
+    with pytest.raises(InputError, match=r"no_load_torque_nm is 1\.5; allowed is more than 1\.6.*friction\.seals_nm"):
+        load_reducer(path)
+    path.write_text(stated + "\n[friction]\nseals_nm = 0.1\n", encoding="utf-8")
+    assert load_reducer(path).catalogue.no_load_torque == 1.5
+
+
+def test_a_seal_whose_size_no_bearing_tells_is_left_open():
+    found = IdleTorque.of(load_reducer("rv20e_liu2020"))
+    assert (found.seals, found.grease, found.together) == (None, 0.0, 0.0)

@@ -19,6 +19,7 @@ from tolalloc.reducers import DISC_TEMPERATURE, FRICTION_TORQUE, PEAK_TO_PEAK, P
 from tolalloc.reducers.equivalent.hysteresis import HysteresisLoop
 from tolalloc.reducers.equivalent.perfect import exact_loop, preload, rated_pin_force
 from tolalloc.reducers.reducer.design import MODIFICATION_CONVENTION, Modification, Reducer, thermal_shift
+from tolalloc.reducers.reducer.idle_torque import IdleTorque
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.reducers.response.kernel import (
     SEEN,
@@ -325,12 +326,13 @@ class ReducerModel(Model):
         """No pin may press harder without torque than the rated torque makes it: such a unit is preloaded.
 
         Only where bearings are stated by their dimensions: with printed stiffnesses, far too large, nearly all are.
-        With either the pins' friction may take no more without load than the catalogue allows, where it states that.
+        With either the pins' friction may take no more without load than the catalogue allows, where it states that:
+        less what seals, grease and preloaded rollers take.
         """
         limits = {PRELOAD: self.rated_pin_force} if self.reducer.parts else {}
         catalogue = self.reducer.catalogue
         if catalogue and catalogue.no_load_torque:
-            limits[FRICTION_TORQUE] = catalogue.no_load_torque
+            limits[FRICTION_TORQUE] = catalogue.no_load_torque - IdleTorque.of(self.reducer).together
         return limits
 
     @cached_property

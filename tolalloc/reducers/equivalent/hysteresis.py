@@ -30,7 +30,7 @@ from tolalloc.reducers.equivalent.condensation import CondensedAngles, bilateral
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import Forces, Solved, forces
 from tolalloc.reducers.equivalent.springs import Positions
-from tolalloc.reducers.reducer.bearings import FrictionDimensions, Part, RollingBearing, loss_factor
+from tolalloc.reducers.reducer.bearings import CRANK_BEARINGS, FrictionDimensions, Part, RollingBearing, loss_factor
 from tolalloc.reducers.reducer.design import Reducer
 
 
@@ -93,7 +93,6 @@ class Play:
 
 
 MESH, PINS = "gear_mesh", "pins"
-CRANK_BEARINGS = ("crank_disc_bearing", "crank_carrier_bearing")
 
 
 def _angles_of_pins(
@@ -156,7 +155,7 @@ def friction_torques(solved: Solved) -> dict[str, Float[np.ndarray, "sample angl
     It is that at the output: the coefficient times the sum of force times sliding way per radian of the output, the
     sun turning. Forces are those of the equilibria, which have no friction.
 
-    T_f = Σ µ·F·way; Coulomb's friction, no seals and no churning; mesh µ·H_v·F·r_b1·(i − 1).
+    T_f = Σ µ·F·way; Coulomb's friction, no seals and no grease (`IdleTorque`); mesh µ·H_v·F·r_b1·(i − 1).
 
     References
     ----------

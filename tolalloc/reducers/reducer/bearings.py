@@ -8,7 +8,7 @@ What the friction of a reducer follows from: a coefficient per kind of contact, 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import asin, cos, log, pi, sin, sqrt, tan
 from typing import Annotated
@@ -315,9 +315,21 @@ class Friction:
     crank_carrier_bearing: Coefficient = 0.0018
     carrier_bearing: Coefficient = 0.0020
     gear_mesh: Coefficient = 0.06  # µ_z, mean over the path of contact [-]
+    # What seals and grease take at the output whatever the load, where measured; else by a rule, `IdleTorque` [N·m]
+    seals: Annotated[float | None, Field(alias="seals_nm", ge=0, le=1e4)] = None
+    grease: Annotated[float | None, Field(alias="grease_nm", ge=0, le=1e4)] = None
+
+    @property
+    def coefficients(self) -> dict[str, float]:
+        """Coefficient of every kind of contact [-]."""
+        return {name: getattr(self, name) for name in CONTACTS}
 
 
-CONTACTS = {field.name: field.name.replace("_", " ").replace("crank ", "crank–") for field in fields(Friction)}
+CRANK_BEARINGS = ("crank_disc_bearing", "crank_carrier_bearing")
+CONTACTS = {
+    name: name.replace("_", " ").replace("crank ", "crank–")
+    for name in ("pins", *CRANK_BEARINGS, "carrier_bearing", "gear_mesh")
+}
 """Kind of contact → its name."""
 
 
@@ -354,11 +366,11 @@ def loss_factor(first_teeth: int, second_teeth: int, contact_ratio: float) -> fl
 
 def friction_assumptions(friction: Friction, dimensions: FrictionDimensions) -> tuple[str, ...]:
     """Return what the numbers on friction take for granted, and what they leave out."""
-    coefficients = ", ".join(f"{CONTACTS[name]} {value:g}" for name, value in vars(friction).items())
+    coefficients = ", ".join(f"{CONTACTS[name]} {value:g}" for name, value in friction.coefficients.items())
     unknown = ", ".join(CONTACTS[name] for name in dimensions.unknown)
     return (
         f"coefficients of friction: {coefficients}; the same at every speed and temperature",
-        "friction: Coulomb's, at the forces without friction; no seals, no churning of grease, no flanges of rollers",
+        "friction: Coulomb's, at the forces without friction; no churning of gears and discs, no flanges of rollers",
         *(
             (f"friction of {unknown}: not known, because the file states a stiffness and no dimensions",)
             * bool(unknown)

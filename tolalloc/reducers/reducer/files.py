@@ -38,6 +38,7 @@ from tolalloc.reducers.reducer.design import (
     Reducer,
     at_torque,
 )
+from tolalloc.reducers.reducer.idle_torque import IdleTorque
 from tolalloc.reducers.reducer.stiffness import (
     TAPER_ANGLE,
     Crankshaft,
@@ -357,7 +358,17 @@ class ReducerRecord(Record):
                     f"catalogue.torsional_rigidity_nm_per_arcmin is {stated:g}; allowed is {least:.3g} to {most:.3g}, "
                     f"a twist of {_SMALLEST_TWIST:g} to {_LARGEST_TWIST:g} arcmin under the rated {rated:g} N·m"
                 )
+            self._require_room_for_idle(self.catalogue.no_load_torque)
         return self
+
+    def _require_room_for_idle(self, stated: float | None) -> None:
+        """Raise where seals, grease and preload alone take what the catalogue allows without load."""
+        taken = IdleTorque.of(self.reducer()).together
+        if stated is not None and stated <= taken:
+            raise ValueError(
+                f"catalogue.no_load_torque_nm is {stated:g}; allowed is more than {taken:.3g}, which seals, grease and "
+                "preloaded rollers take; friction.seals_nm and friction.grease_nm state what they are known to take"
+            )
 
     def reducer(self) -> Reducer:
         """Return the reducer in SI units."""

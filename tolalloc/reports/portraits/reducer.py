@@ -23,6 +23,7 @@ from tolalloc.reducers.equivalent.outputs import order_spectrum
 from tolalloc.reducers.equivalent.perfect import twist_shares
 from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.reducer.design import CycloidStage, Modification, Reducer
+from tolalloc.reducers.reducer.idle_torque import IdleTorque
 from tolalloc.reducers.scene import PER_CRANK_TURN, Scene, is_placed, scene_of
 from tolalloc.reducers.settings import FLANK, RADIAL
 from tolalloc.reports.document import Section
@@ -302,12 +303,15 @@ _MEANS = "A preloaded reducer turns, but it runs warm, wears early and has no lo
 def _no_load(model: ReducerModel, figures: Mapping[str, float]) -> str:
     """Return what the pins' friction takes without load, at the output and at the motor, beside the catalogue."""
     half, most = (figures[f"no-load torque of the pins, {which} [N·m]"] for which in ("median", "99.73 %"))
-    rated, stated = model.reducer.load.rated_torque, _catalogue_no_load(model)
-    beside = f", where the catalogue allows {stated:.3g} N·m" if stated else ""
+    rated, stated, idle = model.reducer.load.rated_torque, _catalogue_no_load(model), IdleTorque.of(model.reducer)
+    beside = f"; the catalogue allows {stated:.3g} N·m in all" if stated else ""
+    known = "seals, grease and preloaded rollers" if idle.seals is not None else "grease and preloaded rollers"
+    assumed = "" if None not in (model.reducer.friction.seals, model.reducer.friction.grease) else " (assumed)"
     return (
         f"Without load the friction of the pins takes {number(half, '.2g')} N·m at the output in half of them and up "
-        f"to {number(most, '.2g')} N·m in 99.73 %{beside}: {number(100 * most / rated, '.2g')} % of the rated torque, "
-        f"{number(most / abs(model.reducer.ratio), '.2g')} N·m at the motor; seals and grease come on top."
+        f"to {number(most, '.2g')} N·m in 99.73 %: {number(100 * most / rated, '.2g')} % of the rated torque, "
+        f"{number(most / abs(model.reducer.ratio), '.2g')} N·m at the motor. {known.capitalize()} take "
+        f"{number(idle.together, '.2g')} N·m more{assumed}{beside}."
     )
 
 
@@ -324,7 +328,8 @@ def _reasons(model: ReducerModel, figures: Mapping[str, float]) -> list[str]:
         force = figures["pin force of the rated torque [N]"]
         more = f"a pin presses with more than the {force:,.0f} N of rated torque{by}"
         found.append(f"{number(share, '.1%')} are preloaded ({more})")
-    stated, most = _catalogue_no_load(model), figures["no-load torque of the pins, 99.73 % [N·m]"]
+    most = figures["no-load torque of the pins, 99.73 % [N·m]"] + IdleTorque.of(model.reducer).together
+    stated = _catalogue_no_load(model)
     if stated and most > stated:
         found.append(
             f"99.73 % take up to {number(most, '.2g')} N·m without load (the catalogue allows {stated:.3g} N·m)"

@@ -16,6 +16,7 @@ from tolalloc.reducers.equivalent.outputs import OUTPUTS, Attribution, forces
 from tolalloc.reducers.equivalent.perfect import PRELOAD_ASSUMPTION
 from tolalloc.reducers.reducer.bearings import CONTACTS, friction_assumptions
 from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.idle_torque import IdleTorque
 from tolalloc.reducers.transmission_error import TransmissionErrorResult
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
@@ -65,7 +66,8 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
         strongest = ", ".join(_say("order", **wave) for wave in found["main_orders"][:3])
         orders = _say("strongest", orders=strongest) if strongest else _say("flat")
         rigidity, _ = self._rigidity
-        said = (_say("spans", **found | {"orders": orders}), _say("friction", **friction) if friction else "", rigidity)
+        rubbing = _say("friction", **friction, idle=self._idle) if friction else ""
+        said = (_say("spans", **found | {"orders": orders}), rubbing, rigidity)
         return tuple(sentence for sentence in said if sentence)
 
     @property
@@ -87,6 +89,15 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
             return ()
         taken, ratio = float(found.friction_torque[0]), abs(self.result.reducer.ratio)
         return (_say("preloaded", force=found.pin_force[0], rated=rated, output=taken, motor=taken / ratio),)
+
+    @property
+    def _idle(self) -> str:
+        """What seals and grease take, assumed unless the reducer's file states it."""
+        reducer = self.result.reducer
+        found, stated = IdleTorque.of(reducer), reducer.friction
+        assumed = "" if None not in (stated.seals, stated.grease) else _say("idle_assumed")
+        key = "idle_grease" if found.seals is None else "idle_both"
+        return _say(key, seals=found.seals, grease=found.grease, assumed=assumed)
 
     @property
     def assumptions(self) -> tuple[str, ...]:
@@ -150,7 +161,7 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
             "backlash_arcmin": _pair(result.loop.backlash, ARCMINUTE),
             "torsional_stiffness_nm_per_arcmin": _pair(result.loop.torsional_stiffness, 1 / ARCMINUTE),
             "every_bearing_under_its_own_load": _own_loads(result.own_loads) if result.own_loads else None,
-            "friction": _friction(result.friction) if result.friction else None,
+            "friction": _friction(result.friction, IdleTorque.of(result.reducer)) if result.friction else None,
             "reversal_arcsec": {
                 "mean": float(reversed_by.mean() / ARCSECOND),
                 "peak_to_peak": float(np.ptp(reversed_by) / ARCSECOND),
@@ -287,8 +298,8 @@ def force_figure(equilibria: Equilibria) -> Figure:
     )
 
 
-def _friction(loop: FrictionLoop) -> dict[str, Any]:
-    """Return efficiency, loop and friction by contact of the unit, for a program."""
+def _friction(loop: FrictionLoop, idle: IdleTorque) -> dict[str, Any]:
+    """Return efficiency, loop, friction by contact of the unit, and what turns it beside, for a program."""
     return {
         "efficiency_at_rated_torque_percent": 100.0 * float(loop.rated.efficiency[_UNIT]),
         "no_load_torque_nm": float(loop.no_load.friction_torque[_UNIT]),
@@ -302,6 +313,8 @@ def _friction(loop: FrictionLoop) -> dict[str, Any]:
             }
             for name, torque in loop.rated.by_contact.items()
         ],
+        "seals_nm": idle.seals,
+        "grease_nm": idle.grease,
     }
 
 
@@ -309,12 +322,17 @@ def _friction_table(reducer: Reducer, loop: FrictionLoop) -> pd.DataFrame:
     """Return the friction torque of every kind of contact, at rated torque and without torque."""
     import pandas as pd
 
-    found, rated = _friction(loop)["by_contact"], abs(loop.rated.torque)
-    coefficients = {CONTACTS[name]: value for name, value in vars(reducer.friction).items()}
+    idle, rated = IdleTorque.of(reducer), abs(loop.rated.torque)
+    found = _friction(loop, idle)["by_contact"]
+    coefficients = {CONTACTS[name]: value for name, value in reducer.friction.coefficients.items()}
     rows = [(own["contact"], f"{coefficients[own['contact']]:g}", own["rated_nm"], own["no_load_nm"]) for own in found]
-    rows.append(("together", "", sum(row[2] for row in rows), sum(row[3] for row in rows)))
+    without_load = sum(row[3] for row in rows)
+    rows.append(("contacts together", "", sum(row[2] for row in rows), without_load))
+    told = [(name, value, f"{at:.3g}", f"{100 * at / rated:.2f}", f"{none:.2g}") for name, value, at, none in rows]
+    beside = (("seals", idle.seals), ("grease", idle.grease), ("with seals and grease", without_load + idle.turning))
+    told += [(name, "", "", "", "?" if torque is None else f"{torque:.2g}") for name, torque in beside]
     return pd.DataFrame(
-        [(name, value, f"{at:.3g}", f"{100 * at / rated:.2f}", f"{idle:.2g}") for name, value, at, idle in rows],
+        told,
         columns=[
             "contact",
             "coefficient [-]",

@@ -1,0 +1,137 @@
+"""Torque that turns a reducer without load beside the friction of its contacts: seals, grease, preloaded rollers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+
+from tolalloc.reading.units import MILLIMETRE
+from tolalloc.reducers.reducer.bearings import CRANK_BEARINGS, RollingBearing
+from tolalloc.reducers.reducer.design import Reducer
+
+_OUTPUT_SPEED = 15.0
+"""Speed of the output at which catalogues state the rated torque; the grease is churned at it [1/min]."""
+_LIP_FORCE, _LIP_COEFFICIENT = 100.0, 0.4
+"""Force of a seal's lip over its circumference [N/m] and its coefficient of friction in grease [-]; assumptions."""
+_VISCOSITY = 100.0
+"""Kinematic viscosity of the grease's oil at running temperature; an assumption [mm²/s]."""
+_LUBRICATION = {"crank_disc_bearing": 12.0, "crank_carrier_bearing": 6.0, "carrier_bearing": 2.0}
+"""Palmgren's f0 of needle rollers, tapered rollers and angular-contact balls in grease [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class IdleTorque:
+    """What turns a reducer without load beside its contacts, at the output [N·m].
+
+    Notes
+    -----
+    One lip around the output at the pitch diameter of the carrier bearing, T = µ·q·π·d²/2; grease in the bearings by
+    Palmgren, theory page equation (78); the preload of the bearings' rollers by µ·F·d/2. All are turned by virtual work
+    to the output, as cranks turn zp times as fast. A seal at the input is the motor's; churning of gears and discs is
+    left out. Coefficients, viscosity and the lip's force are assumptions.
+    """
+
+    seals: float | None  # None where no carrier bearing says how large the seal is
+    grease: float
+    preload: float
+
+    @classmethod
+    def of(cls, reducer: Reducer) -> IdleTorque:
+        """Return the torques of a reducer; those that its file states as they are stated.
+
+        References
+        ----------
+        A. Palmgren, Ball and Roller Bearing Engineering, 3rd ed. (1959), for the grease; own derivation.
+
+        Examples
+        --------
+        >>> from tolalloc.reducers.reducer.files import load_reducer
+        >>> found = IdleTorque.of(load_reducer("rv20e"))
+        >>> round(found.seals, 2), round(found.grease, 2), round(found.preload, 3)
+        (0.55, 1.09, 0.049)
+        """
+        stated, dimensions = reducer.friction, reducer.friction_dimensions
+        bearings = {name: (getattr(dimensions, name), *_turning(reducer, name)) for name in _LUBRICATION}
+        known = {name: own for name, own in bearings.items() if own[0] is not None}
+        main = dimensions.carrier_bearing
+        return cls(
+            seals=stated.seals if stated.seals is not None or main is None else lip_torque(main.pitch_diameter),
+            grease=sum(
+                count * bearing.rows * speed * grease_torque(_LUBRICATION[name], bearing, speed * _OUTPUT_SPEED)
+                for name, (bearing, count, speed) in known.items()
+            )
+            if stated.grease is None
+            else stated.grease,
+            preload=sum(
+                getattr(stated, name) * count * bearing.rows * bearing.idle_load * bearing.pitch_diameter / 2.0 * speed
+                for name, (bearing, count, speed) in known.items()
+            ),
+        )
+
+    @property
+    def turning(self) -> float:
+        """What seals, as far as they are known, and grease take [N·m]."""
+        return (self.seals or 0.0) + self.grease
+
+    @property
+    def together(self) -> float:
+        """What all three take [N·m]."""
+        return self.turning + self.preload
+
+
+def _turning(reducer: Reducer, name: str) -> tuple[int, int]:
+    """Return how many bearings of a kind there are, and how fast they turn over the output [-]."""
+    if name not in CRANK_BEARINGS:
+        return 1, 1
+    journals = reducer.disc_count if name == "crank_disc_bearing" else 1
+    return reducer.crank_count * journals, reducer.cycloid_stage.pin_count
+
+
+def lip_torque(diameter: float) -> float:
+    """Return the friction torque of a shaft's lip seal, µ·q·π·d²/2 with assumed µ and q [N·m].
+
+    Parameters
+    ----------
+    diameter
+        Of the shaft at the lip [m].
+
+    References
+    ----------
+    Own derivation: a line force q on the circumference, µ = 0.4 and q = 100 N/m assumed.
+
+    Examples
+    --------
+    >>> round(lip_torque(0.1), 3)
+    0.628
+    """
+    return _LIP_COEFFICIENT * _LIP_FORCE * pi * diameter**2 / 2.0
+
+
+def grease_torque(factor: float, bearing: RollingBearing, speed: float) -> float:
+    """Return the torque of a bearing row that no load decides, f0·10⁻¹⁰·(ν·n)^(2/3)·d_m³, theory page (78) [N·m].
+
+    With d_m in mm, ν = 100 mm²/s assumed and n in 1/min; below ν·n = 2000 the power is 160.
+
+    Parameters
+    ----------
+    factor
+        Palmgren's f0 [-].
+    bearing
+        The bearing.
+    speed
+        Of one ring against the other [1/min].
+
+    References
+    ----------
+    A. Palmgren, Ball and Roller Bearing Engineering, 3rd ed. (1959).
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> needles = load_reducer("rv20e").friction_dimensions.crank_disc_bearing
+    >>> round(1e3 * grease_torque(12.0, needles, 600.0), 2)  # [N·mm]
+    4.43
+    """
+    flow = _VISCOSITY * speed
+    power = flow ** (2.0 / 3.0) if flow >= 2000.0 else 160.0
+    return float(factor * 1e-10 * power * (bearing.pitch_diameter / MILLIMETRE) ** 3)
