@@ -114,6 +114,17 @@ def test_another_reducer_torque_yield_or_side_is_another_question(tmp_path, chan
         assert json.loads(tolalloc("compare", *pair, "--json").stdout)["same question"] is False
 
 
+def test_a_limit_beside_the_leading_one_is_part_of_the_question(tmp_path):
+    def required(upper, shown="99.73 % of units"):
+        lost = {"requirement": "lost motion [arcmin]", "limit": f"at most {upper} arcmin", "shown for": shown}
+        return {"requirements": [lost]}
+
+    asked = (required(1), required(1), required(1.2), required(1, "99 % of units"), {})
+    one, *others = (run_folder(tmp_path / f"run{at}", **own) for at, own in enumerate(asked))
+    same = [json.loads(tolalloc("compare", one, own, "--json").stdout)["same question"] for own in others]
+    assert same == [True, False, False, True]  # the last is of a version that did not say it
+
+
 def test_rankings_with_a_lower_limit_alone_are_compared(tmp_path):
     runs = []
     for name, index in (("one", 0.3), ("two", 0.4)):

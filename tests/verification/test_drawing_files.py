@@ -45,7 +45,7 @@ def gap(a, b, c, d, spring):
 
 def study(**changed) -> ta.Study:
     own = {"limits": {GAP: ta.Limit(lower=14.9, upper=15.15, show=ta.AtYield(0.9973))}, "name": "drawn", "seed": 1}
-    own["title_block"] = {"drawing number": "X-17"}
+    own["title_block"] = {"drawing number": "X-17", "material": "GCr15"}
     setting = ta.Setting(name=SPRING, value=0.1, lower=-0.5, upper=0.5, step=0.01)
     return ta.Study(
         ta.model(gap, inputs=("a", "b", "c", "d"), outputs=(GAP,), settings=(setting,)),
@@ -203,7 +203,7 @@ def test_the_sheet_has_layers_and_a_title_block_that_invents_nothing(told, answe
     used = {own.dxf.layer for own in drawing.modelspace()}
     assert used == set(LAYERS) - {"SIGN_PICTURE"}  # an own function says nothing of grinding
     fields = {text for row in cells(folder / "frames.dxf", "TITLE_BLOCK") for text in row}
-    assert {"drawing number X-17", "author", "revision", "material", "study drawn"} <= fields
+    assert {"drawing number X-17", "author", "revision", "material GCr15", "study drawn"} <= fields
     assert f"study hash {told.header.digest[:12]}" in fields
     shown = frames(folder / "frames.dxf")
     assert shown == {answer.line_name(own): str(callout(own[1][0])) for own in answer.lines}
@@ -211,7 +211,7 @@ def test_the_sheet_has_layers_and_a_title_block_that_invents_nothing(told, answe
 
 def test_the_table_says_what_the_title_block_states(folder):
     comments = [line for line in (folder / "allocation.csv").read_text("utf-8").splitlines() if line.startswith("# ")]
-    assert says(comments, "allocation.table_block", fields="drawing number X-17")
+    assert says(comments, "allocation.table_block", fields="drawing number X-17 - material GCr15")
 
 
 def recalculated(path, tmp_path):

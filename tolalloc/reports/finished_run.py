@@ -73,6 +73,12 @@ class FinishedRun:
         """Limits of the leading output by the names that the summary gives them, the upper one first."""
         return {name: value for name, value in self.summary.items() if name.startswith(_LIMITS)}
 
+    @property
+    def requirements(self) -> dict[str, tuple[str, str]]:
+        """Limited output → its limits and what was to be shown, in words; none in a ranking."""
+        rows = self.summary.get("requirements") or ()
+        return {str(row["requirement"]): (str(row["limit"]), str(row["shown for"])) for row in rows}
+
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
@@ -90,7 +96,10 @@ class Comparison:
     def same_question(self) -> bool:
         """Whether both were asked for the same reducer or model, torque, limits and yield."""
         asked = ("reducer", "model", "torque [N·m]", "yield target [-]", *self.first.limits, *self.second.limits)
-        return all(self.first.summary.get(name) == self.second.summary.get(name) for name in asked)
+        required = [run.requirements for run in self.runs if run.requirements]
+        return all(self.first.summary.get(name) == self.second.summary.get(name) for name in asked) and all(
+            own == required[0] for own in required
+        )
 
     @property
     def same_versions(self) -> bool:

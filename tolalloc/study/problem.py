@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 COMMON: Literal["common"] = "common"
 """What is asked of all limits at once is what each of them asks for, where that is one yield."""
-_TITLE_BLOCK = ("drawing number", "revision", "author")
+_TITLE_BLOCK = ("drawing number", "revision", "author", "material")
 _TITLES = ", ".join(_TITLE_BLOCK)
 _LONGEST_TEXT = 60
 _NAME = re.compile(r"[\w-][\w. -]{0,99}")
@@ -154,8 +154,8 @@ class Problem(NamedFields):
     effort
         How much may be computed.
     title_block
-        What the first page of a report says beside study and date: ``drawing number``, ``revision``, ``author``. What
-        is not said stays empty there, to be filled in by hand.
+        What the title blocks of page and drawing say beside study and date: ``drawing number``, ``revision``,
+        ``author``, and ``material`` on the drawing. What is not said stays empty there, to be filled in by hand.
     """
 
     called: ClassVar[str] = "study"

@@ -89,8 +89,8 @@ class Study(Problem):
     effort
         How much may be computed.
     title_block
-        What the first page of a report says beside study and date: ``drawing number``, ``revision``, ``author``. What
-        is not said stays empty there, to be filled in by hand.
+        What the title blocks of page and drawing say beside study and date: ``drawing number``, ``revision``,
+        ``author``, and ``material`` on the drawing. What is not said stays empty there, to be filled in by hand.
 
     Raises
     ------

@@ -111,7 +111,7 @@ def _title_block(result: AllocationResult, header: Header, today: date) -> tuple
         ("revision", stated.get("revision", "")),
         ("author", stated.get("author", "")),
         ("date", today.isoformat()),
-        ("material", ""),
+        ("material", stated.get("material", "")),
         ("units", _say("sheet_units")),
         ("limits", f"{status}{_say('sheet_status_quick') if header.quick else ''}"),
         ("checked", ""),
