@@ -214,9 +214,9 @@ def test_runs_of_several_limits_say_the_yield_of_each_and_of_all(tmp_path):
     assert run.yields == {"high": high.estimate, "low": low.estimate}
     assert run.joint == ranking.result.joint.estimate
     checked = ta.check(study, timed=True)
-    assert checked.result.joint.units == 256
-    assert says(checked.sentences, "check.all_limits", share=checked.result.joint.estimate)
-    assert ta.check(study).result.joint is None
+    assert checked.result.kept.joint.units == 256
+    assert says(checked.sentences, "check.today", share=checked.result.kept.joint.estimate)
+    assert ta.check(study).result.kept is None
     member = Member(name="apart", folder=run.folder, found=run)
     table = Answer(kind="series", header=checked.header, result=(member,)).summary
     assert table["studies"][0]["yield of all limits [-]"] == run.joint

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
+from tests.builders import says
 from tests.studies.command import ROOT, command, refused, tolalloc
 from tests.studies.scripts import study_script
 from tolalloc.drawings.drawing import Drawing
@@ -254,3 +255,49 @@ def test_a_question_of_ones_own_and_a_model_without_a_name_are_shown():
     assert repr(ta.Study(Source(), questions=[Own()])).startswith("Study('study': Source at none")
     with pytest.raises(UnknownNameError, match="question own: field 'units' is not known; it has none"):
         Own(units=3)
+
+
+class Heard:
+    """Progress that remembers what it was told."""
+
+    def __init__(self):
+        self.said = []
+
+    def begin(self, stage):
+        self.said.append(stage)
+
+    def advance(self, units):
+        self.said.append(units)
+
+    def tell(self, sentence):
+        self.said.append(sentence)
+
+
+def test_a_run_first_says_how_the_drawing_stands_as_it_is(tmp_path):
+    """Of a uniform deviation within ±3 µm five sixths lie below 2 µm and two thirds above −1 µm, one half between."""
+    row = {
+        "id": "a",
+        "plus": 3.0,
+        "minus": -3.0,
+        "unit": "µm",
+        "distribution": "uniform",
+        "min": 1,
+        "max": 9,
+        "cost": 1,
+    }
+    outputs = ("high [mm]", "low [mm]")
+    limits = {"high [mm]": ta.Limit(upper=0.002), "low [mm]": ta.Limit(lower=-0.001)}
+    study = ta.Study(
+        ta.model(lambda a: (a, a), inputs=("a",), outputs=outputs),
+        ta.Drawing.of_rows([row]),
+        limits=limits,
+        questions=[ta.Ranking()],
+        name="today",
+        seed=2,
+    )
+    found, heard = Prepared(study=study).kept_limits(1024), Heard()
+    for share, own in zip((5 / 6, 2 / 3, 1 / 2), (*found.each.values(), found.joint), strict=True):
+        assert own.estimate == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / 1024))
+    study.run(tmp_path / "run", "quick", heard)
+    assert heard.said[:2] == ["the drawing as it is", 1024]
+    assert says(heard.said[2], "check.today", share=found.joint.estimate)

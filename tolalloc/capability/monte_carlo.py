@@ -385,3 +385,17 @@ def kept_at_once(evaluation: Evaluation, outputs: Sequence[str], limits: Mapping
     kept = [own.kept_by(evaluation.values[:, outputs.index(name)]) for name, own in limits.items()]
     good = evaluation.good & np.all(kept, axis=0)
     return proportion(good.size, good.size - int(np.count_nonzero(good)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeptLimits:
+    """Which share of random units keeps each limit, and all of them at once."""
+
+    each: Mapping[str, Yield]  # Limited output → share of the units that keep its limits, the leading one first
+    joint: Yield  # Share of the units that keep all limits at once
+
+    @classmethod
+    def of(cls, evaluation: Evaluation, outputs: Sequence[str], limits: Mapping[str, Limits]) -> KeptLimits:
+        """Return what units say, as `kept_at_once` reads them."""
+        each = {name: kept_at_once(evaluation, outputs, {name: own}) for name, own in limits.items()}
+        return cls(each=each, joint=kept_at_once(evaluation, outputs, limits))

@@ -58,6 +58,11 @@ class Lines:
         if self._stage and time.perf_counter() - self._told >= _PAUSE:
             self._tell("so far")
 
+    def tell(self, sentence: str) -> None:
+        """Say what is known already; the stage that found it is finished."""
+        self._end("done")
+        note(sentence)
+
     def _end(self, how: str) -> None:
         if self._stage:
             self._tell(how)
@@ -113,6 +118,12 @@ class Bars:
         self._units += units
         rate = self._units / max(time.perf_counter() - self._began, 1e-9)
         self._bar.update(self._task, counted=self._units, rate=rate)
+
+    def tell(self, sentence: str) -> None:
+        """Say what is known already, above the bars; the stage that found it is finished."""
+        self._end()
+        self._task = None
+        self._bar.console.print(sentence, markup=False, highlight=False)
 
     def _end(self) -> None:
         if self._task is not None:

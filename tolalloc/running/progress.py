@@ -27,6 +27,10 @@ class Progress(Protocol):
         """So many more units are solved."""
         ...
 
+    def tell(self, sentence: str) -> None:
+        """Say what is known already, before the work is done."""
+        ...
+
 
 class Silent:
     """Progress that nobody is shown, as in a script or a notebook."""
@@ -36,6 +40,9 @@ class Silent:
 
     def advance(self, units: int) -> None:
         """So many more units are solved."""
+
+    def tell(self, sentence: str) -> None:
+        """Say what is known already."""
 
 
 @dataclass

@@ -11,11 +11,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-from jaxtyping import Float
-
-from tolalloc.capability.monte_carlo import Yield, kept_at_once
-from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, TolallocError
 from tolalloc.reports.finished_run import FinishedRun, Member, common_currency, read_run
 from tolalloc.reports.header import Header
@@ -84,25 +79,11 @@ def check(study: Study | str | Path, *, timed: bool = False, script: str = "") -
             space=space,
             requirements=requirements,
             notes=prepared.notes,
-            examined=model.examined(_random_units(prepared)),
+            examined=model.examined(prepared.random_units(_CHECKED)),
             times=_times(prepared) if timed else (),
-            joint=_kept(prepared) if timed and len(requirements) > 1 else None,
+            kept=prepared.kept_limits(_JUDGED) if timed else None,
         )
     return Answer(kind="check", header=header, result=result)
-
-
-def _kept(prepared: Prepared) -> Yield:
-    """Return the share of some random units at the zones of the drawing that keep all limits at once."""
-    limits = {own.output: own.limits for own in prepared.requirements}
-    response = prepared.model.reading(tuple(limits))
-    return kept_at_once(response(_random_units(prepared, _JUDGED)), response.outputs, limits)
-
-
-def _random_units(prepared: Prepared, units: int = _CHECKED) -> Float[np.ndarray, "unit column"]:
-    """Return the deviations of random units at the zones of the drawing."""
-    errors, seeds = prepared.errors, SeedTree(prepared.study.seed).child("check")
-    chunks = seeds.uniform_chunks(units, len(errors.columns))
-    return np.concatenate([errors.deviations(errors.standard_values(uniform), errors.zones) for uniform in chunks])
 
 
 def _times(prepared: Prepared) -> tuple[CheckedTime, ...]:

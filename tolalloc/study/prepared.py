@@ -8,13 +8,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
+from jaxtyping import Float
+
 from tolalloc.allocation.cost.process_costs import ProcessesOfSources, currency_of_costs, load_process_costs, priced
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import AllocationEffort
 from tolalloc.allocation.space.joint_yield import JointRequirement
 from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, Guarantee, OwnLimit, Requirement
 from tolalloc.capability.indices import Limits
+from tolalloc.capability.monte_carlo import KeptLimits
 from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.model import HasCopies, Model
 from tolalloc.reports.header import Header
@@ -203,6 +208,18 @@ class Prepared:
             self.space.processes,
         )
         return hashlib.sha256(repr(content).encode()).hexdigest()
+
+    def random_units(self, units: int) -> Float[np.ndarray, "unit column"]:
+        """Return the deviations of random units at the zones of the drawing [m, angles rad]."""
+        errors, seeds = self.errors, SeedTree(self.study.seed).child("check")
+        chunks = seeds.uniform_chunks(units, len(errors.columns))
+        return np.concatenate([errors.deviations(errors.standard_values(uniform), errors.zones) for uniform in chunks])
+
+    def kept_limits(self, units: int) -> KeptLimits:
+        """Return the shares of random units at the zones of the drawing that keep each limit and all at once."""
+        limits = {own.output: own.limits for own in self.requirements}
+        response = self.model.reading(tuple(limits))
+        return KeptLimits.of(response(self.random_units(units)), response.outputs, limits)
 
     @property
     def header(self) -> Header:

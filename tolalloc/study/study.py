@@ -12,6 +12,7 @@ from tolalloc.reading.named_fields import Rule
 from tolalloc.reports.document import Document, joined
 from tolalloc.reports.folder import claimed
 from tolalloc.reports.portrait import portrait_of
+from tolalloc.reports.tellers.check import today_sentence
 from tolalloc.running.chunks import Mapper
 from tolalloc.running.progress import Progress, RunRecord, Silent
 from tolalloc.running.result_cache import ResultCache
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
     from tolalloc.sensitivity.result import RankingResult
 
 _READ_BY_ALL = frozenset({"name", "questions", "effort", "title_block"})
+_JUDGED = 1024
+"""Random units that say how the drawing stands as it is [-]."""
 
 
 def _are_questions(given: object) -> bool:
@@ -241,6 +244,7 @@ def run(
     kept = replace(cache_beside(folder), solved_by=solved_by).pruned()
     prepared = Prepared(study=study, mapper=solved_by if fresh else kept)
     with claimed(folder) as beside:
+        _tell_today(prepared, asked, progress)
         answers = {
             question.kind: question.answer(prepared, _record(prepared, question, progress), checkpoint)
             for question in asked
@@ -254,6 +258,15 @@ def run(
             answer.add_files(beside)
         write_document(document, beside)
     return Run(answers=answers, folder=folder, document=document)
+
+
+def _tell_today(prepared: Prepared, asked: tuple[Question, ...], progress: Progress | None) -> None:
+    """Say how the drawing stands as it is, some seconds after the start; what is asked takes minutes."""
+    if progress and any("limits" in question.reads for question in asked):
+        progress.begin("the drawing as it is")
+        kept = prepared.kept_limits(_JUDGED)
+        progress.advance(kept.joint.units)
+        progress.tell(today_sentence(kept))
 
 
 def cache_beside(folder: Path) -> ResultCache:

@@ -70,6 +70,9 @@ class Job:
         self._look()
         self.units += units
 
+    def tell(self, sentence: str) -> None:
+        """Nothing is said before the answer."""
+
     @property
     def state(self) -> dict[str, Any]:
         """How far it has come, and its answer once there is one."""

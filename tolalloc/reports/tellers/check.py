@@ -10,7 +10,7 @@ from typing import Any
 
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.requirement import Requirement
-from tolalloc.capability.monte_carlo import Yield
+from tolalloc.capability.monte_carlo import KeptLimits
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import doubts
@@ -21,6 +21,7 @@ from tolalloc.reports.finished_run import told_yields
 from tolalloc.reports.portrait import Examination, Portrait, portrait_of
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.templates import Sentences
+from tolalloc.reports.wording import short
 
 _say = Sentences("check")
 
@@ -49,8 +50,7 @@ class Checked:
     notes: tuple[str, ...] = ()  # What the drawing says beside its rows
     examined: Mapping[str, float] = field(default_factory=dict)  # Counted of some random units, units in the names
     times: tuple[CheckedTime, ...] = ()  # How long the questions take; none unless asked for
-    # Share of some random units that keep all limits at once; none with one limit alone, or where none were solved
-    joint: Yield | None = None
+    kept: KeptLimits | None = None  # Shares of some random units that keep the limits; none where none were solved
 
 
 class CheckTeller(Teller[Checked]):
@@ -76,7 +76,7 @@ class CheckTeller(Teller[Checked]):
             lines += [f"  {own}" for own in result.errors.correlation.mappings(result.errors.sources)]
             lines += [f"  {setting.sentence}" for setting in result.model.settings]
             lines += [*self._costs, *self._neglected, *result.notes, *self._examination.sentences]
-            lines += self._all_limits
+            lines += [today_sentence(result.kept)] if result.kept else []
             quick = _say("quick")
             lines += [f"{f'{quick} ' if own.effort == 'quick' else ''}{own.sentence}" for own in result.times]
         if result.script:
@@ -108,8 +108,8 @@ class CheckTeller(Teller[Checked]):
         found["neglected"] = [*self._zero, *self._portrait.left_out]
         found |= {"examined": list(self._examination.sentences), "but": self._examination.but}
         found["doubted rows"] = self._doubted
-        if result.joint:
-            found |= told_yields({}, result.joint)
+        if result.kept:
+            found |= told_yields(result.kept.each, result.kept.joint)
         if result.times:
             found["durations"] = {
                 f"{own.effort} {own.kind}": {"units": list(own.units), "seconds": list(own.seconds)}
@@ -142,14 +142,6 @@ class CheckTeller(Teller[Checked]):
         return (_say("cost_locked" if space.locked_cost else "cost", **said),)
 
     @property
-    def _all_limits(self) -> tuple[str, ...]:
-        """How many random units of the table keep all limits at once, where some were solved."""
-        joint = self.result.joint
-        if joint is None:
-            return ()
-        return (_say("all_limits", units=joint.units, share=joint.estimate, low=100 * joint.low, high=joint.high),)
-
-    @property
     def _neglected(self) -> tuple[str, ...]:
         """Rows with a zone of 0, and what the model leaves out."""
         kinds = ", ".join(dict.fromkeys(map(_without_numbers, self._zero)))
@@ -175,6 +167,16 @@ class CheckTeller(Teller[Checked]):
     @cached_property
     def _doubted(self) -> int:
         return len(doubts(self.result.errors.sources, self.result.errors.table))
+
+
+def today_sentence(kept: KeptLimits) -> str:
+    """Return how many random units of the drawing as it is keep its limits."""
+    joint = kept.joint
+    each = ", ".join(_say("each", output=short(name), share=own.estimate) for name, own in kept.each.items())
+    said = {"units": joint.units, "share": joint.estimate, "low": 100 * joint.low, "high": joint.high}
+    if len(kept.each) == 1:
+        return _say("today_one", output=short(next(iter(kept.each))), **said)
+    return _say("today", each=each, **said)
 
 
 def _cost(space: DesignSpace) -> float:
