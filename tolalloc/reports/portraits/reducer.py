@@ -305,13 +305,14 @@ def _no_load(model: ReducerModel, figures: Mapping[str, float]) -> str:
     half, most = (figures[f"no-load torque of the pins, {which} [N·m]"] for which in ("median", "99.73 %"))
     rated, stated, idle = model.reducer.load.rated_torque, _catalogue_no_load(model), IdleTorque.of(model.reducer)
     beside = f"; the catalogue allows {stated:.3g} N·m in all" if stated else ""
-    known = "seals, grease and preloaded rollers" if idle.seals is not None else "grease and preloaded rollers"
     assumed = "" if None not in (model.reducer.friction.seals, model.reducer.friction.grease) else " (assumed)"
+    more = f"Seals, grease and preloaded rollers take {number(idle.together, '.2g')} N·m more{assumed}"
+    if idle.seals is None:
+        more = "Seals and grease come on top"
     return (
         f"Without load the friction of the pins takes {number(half, '.2g')} N·m at the output in half of them and up "
         f"to {number(most, '.2g')} N·m in 99.73 %: {number(100 * most / rated, '.2g')} % of the rated torque, "
-        f"{number(most / abs(model.reducer.ratio), '.2g')} N·m at the motor. {known.capitalize()} take "
-        f"{number(idle.together, '.2g')} N·m more{assumed}{beside}."
+        f"{number(most / abs(model.reducer.ratio), '.2g')} N·m at the motor. {more}{beside}."
     )
 
 
