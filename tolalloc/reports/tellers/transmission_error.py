@@ -95,9 +95,8 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
         """What seals and grease take, assumed unless the reducer's file states it."""
         reducer = self.result.reducer
         found, stated = IdleTorque.of(reducer), reducer.friction
-        assumed = "" if None not in (stated.seals, stated.grease) else _say("idle_assumed")
-        key = "idle_grease" if found.seals is None else "idle_both"
-        return _say(key, seals=found.seals, grease=found.grease, assumed=assumed)
+        key = "idle" if None not in (stated.seals, stated.grease) else "idle_assumed"
+        return _say(key, seals=found.seals, grease=found.grease)
 
     @property
     def assumptions(self) -> tuple[str, ...]:
