@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+import stat
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 
 import numba as nb
 import numpy as np
 import pytest
 
+import tolalloc
+from tolalloc.exceptions import InputError
 from tolalloc.running import compiled
 from tolalloc.running.compiled_parts import Whole
 
@@ -100,3 +107,93 @@ def test_one_core_compiles_alone(monkeypatch):
     monkeypatch.setattr(compiled, "_threads", 1)
     compiled.compile_elsewhere([__name__], "this")
     assert not compiled._elsewhere
+
+
+NOBODY = 65534
+COMPILE = """
+import numpy as np
+from tolalloc import {module}
+from tolalloc.running import compiled
+print({module}.double(np.array([21.0])), compiled._KEPT, compiled.is_kept("{module}"), sep="|")
+"""
+
+
+@pytest.fixture
+def bare_place():
+    """Return a folder with the package in it that can be written by nobody, and one for temporary files by all."""
+    folder = Path(tempfile.mkdtemp(prefix="bare-", dir="/tmp" if sys.platform == "linux" else None))
+    package = shutil.copytree(Path(tolalloc.__file__).parent, folder / "tolalloc", ignore=lambda *_: ["__pycache__"])
+    text = "from tolalloc.running.compiled import jit\n\n\n@jit\ndef double(values):\n    return values.sum() * 2.0\n"
+    (package / "doubling.py").write_text(text, encoding="utf-8")
+    (folder / "tmp").mkdir()
+    for path in (folder, *package.rglob("*"), package):
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    (folder / "tmp").chmod(0o777)
+    yield folder
+    for path in (folder, *folder.rglob("*")):
+        if path.is_dir():
+            path.chmod(0o755)
+    shutil.rmtree(folder)
+
+
+def as_a_user_without_a_home(place, *words, **variables):
+    """Run Python with the package of a place, unprivileged; skipped where root cannot become anybody else."""
+    lowered = {"user": NOBODY, "group": NOBODY, "extra_groups": []} if os.getuid() == 0 else {}
+    environment = {"PATH": os.environ["PATH"], "PYTHONPATH": str(place), "HOME": "/nonexistent"}
+    environment |= {"TMPDIR": str(place / "tmp"), **variables}
+    try:
+        return subprocess.run(
+            [sys.executable, *words], env=environment, cwd="/", capture_output=True, text=True, check=False, **lowered
+        )
+    except PermissionError:
+        pytest.skip("root can neither become another user here nor let one run this interpreter")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="users of this system cannot be changed so")
+def test_a_user_who_can_write_nowhere_compiles_into_a_temporary_folder(bare_place):
+    for _ in range(2):
+        done = as_a_user_without_a_home(bare_place, "-c", COMPILE.format(module="doubling"))
+        assert done.returncode == 0, done.stderr
+        answer, kept, found = done.stdout.strip().split("|")
+        assert (float(answer), found) == (42.0, "True")
+        said = done.stderr.splitlines()
+        assert len(said) == 1 and "NUMBA_CACHE_DIR" in said[0]
+        own = Path(kept).parent
+        assert own.parent == bare_place / "tmp" and str(own) in said[0]
+        assert stat.S_IMODE(own.stat().st_mode) == 0o700
+    (bare_place / "tmp/mine").mkdir()
+    (bare_place / "tmp/mine").chmod(0o777)
+    named = as_a_user_without_a_home(
+        bare_place, "-c", COMPILE.format(module="doubling"), NUMBA_CACHE_DIR=str(bare_place / "tmp/mine")
+    )
+    assert named.returncode == 0 and named.stderr == ""
+    assert Path(named.stdout.strip().split("|")[1]).parent == bare_place / "tmp/mine"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="users of this system cannot be changed so")
+def test_te_answers_a_user_who_can_write_nowhere(bare_place):
+    done = as_a_user_without_a_home(bare_place, "-m", "tolalloc.cli.main", "te", "--reducer", "rv20e", "--json")
+    assert done.returncode == 0, done.stderr
+    assert "peak-to-peak" in done.stdout
+    assert "Traceback" not in done.stderr
+
+
+def test_a_temporary_folder_that_others_may_write_is_not_used(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    own = compiled._temporary_folder()
+    assert own == compiled._temporary_folder()
+    own.chmod(0o777)
+    other = compiled._temporary_folder()
+    assert other != own and stat.S_IMODE(other.stat().st_mode) == 0o700
+    own.rmdir()
+    own.symlink_to(other)
+    assert compiled._temporary_folder() not in (own, other)
+
+
+def test_a_stated_folder_that_cannot_be_written_is_refused(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    monkeypatch.setattr(nb.config, "CACHE_DIR", str(tmp_path / "file"))
+    with pytest.raises(InputError, match="NUMBA_CACHE_DIR"):
+        compiled._place()

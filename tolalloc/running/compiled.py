@@ -2,7 +2,8 @@
 
 numba keeps a compiled function until its own file changes, although functions from other files are built into it. So
 what is kept stands in a folder named after a digest of all rooms named ``solvers``, where every compiled function
-lives: a change in any of their files compiles all anew.
+lives: a change in any of their files compiles all anew. The folder stands where `NUMBA_CACHE_DIR` says, else in the
+package, else in the user's cache, else among the temporary files: the first of these that can be written.
 
 Threads are the interpreter's own, each calling compiled functions that hold no lock. A parallel loop of numba's was no
 faster here, and took as long to compile as all that it calls.
@@ -10,26 +11,105 @@ faster here, and took as long to compile as all that it calls.
 
 from __future__ import annotations
 
+import atexit
 import hashlib
+import os
+import shutil
+import stat
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from multiprocessing import parent_process
 from pathlib import Path
 from typing import Any
 
 import numba as nb
 import numpy as np
+from numba.misc.appdirs import AppDirs
+
+from tolalloc.exceptions import InputError
 
 _HERE = Path(__file__)
 _FILES = [_HERE, _HERE.with_name("compiled_parts.py"), *sorted(_HERE.parents[1].glob("**/solvers/*.py"))]
 _DIGEST = hashlib.sha256(b"".join(path.read_bytes() for path in _FILES)).hexdigest()
-_KEPT = _HERE.parents[1] / "__pycache__" / f"compiled-{_DIGEST[:16]}"
+_PLACE = "NUMBA_CACHE_DIR"
+"""Variable of the environment that names the folder of compiled functions."""
+
+
+def _place() -> Path | None:
+    """Return the folder that compiled functions are kept in; nothing where no folder can be written.
+
+    Raises
+    ------
+    InputError
+        The folder that the environment names cannot be written.
+    """
+    folder = f"compiled-{_DIGEST[:16]}"
+    if stated := str(nb.config.CACHE_DIR):
+        if not _can_be_written(Path(stated) / folder):
+            raise InputError.at("environment", _PLACE, stated, "a folder that can be written, or nothing")
+        return Path(stated).absolute() / folder
+    for usual in (_HERE.parents[1] / "__pycache__", Path(AppDirs("tolalloc", False).user_cache_dir)):
+        if _can_be_written(usual / folder):
+            return usual / folder
+    place = _temporary_folder()
+    where = f"in {place}" if place else "nowhere, and again in every run"
+    if sys.stderr and parent_process() is None:  # workers need not say it again
+        sys.stderr.write(
+            "Neither the package's folder nor a home can be written: what is compiled for this machine is kept "
+            f"{where}; {_PLACE} may name another folder.\n"
+        )
+    return place and place / folder
+
+
+def _can_be_written(folder: Path) -> bool:
+    """Return whether a folder, made if need be, takes files."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
+        return False
+    return True
+
+
+def _temporary_folder() -> Path | None:
+    """Return a folder of this user alone among the temporary ones: what is kept is code, and is run as it is read."""
+    user = "" if sys.platform == "win32" else f"-{os.getuid()}"
+    try:
+        own = Path(tempfile.gettempdir()) / f"tolalloc{user}"
+        if not _is_ours(own):  # somebody else has made it
+            own = Path(tempfile.mkdtemp(prefix="tolalloc-"))
+            atexit.register(shutil.rmtree, own, ignore_errors=True)
+    except OSError:
+        return None
+    return own
+
+
+def _is_ours(folder: Path) -> bool:
+    """Return whether a folder, made if need be, belongs to this user, and nobody else can look into it."""
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+    except FileExistsError:  # a file, or a link to nowhere
+        return False
+    found = folder.lstat()  # a link is none of ours
+    if sys.platform == "win32":  # temporary folders are each user's own
+        return stat.S_ISDIR(found.st_mode)
+    return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o077
+
+
+_KEPT = _place()
 
 
 def is_kept(module: str) -> bool:
     """Return whether functions of this version of a module were compiled on this machine before."""
-    return any(_KEPT.glob(f"*/{module}.*.nbi"))
+    return _KEPT is not None and any(_KEPT.glob(f"*/{module}.*.nbi"))
+
+
+def kept_in() -> Path | None:
+    """Return the folder that compiled functions are kept in; nothing where none can be written."""
+    return _KEPT
 
 
 def processor() -> dict[str, str]:
@@ -44,9 +124,10 @@ def processor() -> dict[str, str]:
 
 def _compiled(function: Callable[..., Any], **options: bool) -> Any:
     whole = _new(function, {"nogil": True, "error_model": "numpy"} | options)
-    _keep(whole, _KEPT)
-    if hasattr(whole, "part"):
-        _keep(whole.part, _KEPT / "parts")
+    if _KEPT is not None:
+        _keep(whole, _KEPT)
+        if hasattr(whole, "part"):
+            _keep(whole.part, _KEPT / "parts")
     return whole
 
 
