@@ -12,7 +12,7 @@ from tolalloc.cli.main import app
 COMMANDS = get_command(app).commands
 MEANT = {
     "--out": {
-        "Run folder, new or empty; runs/NAME unless given.",
+        "Run folder, new or empty; the next one of runs/NAME, runs/NAME-2, … unless given.",
         "Write a report into this folder, new or empty.",
         "Folder of all run folders; finished ones in it are not run again.",
     },

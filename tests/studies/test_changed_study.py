@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import subprocess
+
 import numpy as np
 import pytest
 
 import tolalloc as ta
-from tests.builders import prepared
+from tests.builders import prepared, says
+from tests.studies.command import command
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import with_zones
 from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.reports.finished_run import read_run
 from tolalloc.study.prepared import Prepared
 
 FLANK, RADIAL = "flank clearance [µm]", "radial clearance [µm]"
@@ -55,3 +59,40 @@ def test_a_setting_that_is_not_there_or_out_of_bounds_is_a_sentence(settings, er
     with pytest.raises(error) as raised:
         study.changed(study.drawing, settings)
     assert said in str(raised.value)
+
+
+WEIGHT = """import tolalloc as ta
+row = {"plus": 3.0, "minus": -3.0, "unit": "µm", "min": 1.0, "max": 9.0, "cost": 1.0}
+study = ta.Study(
+    ta.model(lambda a, b: a + b, inputs=("a", "b"), outputs=("sum [mm]",)),
+    ta.Drawing.of_rows([{"id": name, **row} for name in "ab"]),
+    limits={"sum [mm]": ta.Limit(upper=UPPER)},
+    questions=[ta.Allocation(front=False, what_if=False)],
+    name="edited",
+)
+"""
+
+
+@pytest.mark.slow
+def test_a_study_runs_again_after_an_edit_and_says_what_changed(tmp_path):
+    def run(upper, *words):
+        (tmp_path / "edited.py").write_text(WEIGHT.replace("UPPER", str(upper)), encoding="utf-8")
+        asked = command("run", "edited.py", "--quick", *words)
+        found = subprocess.run(asked, cwd=tmp_path, capture_output=True, text=True, check=True, encoding="utf-8")
+        return found.stdout.splitlines()
+
+    compared = command("compare")
+    none = subprocess.run(compared, cwd=tmp_path, capture_output=True, text=True, check=False, encoding="utf-8")
+    assert none.returncode == 2 and "0 finished runs" in none.stderr
+    assert not says(run(0.003), "comparison.both")
+    again = run(0.002)
+    first, second = (read_run(tmp_path / "runs" / name) for name in ("edited", "edited-2"))
+    costs = [own.summary["cost [cost units]"] for own in (first, second)]
+    assert costs[0] < costs[1]
+    assert says(again, "comparison.since_cost", before="runs/edited", first=costs[0], second=costs[1])
+    assert says(again, "comparison.other_question")
+    assert says(again, "comparison.changed", count=2, rows=2)
+    assert says(run(0.002), "comparison.unchanged")
+    assert not says(run(0.002, "--out", "named"), "comparison.both")  # a named folder follows none
+    last = subprocess.run(compared, cwd=tmp_path, capture_output=True, text=True, check=True, encoding="utf-8")
+    assert "runs/edited-2" in last.stdout and "runs/edited-3" in last.stdout

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 Script = Annotated[Path, typer.Argument(help="Python script that defines study = Study(...).")]
 Quick = Annotated[bool, typer.Option("--quick", help="Small samples, wide intervals; every stage is real.")]
 Seed = Annotated[int | None, typer.Option(help="Seed of every random number, instead of the study's.")]
-Out = Annotated[Path | None, typer.Option(help="Run folder, new or empty; runs/NAME unless given.")]
+Out = Annotated[
+    Path | None, typer.Option(help="Run folder, new or empty; the next one of runs/NAME, runs/NAME-2, … unless given.")
+]
 Fresh = Annotated[bool, typer.Option("--fresh", help="Solve again what runs beside this one have solved and kept.")]
 Kept = Annotated[
     Path | None, typer.Option(help="File that keeps the search for the front; an interrupted run goes on from it.")
@@ -53,13 +55,7 @@ def run(
     """Run a study: every question once, one folder, one report."""
     study = _asked(script, quick, seed)
     kinds = tuple(kind.strip() for kind in only.split(",") if kind.strip())
-    _run(
-        study,
-        kinds,
-        out or Path("runs") / study.name,
-        checkpoint,
-        _Way(fresh, scheduler, paper if pdf else "", as_json),
-    )
+    _run(study, kinds, _Place.of(out, study.name), checkpoint, _Way(fresh, scheduler, paper if pdf else "", as_json))
 
 
 def rank(
@@ -75,13 +71,8 @@ def rank(
 ) -> None:
     """Tell which error drives which output, which order and the rejects: short for run --only ranking."""
     study = _asked(script, quick, seed)
-    _run(
-        study,
-        ("ranking",),
-        out or Path("runs") / f"{study.name}-rank",
-        None,
-        _Way(fresh, scheduler, paper if pdf else "", as_json),
-    )
+    place = _Place.of(out, f"{study.name}-rank")
+    _run(study, ("ranking",), place, None, _Way(fresh, scheduler, paper if pdf else "", as_json))
 
 
 def allocate(
@@ -113,8 +104,8 @@ def allocate(
         own = questions_of(("allocation",), tuple(study.questions), "tolalloc allocate")[0]
         graded = replace(own, grades=True) if isinstance(own, Allocation) else own
         study = replace(study, questions=(*(q for q in study.questions if q.kind != "allocation"), graded))
-    folder = out or Path("runs") / f"{study.name}-allocate"
-    _run(study, ("allocation",), folder, checkpoint, _Way(fresh, scheduler, paper if pdf else "", as_json))
+    place = _Place.of(out, f"{study.name}-allocate")
+    _run(study, ("allocation",), place, checkpoint, _Way(fresh, scheduler, paper if pdf else "", as_json))
 
 
 def _asked(script: Path, quick: bool, seed: int | None) -> Study:
@@ -160,13 +151,47 @@ class _Way:
     as_json: bool
 
 
-def _run(study: Study, kinds: tuple[str, ...], folder: Path, checkpoint: Path | None, way: _Way) -> None:
+@dataclass(frozen=True)
+class _Place:
+    """Where a run is written, and the run before it."""
+
+    folder: Path
+    before: Path | None  # The last finished run of the same name; none where a folder was named
+
+    @classmethod
+    def of(cls, named: Path | None, name: str) -> _Place:
+        """Return the named folder; else the next numbered one in runs, so that the study runs again after an edit."""
+        from tolalloc.reports.finished_run import finished
+        from tolalloc.reports.folder import numbered
+
+        if named:
+            return cls(named, None)
+        *earlier, folder = numbered(Path("runs") / name)
+        last = finished(earlier)[-1:]
+        return cls(folder, last[0].folder if last else None)
+
+    def tell_changes(self) -> None:
+        """Say what changed since the run before; nothing where one of the two is no ranking and no allocation."""
+        from tolalloc.reports.tellers.comparison import ComparisonTeller
+        from tolalloc.running.progress import Silent
+        from tolalloc.study.inquiries.compare import Compare
+
+        if self.before:
+            with suppress(InputError):
+                asked = Compare(first=self.before, second=self.folder)
+                found = asked.solve(asked.prepare(), Silent())
+                for sentence in ComparisonTeller(found.result, found.header).since:
+                    typer.echo(sentence)
+
+
+def _run(study: Study, kinds: tuple[str, ...], place: _Place, checkpoint: Path | None, way: _Way) -> None:
     """Run some questions of a study, write its folder and say the answers."""
     from tolalloc.reports.pdf import require_printable, write_pdf
     from tolalloc.study.questions import questions_of
     from tolalloc.study.study import cache_beside
     from tolalloc.study.study import run as run_study
 
+    folder = place.folder
     questions = questions_of(kinds, tuple(study.questions), f"study {study.name}")
     if way.paper:
         require_printable(way.paper)
@@ -189,6 +214,7 @@ def _run(study: Study, kinds: tuple[str, ...], folder: Path, checkpoint: Path | 
         return
     for answer in found.answers.values():
         _show(answer)
+    place.tell_changes()
 
 
 def solvers(scheduler: str) -> AbstractContextManager[Mapper]:

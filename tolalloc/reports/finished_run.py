@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
@@ -223,6 +224,15 @@ def _with_cost_units(header: str) -> str:
     """Return the header of a column under the name that every run's has, whatever its costs are in."""
     unit = unit_of(header)
     return header.replace(f"[{unit}]", f"[{in_cost_units(unit)}]")
+
+
+def finished(folders: Iterable[Path]) -> list[FinishedRun]:
+    """Return what those folders say that hold a finished run, in their order."""
+    found = []
+    for folder in folders:
+        with suppress(InputError):
+            found.append(read_run(folder))
+    return found
 
 
 def _with(found: dict[str, Any], names: tuple[str, ...], path: Path) -> dict[str, Any]:

@@ -39,6 +39,14 @@ def require_usable(folder: Path | None) -> None:
         raise RunFolderError(f"{folder}: the run folder cannot be made in {above}; name another (--out).")
 
 
+def numbered(first: Path) -> list[Path]:
+    """Return the folders that runs of one name have taken, and last the next one that is new or empty."""
+    found = [first]
+    while found[-1].is_file() or (found[-1].is_dir() and any(found[-1].iterdir())):
+        found.append(first.with_name(f"{first.name}-{len(found) + 1}"))
+    return found
+
+
 @contextmanager
 def claimed(folder: Path) -> Iterator[Path]:
     """Give a folder beside the wanted one to fill, which takes its place once the work inside has succeeded.

@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from tolalloc.exceptions import InputError, TolallocError
 from tolalloc.reports.finished_run import FinishedRun, Member, common_currency, read_run
+from tolalloc.reports.folder import numbered
 from tolalloc.reports.header import Header
 from tolalloc.reports.tellers.check import Checked, CheckedTime
 from tolalloc.running.chunks import Mapper
@@ -199,7 +200,7 @@ def run_series(
         if names.count(name) > 1:
             raise InputError(f"series: {names.count(name)} studies are named {name!r}; each needs a name of its own.")
     for study, in_force in known:
-        *earlier, own = _folders(folder / study.name)
+        *earlier, own = numbered(folder / study.name)
         try:
             with in_force():
                 current = () if fresh else (found for own in reversed(earlier) if (found := _finished(study, own)))
@@ -210,14 +211,6 @@ def run_series(
             yield Member(name=study.name, folder=found.folder, found=found)
         except TolallocError as error:
             yield Member(name=study.name, folder=own, fault=str(error))
-
-
-def _folders(first: Path) -> list[Path]:
-    """Return the folders that a study has, and last the next one that is new or empty."""
-    found = [first]
-    while found[-1].is_file() or (found[-1].is_dir() and any(found[-1].iterdir())):
-        found.append(first.with_name(f"{first.name}-{len(found) + 1}"))
-    return found
 
 
 def _finished(study: Study, folder: Path) -> FinishedRun | None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 from tolalloc.exceptions import InputError
 from tolalloc.reading.named_fields import Rule
 from tolalloc.reports.document import Document, joined
-from tolalloc.reports.folder import claimed
+from tolalloc.reports.folder import claimed, numbered
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.tellers.check import today_sentence
 from tolalloc.running.chunks import Mapper
@@ -200,7 +200,7 @@ class Study(Problem):
         Parameters
         ----------
         folder
-            New or empty folder; ``runs/NAME`` unless given.
+            New or empty folder; the next one of ``runs/NAME``, ``runs/NAME-2``, … unless given.
         effort, progress
             As of `ask`.
         fresh
@@ -211,7 +211,8 @@ class Study(Problem):
         TolallocError
             One sentence on what is wrong; nothing is written then.
         """
-        return run(self.with_effort(effort), Path(folder or Path("runs") / self.name), progress=progress, fresh=fresh)
+        place = Path(folder) if folder else numbered(Path("runs") / self.name)[-1]
+        return run(self.with_effort(effort), place, progress=progress, fresh=fresh)
 
 
 def _record(prepared: Prepared, question: Question, progress: Progress | None) -> RunRecord:

@@ -17,6 +17,8 @@ from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import quantity, with_unit
 
 _say = Sentences("comparison")
+_SAME, _NAMED = 1e-6, 3
+"""Relative change from which a zone is another one, and how many of them a sentence names [-]."""
 
 
 class ComparisonTeller(Teller[Comparison]):
@@ -74,6 +76,25 @@ class ComparisonTeller(Teller[Comparison]):
         if result.same_study:
             found.append(_say("same_study"))
         return tuple(found)
+
+    @property
+    def since(self) -> tuple[str, ...]:
+        """What changed since the first run, in two sentences and where to see more."""
+        first, second = self.result.runs
+        other = () if self.result.same_question else (_say("other_question"),)
+        both = _say("both", before=first.folder, now=second.folder)
+        return (self._since(first, second), *other, _changed(_zones(self.result, COST_UNITS)), both)
+
+    def _since(self, first: FinishedRun, second: FinishedRun) -> str:
+        """Return how cost and yield changed."""
+        jointly = None not in (first.joint, second.joint)
+        shares = [run.joint if jointly else run.summary["yield [-]"] for run in (first, second)]
+        limits = _say("all_limits" if jointly and len(second.yields) > 1 else "the_limit")
+        costs = [run.summary.get("cost [cost units]") for run in (first, second)]
+        gaps = {"before": first.folder, "share": shares[0], "then": shares[1], "limits": limits}
+        if None in costs:
+            return _say("since", **gaps)
+        return _say("since_cost", first=costs[0], second=costs[1], cost_unit=self.header.cost_unit, **gaps)
 
     @cached_property
     def sections(self) -> tuple[Section, ...]:
@@ -201,6 +222,22 @@ def _zones(comparison: Comparison, cost_unit: str) -> pd.DataFrame:
             f"cost B [{cost_unit}]": joint["cost B"].to_numpy(),
         }
     )
+
+
+def _changed(zones: pd.DataFrame) -> str:
+    """Return which zones changed most, those of numbered parts together."""
+    alike = zones.assign(source=zones["source"].str.replace(r"\d+", "*", regex=True)).drop_duplicates(
+        ["source", "zone A", "zone B"]
+    )
+    moved = alike[(alike["zone B"] / alike["zone A"] - 1).abs() > _SAME]
+    if moved.empty:
+        return _say("unchanged")
+    most = moved.reindex(moved["B over A, less 1 [%]"].abs().sort_values(ascending=False).index).head(_NAMED)
+    named = [
+        _say("changed_zone", source=own["source"], first=own["zone A"], second=own["zone B"], unit=own["unit"])
+        for _, own in most.iterrows()
+    ]
+    return _say("changed", zones=", ".join(named), count=len(moved), rows=len(alike))
 
 
 def _names(zones: pd.DataFrame) -> pd.Series:

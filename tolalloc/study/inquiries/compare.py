@@ -6,26 +6,44 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar
 
-from tolalloc.reports.finished_run import Comparison, common_currency, read_run
+from tolalloc.exceptions import InputError
+from tolalloc.reports.finished_run import Comparison, common_currency, finished, read_run
 from tolalloc.reports.header import Header
 from tolalloc.running.progress import Progress
 from tolalloc.study.answer import Answer
 from tolalloc.study.inquiry import Inquiry, Word
 
+_RUNS = Path("runs")
+"""Where runs stand whose folder nobody names."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Compare(Inquiry[Comparison]):
-    """Two finished studies side by side: answers, rankings, zones."""
+    """Two finished studies side by side: answers, rankings, zones; the last two of the folder runs unless named."""
 
     word: ClassVar[str] = "compare"
     by_position: ClassVar[int] = 2
 
-    first: Annotated[Path, Word("Folder of a finished run, A.")]
-    second: Annotated[Path, Word("Folder of another one, B.")]
+    first: Annotated[Path | None, Word("Folder of a finished run, A; the last but one in runs unless given.")] = None
+    second: Annotated[Path | None, Word("Folder of another one, B; the last one in runs unless given.")] = None
 
     def prepare(self) -> Comparison:
-        """Return what both folders say."""
-        return Comparison(first=read_run(Path(self.first)), second=read_run(Path(self.second)))
+        """Return what both folders say.
+
+        Raises
+        ------
+        InputError
+            A folder that holds no finished run; one folder alone; none, where runs holds less than two.
+        """
+        if self.first and self.second:
+            return Comparison(first=read_run(self.first), second=read_run(self.second))
+        if self.first or self.second:
+            raise InputError(f"{self.called}: one folder is named; name two, or none for the last two runs in {_RUNS}.")
+        places = sorted(_RUNS.glob("*/manifest.json"), key=lambda path: path.stat().st_mtime)
+        found = finished(path.parent for path in places)[-2:]
+        if len(found) < 2:
+            raise InputError(f"{self.called}: {_RUNS} holds {len(found)} finished runs; name two folders, A and B.")
+        return Comparison(first=found[0], second=found[1])
 
     def solve(self, prepared: Comparison, progress: Progress) -> Answer[Comparison]:  # noqa: ARG002
         """Return both side by side, with their currency where they have one in common."""
