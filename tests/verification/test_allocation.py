@@ -29,7 +29,8 @@ verifier_of = partial(builders.verifier_of, slope_units=64)
 class KnownSample(OutputSample):
     """A trial whose values are known."""
 
-    design, groups, failed, confidence, law = np.array([1.0, 2.0, 3.0, 4.0]), 2, 0, 0.95, None
+    design, groups, failed, confidence = np.array([1.0, 2.0, 3.0, 4.0]), 2, 0, 0.95
+    law = near = None
 
     def __init__(self, values, failed=0, confidence=0.95):
         vars(self).update(values=values, failed=failed, output="x [mm]", confidence=confidence)

@@ -87,3 +87,17 @@ def test_two_studies_are_solved_once(tmp_path):
     assert json.loads(again.stdout) == found
     assert files == {path: path.stat().st_mtime_ns for path in tmp_path.glob("*.json")}
     assert len(list(tmp_path.glob("*.csv"))) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("made", ["chain", "chains", "clutch", "clutches"])
+def test_quick_answers_of_own_functions_cost_half_a_percent_more_than_the_optimum_at_most(monkeypatch, made):
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    module = import_module("own_functions")
+    own = getattr(module, made)()
+    for seed in (41, 42):
+        found = own.study(seed).allocate(effort="quick").result
+        scales = np.array([source.zone * 1e3 for source in found.drawn_sources]) / (6 * own.deviations)
+        assert found.met
+        assert own.failing(scales) <= 1 - module.TARGET
+        assert own.optimum <= found.cost * (1 + 1e-6) <= 1.005 * own.optimum

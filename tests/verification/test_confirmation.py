@@ -13,8 +13,11 @@ from scipy.stats import binom, norm
 import tolalloc as ta
 from tolalloc.allocation.search.candidates import _still_kept
 from tolalloc.allocation.space.effort import AllocationEffort
+from tolalloc.allocation.space.output_sample import Control, LimitedSample, Surprises
 from tolalloc.allocation.verify.acceptance import ATTEMPTS, FIRST, AcceptanceTest, accept_cheapest, confidence_of_fewer
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier
+from tolalloc.capability.indices import Limits
+from tolalloc.capability.linear_function import NearPlane
 from tolalloc.capability.monte_carlo import allowed_rejections
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.study.prepared import Prepared
@@ -247,3 +250,37 @@ def test_after_a_miss_a_design_counts_that_stays_inside_with_what_the_missed_one
     (side,) = cheap.constraints
     beyond = replace(side, stack=replace(side.stack, budget=side.stack.budget - 100.0), standard_error=1e-6)
     assert not _still_kept((inside,), replace(cheap, checks=(replace(cheap.checks[0], constraints=(beyond,)),)))
+
+
+@pytest.mark.parametrize(("more", "fewer"), [(0.0002, 0.0004), (0.0, 0.001), (0.002, 0.0), (1e-5, 1e-5)])
+def test_what_units_say_beside_planes_shows_too_few_failures_no_more_often_than_stated(generator, more, fewer):
+    """2,000 samples of 65,536 units; a share of 5 % has a standard error of 0.5 %. Both ends are tried."""
+    samples, units, by_law = 2000, 2**16, 0.0027
+    true, called = by_law + more - fewer, generator.multinomial(units, [more, fewer, 1 - more - fewer], samples)
+    wrong = {0.95: 0, 0.05: 0}
+    for own, other, _ in called.tolist():
+        found = Surprises(units=units, more=own, fewer=other, sum=own - other, by_law=by_law)
+        wrong[0.95] += found.share(0.95) < true
+        wrong[0.05] += found.share(0.05) > true
+    assert max(wrong.values()) <= samples * (ERROR + 3 * np.sqrt(ERROR * (1 - ERROR) / samples))
+
+
+@pytest.mark.parametrize("scale", [0.99, 0.999, 1.001, 1.01])
+def test_a_limit_is_kept_just_where_units_and_planes_show_it(generator, scale):
+    """A bent sum of two sizes, whose units at a limit the plane behind it calls."""
+    errors = prepared(ON_THE_LIMIT["one limit"][0]).space.errors
+    x = generator.standard_normal((2**16, 2)) * errors.zones / 6
+
+    def bent(x):
+        return np.exp(1e4 * x.sum(axis=1))
+
+    near = NearPlane.of(x[: 2**15], bent(x[: 2**15]), errors, errors.zones)
+    limits = Limits(upper=scale * np.exp(1e4 * norm.ppf(TARGET) * np.hypot(*errors.zones) / 6))
+    control = Control(near=near, values=near(x), limits=limits)
+    sample = LimitedSample.all_of(bent(x), limits, controls=(control,))
+    (bound,) = SHOWN.bounds(sample, 0.95)
+    called = (control.excess > 0).astype(int)
+    shown = Surprises.among(sample.excess > 0, called, near.share_above(1, limits.upper), x.shape[0]).share(0.95)
+    assert (bound.excess <= 0) == (shown <= 1 - TARGET)
+    plain = LimitedSample.all_of(bent(x), limits)
+    assert bound.standard_error < 0.3 * SHOWN.bounds(plain, 0.95)[0].standard_error

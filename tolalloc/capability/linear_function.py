@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +22,9 @@ _POINTS = 2**15
 """Points on which densities are folded; a share of 0.27 % is then right to 1e-7 (uniform sums, tested) [-]."""
 _TAIL = 1e-13
 """Probability beyond which an endless distribution is cut [-]."""
+_FAR = 0.5
+"""Standard deviation from a plane, over that of the output, from which the plane says too little of it [-]."""
+_DEGREE, _POINTS_OF_CURVE, _ENDS = 5, 2049, 100.0
 _REACH = 12.0
 """Standard deviations of the normal part that the points cover to either side [-]."""
 
@@ -56,6 +59,23 @@ class LinearFunction:
         rounding = _LINEAR * float(np.ptp(values))
         plane = cls(offset=float(middle - centre @ slopes), slopes=slopes, rounding=rounding)
         return None if plane.leaves(x[:few], values[:few]).any() or plane.leaves(x, values).any() else plane
+
+    @classmethod
+    def near(cls, x: Float[np.ndarray, "sample column"], values: Float[np.ndarray, " sample"]) -> LinearFunction:
+        """Return the plane nearest to samples by least squares.
+
+        Parameters
+        ----------
+        x
+            Deviations [m, angles rad].
+        values
+            What the function says of them [unit of the output].
+        """
+        centre, size = x.mean(axis=0), np.maximum(x.std(axis=0), np.finfo(float).tiny)
+        standard, middle = (x - centre) / size, float(values.mean())
+        # Columns are independent or nearly so: the small system of their products is well conditioned.
+        slopes = np.linalg.lstsq(standard.T @ standard, standard.T @ (values - middle), rcond=None)[0] / size
+        return cls(offset=float(middle - centre @ slopes), slopes=slopes, rounding=0.0)
 
     def __call__(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, " sample"]:
         """Return the values on the plane [unit of the output]."""
@@ -140,7 +160,7 @@ class LinearLaw:
 
     def beyond(self, limits: Limits, by: float) -> float:
         """Return the share of units that lie further beyond a limit than so far [unit of the output]."""
-        return sum(self._share_above(sign, limit + sign * by) for sign, limit in limits.turned)
+        return sum(self.share_above(sign, limit + sign * by) for sign, limit in limits.turned)
 
     def excess(self, limits: Limits, share: float) -> float:
         """Return how far beyond a limit just this share of units lies, negative inside [unit of the output]."""
@@ -169,7 +189,7 @@ class LinearLaw:
             weights += density
         return np.asarray(found / max(weights, np.finfo(float).tiny) / self.zones)
 
-    def _share_above(self, sign: int, value: float) -> float:
+    def share_above(self, sign: int, value: float) -> float:
         """Return the share of units above a value, or below one [-]."""
         from scipy.special import ndtr
 
@@ -294,6 +314,104 @@ class LinearLaw:
     def _cumulative(self) -> Float[np.ndarray, " edge"]:
         masses = np.fft.fftshift(np.fft.ifft(self._spectra.prod(axis=0) * self._normal_spectrum).real)
         return np.append(0.0, np.cumsum(np.maximum(masses, 0.0)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class NearPlane:
+    """A plane near an output, or near a monotone curve of it, of which the law is known.
+
+    Notes
+    -----
+    What bends in one direction alone, such as an angle over a chain of sizes, is a plane behind a curve: normal scores
+    of its values are regressed on the deviations, and the curve is a polynomial of degree 5 through what the plane says
+    over the values (one step of alternating conditional expectations, Breiman & Friedman 1985). Nothing is believed of
+    it (`tolalloc.allocation.space.output_sample.Control`).
+
+    Examples
+    --------
+    An output that is a plane behind a curve is found again.
+
+    >>> from tolalloc.capability.experiment import sum_of_sizes
+    >>> experiment = sum_of_sizes(6.0, 12.0)
+    >>> x = np.random.default_rng(0).standard_normal((20_000, 2)) * experiment.zones / 6
+    >>> near = NearPlane.of(x, np.exp(x.sum(axis=1) / 20), experiment.errors, experiment.zones)
+    >>> round(near.share_above(1, np.exp(0.25)), 3)  # P(√5·z > 5)
+    0.013
+    """
+
+    law: LinearLaw  # Of the plane
+    # Points of the curve: values of the output [unit of the output], and of the plane; none where there is no curve
+    curve: tuple[Float[np.ndarray, " point"], Float[np.ndarray, " point"]] | None = None
+
+    @classmethod
+    def of(
+        cls,
+        x: Float[np.ndarray, "sample column"],
+        values: Float[np.ndarray, " sample"],
+        errors: ErrorModel,
+        zones: Float[np.ndarray, " source"],
+    ) -> NearPlane | None:
+        """Return what lies near an output, none where its law is not known or it says too little of the output.
+
+        Parameters
+        ----------
+        x
+            Deviations [m, angles rad].
+        values
+            The output, not a number where there is none [unit of the output].
+        errors, zones
+            The sources, and their zones [m].
+        """
+        known = np.isfinite(values)
+        x, values = x[known], values[known]
+        if values.size <= x.shape[1] + _SPARE or not np.ptp(values) > 0:
+            return None
+        found = cls._bent(x, values, errors, zones)
+        flat = LinearFunction.near(x, values)
+        law = LinearLaw.of(flat, errors, zones)
+        if law and (off := float(np.std(values - flat(x)) / np.std(values))) < (found[1] if found else _FAR):
+            found = (cls(law=law), off)
+        return found[0] if found else None
+
+    @classmethod
+    def _bent(
+        cls,
+        x: Float[np.ndarray, "sample column"],
+        values: Float[np.ndarray, " sample"],
+        errors: ErrorModel,
+        zones: Float[np.ndarray, " source"],
+    ) -> tuple[NearPlane, float] | None:
+        """Return a plane behind a curve, and by how much the curve of the output is off it over what it varies [-]."""
+        from scipy.special import ndtri
+
+        ranks = np.empty(values.size)
+        ranks[np.argsort(values, kind="stable")] = (np.arange(values.size) + 0.5) / values.size
+        plane = LinearFunction.near(x, ndtri(ranks))
+        law, says = LinearLaw.of(plane, errors, zones), plane(x)
+        curve = np.polynomial.Polynomial.fit(values, says, _DEGREE)
+        points = np.linspace(values.min(), values.max(), _POINTS_OF_CURVE)
+        of_plane = curve(points)
+        off = float(np.std(curve(values) - says) / np.std(says)) if np.std(says) > 0 else np.inf
+        if law is None or off >= _FAR or not (np.diff(of_plane) > 0).all():
+            return None
+        reach, slopes = _ENDS * np.ptp(points), np.diff(of_plane)[[0, -1]] / np.diff(points)[[0, -1]]
+        ends = np.concatenate([[points[0] - reach], points, [points[-1] + reach]])
+        of_ends = np.concatenate([[of_plane[0] - slopes[0] * reach], of_plane, [of_plane[-1] + slopes[1] * reach]])
+        return cls(law=law, curve=(ends, of_ends)), off
+
+    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, " sample"]:
+        """Return what it says of the output [unit of the output]."""
+        says = self.law.function(x)
+        return says if self.curve is None else np.asarray(np.interp(says, self.curve[1], self.curve[0]))
+
+    def share_above(self, sign: int, value: float) -> float:
+        """Return the share of units that it has above a value, or below one [-]."""
+        of_plane = value if self.curve is None else float(np.interp(value, *self.curve))
+        return self.law.share_above(sign, of_plane)
+
+    def at(self, zones: Float[np.ndarray, " source"]) -> NearPlane:
+        """Return it with the law of other zones [m]."""
+        return replace(self, law=replace(self.law, zones=zones))
 
 
 _KNOWN = (Feature.SIZE, Feature.POSITION, Feature.PITCH, Feature.RUNOUT)

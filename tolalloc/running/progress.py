@@ -79,7 +79,8 @@ class RunRecord:
 
     def observe(self, status: UInt8[np.ndarray, " sample"]) -> None:
         """Count the statuses of one chunk."""
-        self.statuses.update(int(value) for value in status)
+        counts = np.bincount(status)
+        self.statuses.update({int(value): int(counts[value]) for value in np.flatnonzero(counts)})
         self.progress.advance(status.size)
 
     @property

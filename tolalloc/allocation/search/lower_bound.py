@@ -157,7 +157,7 @@ def _sample(design: VerifiedDesign, check: Check) -> LimitedSample:
     """Return the units that tested a design last."""
     requirement, law = check.requirement, design.laws.get(check.requirement.output)
     if design.independent:
-        return design.independent.limited(requirement, law)
+        return design.independent.limited(requirement, law, design.nearest)
     return LimitedSample.all_of(requirement.read(design.outputs), requirement.limits, law)
 
 

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-from tolalloc.allocation.space.output_sample import DesignSample, LimitedSample, OutputSample
+from tolalloc.allocation.space.output_sample import Control, DesignSample, LimitedSample, OutputSample, Surprises
 from tolalloc.allocation.space.problem import OneSidedConstraint, Stack
-from tolalloc.allocation.space.requirement import AtYield, Check, QuantileBound, Requirement
+from tolalloc.allocation.space.requirement import AtYield, Check, QuantileBound, Requirement, bounds_of_law
 from tolalloc.capability.indices import Limits
+from tolalloc.capability.linear_function import LinearLaw, NearPlane
 from tolalloc.capability.near_limit import largest_first
 from tolalloc.models.model import Model
 
@@ -84,6 +85,16 @@ class JointRequirement(Requirement):
         ]
         return np.asarray(np.max(excesses, axis=0))
 
+    def controls(
+        self,
+        nearest: Mapping[str, NearPlane],
+        planes: Mapping[str, Float[np.ndarray, " unit"]],
+        *,
+        relative: bool = True,  # noqa: ARG002
+    ) -> tuple[Control, ...]:
+        """Return the planes near all that is limited, with an excess over the limit."""
+        return tuple(plane for own in self.requirements for plane in own.controls(nearest, planes, relative=True))
+
     def at(
         self, model: Model, settings: Float[np.ndarray, " setting"], steps: Float[np.ndarray, " setting"]
     ) -> JointRequirement:
@@ -93,7 +104,9 @@ class JointRequirement(Requirement):
     def check(self, sample: OutputSample) -> Check:
         """Return whether all limits are kept at once; the search is steered by the limits."""
         values = self.read({own: sample.units.values(own) for own in self.outputs})
-        limited = LimitedSample.all_of(values, self.limits)
+        limited = LimitedSample.all_of(
+            values, self.limits, None, self.controls(sample.units.nearest, sample.units.planes)
+        )
         (bound,) = self.guarantee.bounds(limited, sample.confidence)
         nothing, settings = np.zeros(sample.groups), np.zeros(sample.design.size - sample.groups)
         verdict = OneSidedConstraint(
@@ -131,9 +144,9 @@ class Tail:
 
     Notes
     -----
-    e(f) = e(f₀) + s·(z(f) − z(f₀)), with z(f) = Φ⁻¹(1 − f) and the slope s of the outermost values over their normal
-    scores; exact for a normal output, where s is its standard deviation. So the quantile of a smaller share is no less
-    certain than that of f₀ (own derivation).
+    Of a linear output it is that of its law. Of any other e(f) = e(f₀) + s·(z(f) − z(f₀)), with z(f) = Φ⁻¹(1 − f) and
+    the slope s of the outermost values over their normal scores; exact for a normal output, where s is its standard
+    deviation. So the quantile of a smaller share is no less certain than that of f₀ (own derivation).
 
     Examples
     --------
@@ -144,31 +157,39 @@ class Tail:
     """
 
     share: float  # f₀ [-]
+    limits: Limits  # [unit of the output]
     bounds: tuple[QuantileBound, ...]  # What of each limit is left to so many failures, at even odds
     slope: float  # s, per normal score [unit of the output]
     error: float  # Standard error [unit of the output]
+    law: LinearLaw | None = None  # Of the output where it is linear, which is then exact at every share
 
     @classmethod
     def of(cls, sample: LimitedSample, share: float) -> Tail:
         """Return the tail of units around a share of failures [-]."""
         from scipy.stats import norm
 
-        bounds = AtYield(1 - share).bounds(sample, _EVEN_ODDS)
-        if sample.law:
-            far = AtYield(1 - share / _NARROWER).bounds(sample, _EVEN_ODDS)
+        limits, law = sample.limits, sample.law
+        if law:
+            bounds = bounds_of_law(sample, law, share)
             scores = norm.isf(share / _NARROWER) - norm.isf(share)
-            slope = max(far[0].excess - bounds[0].excess, 0.0) / float(scores)
-        else:
-            slope = _slope(sample, min(_WIDER * share, _WIDEST))
+            slope = max(law.excess(limits, share / _NARROWER) - bounds[0].excess, 0.0) / float(scores)
+            error = bounds[0].standard_error
+            return cls(share=share, limits=limits, bounds=bounds, slope=slope, error=error, law=law)
+        bounds = AtYield(1 - share).bounds(sample, _EVEN_ODDS)
+        slope = _slope(sample, min(_WIDER * share, _WIDEST))
         counted = slope * share / norm.pdf(norm.isf(share)) / np.sqrt(share * sample.units.drawn.units)
-        error = max(*(own.standard_error for own in bounds), float(counted))
-        return cls(share=share, bounds=bounds, slope=slope, error=error)
+        error = max(own.standard_error for own in bounds)
+        error = error if sample.controls else max(error, float(counted))
+        return cls(share=share, limits=limits, bounds=bounds, slope=slope, error=error)
 
     def rise(self, share: float, before: float | None = None) -> float:
         """Return how much further out another share of failures is than one before it [unit of the output]."""
         from scipy.special import ndtri
 
-        return self.slope * float(ndtri(self.share if before is None else before) - ndtri(share))
+        before = self.share if before is None else before
+        if self.law:
+            return self.law.excess(self.limits, share) - self.law.excess(self.limits, before)
+        return self.slope * float(ndtri(before) - ndtri(share))
 
     def excess(self, share: float) -> float:
         """Return how far beyond the limits a share of the units lies further out than [unit of the output]."""
@@ -179,15 +200,19 @@ class Tail:
         """Share of units that fail the limits [-]."""
         from scipy.special import ndtr, ndtri
 
+        if self.law:
+            return self.law.beyond(self.limits, 0.0)
         beyond = max(own.excess for own in self.bounds)
         if not (np.isfinite(beyond) and self.slope > 0):
             return float(beyond > 0)
         return float(ndtr(ndtri(self.share) + beyond / self.slope))
 
-    def bounds_at(self, share: float) -> tuple[QuantileBound, ...]:
-        """Return what of each limit is left to a share of failures."""
+    def bounds_at(self, share: float, doubt: float = 0.0) -> tuple[QuantileBound, ...]:
+        """Return what of each limit is left to a share of failures, which has a relative standard error [-]."""
         rise = self.rise(share)
-        return tuple(replace(own, value=own.value + own.sign * rise, standard_error=self.error) for own in self.bounds)
+        by_share = self.rise(share * max(1 - doubt, _LEAST_PART), share) if doubt else 0.0
+        error = float(np.hypot(self.error, by_share))
+        return tuple(replace(own, value=own.value + own.sign * rise, standard_error=error) for own in self.bounds)
 
 
 def _slope(sample: LimitedSample, share: float) -> float:
@@ -238,6 +263,48 @@ def _overlap(
     else:
         low = high
     return float(np.exp(low)) * (1.0 if wider == 1.0 else max(allowed, 0.5) / (joint.failures * drawn))
+
+
+def _controlled_overlap(
+    joint: JointRequirement, tails: Sequence[Tail], samples: Sequence[LimitedSample], confidence: float
+) -> tuple[float, float]:
+    """Return κ and its relative standard error where planes are known near outputs [-].
+
+    Notes
+    -----
+    Σ fᵢ of what is linear is exact, and units tell by how much fewer fail, since some fail two limits, and what fails
+    beside it (`Surprises`): κ is the largest with which no more than is allowed is shown; by halving, in 24 steps.
+    """
+    high = float(np.log(1 / min(joint.parts)))
+    furthest = [tail.excess(joint.share(at, float(np.exp(high)))) for at, tail in enumerate(tails)]
+    counted = np.zeros(samples[0].values.size, bool)
+    for own, limit in zip(samples, furthest, strict=True):
+        counted |= own.excess > limit
+        for plane in own.controls:
+            counted |= plane.excess > limit
+    excesses = [own.excess[counted] for own in samples]
+    planes = [[plane.excess[counted] for plane in own.controls] for own in samples]
+
+    def surprises(overlap: float) -> Surprises:
+        fails, called, by_law = np.zeros(excesses[0].size, bool), np.zeros(excesses[0].size, int), 0.0
+        for at, (tail, own) in enumerate(zip(tails, samples, strict=True)):
+            limit = tail.excess(joint.share(at, overlap))
+            fails |= excesses[at] > limit
+            for plane, of_unit in zip(own.controls, planes[at], strict=True):
+                called += of_unit > limit
+                by_law += plane.share(limit)
+        return Surprises.among(fails, called, by_law, counted.size)
+
+    low = float(np.log(_LEAST_PART))
+    if surprises(float(np.exp(high))).share(confidence) > joint.failures:
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            fits = surprises(float(np.exp(middle))).share(confidence) <= joint.failures
+            low, high = (middle, high) if fits else (low, middle)
+    else:
+        low = high
+    overlap = float(np.exp(low))
+    return overlap, surprises(overlap).standard_error / joint.failures
 
 
 Modelled = Callable[[Check, tuple[QuantileBound, ...], int], tuple[OneSidedConstraint, ...]]
@@ -321,12 +388,14 @@ def tightened(
         return checks
     limited = [samples(check.requirement) for check in own]
     tails = tuple(Tail.of(sample, joint.failures) for sample in limited)
-    overlap = _overlap(joint, tails, limited, confidence)
+    if any(sample.controls for sample in limited):
+        overlap, doubt = _controlled_overlap(joint, tails, limited, confidence)
+    else:
+        overlap, doubt = _overlap(joint, tails, limited, confidence), 0.0
     found = JointCheck(requirement=joint, constraints=last.constraints, tightened=(), tails=tails, overlap=overlap)
     steered = []
     for at, (check, tail, share) in enumerate(zip(own, tails, found.shares, strict=True)):
-        constraints = tuple(replace(side, law=None) for side in modelled(check, tail.bounds_at(share), at))
-        steered.append(replace(check, tightened=(*_apart(check), *constraints)))
+        steered.append(replace(check, tightened=(*_apart(check), *modelled(check, tail.bounds_at(share, doubt), at))))
     return (*steered, found)
 
 
@@ -363,6 +432,7 @@ def limited_by(sample: DesignSample) -> Callable[[Requirement], LimitedSample]:
 
     def read(requirement: Requirement) -> LimitedSample:
         values = requirement.read({own: sample.values(own) for own in requirement.outputs})
-        return LimitedSample.all_of(values, requirement.limits, sample.laws.get(requirement.output))
+        controls = requirement.controls(sample.nearest, sample.planes)
+        return LimitedSample.all_of(values, requirement.limits, sample.laws.get(requirement.output), controls)
 
     return read

@@ -7,14 +7,14 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.indices import Limits
-from tolalloc.capability.linear_function import LinearFunction, LinearLaw
+from tolalloc.capability.linear_function import LinearFunction, LinearLaw, NearPlane
 from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo
-from tolalloc.capability.near_limit import SolvedUnits
+from tolalloc.capability.near_limit import SolvedUnits, largest_first
 from tolalloc.capability.worst_unit import worst_unit
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.zones import Feature
@@ -23,6 +23,99 @@ from tolalloc.models.differences import derived
 from tolalloc.models.model import Evaluation, Model, ResponseWithDerivatives, SettingDerivatives
 
 _EVEN_ODDS = 0.5
+_FURTHER, _SURELY = 4, 200
+"""Units that are compared with planes: so many times the share that may fail, and so many more [-]."""
+_HALVINGS = 40
+_STEP = 1e-3
+"""Step of the derivative of a share, over the range of the furthest units [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Control:
+    """A plane through an output whose law is known: what units say beside it bounds what they do.
+
+    Notes
+    -----
+    A control variate of the share of failures: P(fails) = Σ P(plane beyond) + E[V], V = 1 for a unit that fails though
+    no plane calls it, −1 or less for one that more planes call than fail. Nothing is believed of the planes, whose
+    shares are exact; the better they are, the fewer units have a V (Law & Kelton, Simulation Modeling and Analysis).
+    """
+
+    near: NearPlane  # At the zones of the design; of the output itself where it is linear
+    values: Float[np.ndarray, " solved"]  # What it says of the units [unit of the output]
+    limits: Limits  # [unit of the output]
+    relative: bool = False  # Whether an excess is one over the limit [-]
+
+    @cached_property
+    def excess(self) -> Float[np.ndarray, " solved"]:
+        """How far every unit lies beyond the limits by the plane [unit of the output, or -]."""
+        sides = [sign * (self.values - limit) / self._scale(limit) for sign, limit in self.limits.turned]
+        return np.asarray(np.max(sides, axis=0))
+
+    def share(self, by: float) -> float:
+        """Return the share of units that the plane has further beyond a limit than so far [-]."""
+        turned = self.limits.turned
+        return sum(self.near.share_above(sign, limit + sign * by * self._scale(limit)) for sign, limit in turned)
+
+    def _scale(self, limit: float) -> float:
+        return abs(limit) or 1.0 if self.relative else 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Surprises:
+    """Units of which planes say something else than the units themselves, and what the planes say of all units."""
+
+    units: int  # All [-]
+    more: int  # That fail though no plane calls them [-]
+    fewer: int  # That more planes call than fail [-]
+    sum: int  # Of V [-]
+    by_law: float  # Σ of the shares that the planes call [-]
+
+    @classmethod
+    def among(
+        cls, fails: Bool[np.ndarray, " unit"], called: Int[np.ndarray, " unit"], by_law: float, units: int
+    ) -> Surprises:
+        """Return those among units that hold all that fail or are called, of so many."""
+        v = fails.astype(int) - called
+        return cls(
+            units=units,
+            more=int(np.count_nonzero(v > 0)),
+            fewer=int(np.count_nonzero(v < 0)),
+            sum=int(v.sum()),
+            by_law=by_law,
+        )
+
+    def share(self, confidence: float) -> float:
+        """Return what fails at most, with one-sided confidence; at one half the estimate itself [-].
+
+        Each kind of V takes half of the error, by Clopper–Pearson's bounds (1934). Below even odds it is what fails at
+        least, of one output: where planes call a unit twice, V below −1 would make that too large.
+
+        Examples
+        --------
+        >>> surprises = Surprises(units=1000, more=0, fewer=0, sum=0, by_law=0.01)
+        >>> round(surprises.share(0.95), 6)  # 0.01 + 1 − 0.025^(1/1000)
+        0.013682
+        """
+        if confidence == _EVEN_ODDS:
+            return self.by_law + self.sum / self.units
+        if confidence > _EVEN_ODDS:
+            tail = (1 - confidence) / 2
+            return self.by_law + self._end(self.more, 1 - tail) - self._end(self.fewer, tail)
+        return self.by_law + self._end(self.more, confidence / 2) - self._end(self.fewer, 1 - confidence / 2)
+
+    def _end(self, count: int, at: float) -> float:
+        """Return an end of the interval of the share of so many units, the upper one above one half [-]."""
+        from scipy.stats import beta
+
+        if at > _EVEN_ODDS:
+            return float(beta.ppf(at, count + 1, self.units - count)) if count < self.units else 1.0
+        return float(beta.ppf(at, count, self.units - count + 1)) if count else 0.0
+
+    @property
+    def standard_error(self) -> float:
+        """Standard error of the estimate [-]."""
+        return float(np.sqrt(self.more + self.fewer)) / self.units
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,11 +127,66 @@ class LimitedSample:
     limits: Limits  # [unit of the output]
     law: LinearLaw | None = None  # Law of the output, known before these units were drawn or the same units' own
     leaving: int = 0  # Units solved whatever was predicted whose value the law does not give [-]
+    controls: tuple[Control, ...] = ()  # Planes near what is limited, none where not all units were solved
 
     @classmethod
-    def all_of(cls, values: Float[np.ndarray, " unit"], limits: Limits, law: LinearLaw | None = None) -> LimitedSample:
+    def all_of(
+        cls,
+        values: Float[np.ndarray, " unit"],
+        limits: Limits,
+        law: LinearLaw | None = None,
+        controls: tuple[Control, ...] = (),
+    ) -> LimitedSample:
         """Return plain random units, all of which were solved."""
-        return cls(values=values, units=SolvedUnits.all_of(values.size), limits=limits, law=law)
+        return cls(values=values, units=SolvedUnits.all_of(values.size), limits=limits, law=law, controls=controls)
+
+    def controlled_excess(self, share: float, confidence: float) -> tuple[float, float]:
+        """Return how far beyond the limits a share of units lies at most, and its standard error [unit of the excess].
+
+        Parameters
+        ----------
+        share
+            [-]
+        confidence
+            One-sided [-].
+
+        Returns
+        -------
+        tuple
+            Infinite where so few units show nothing.
+
+        Notes
+        -----
+        By halving, in 40 steps, where `Surprises.share` is the share; on the right side of the limits themselves.
+        """
+        own, planes = self._furthest(share)
+        ends = np.maximum(own, planes.max(axis=0))
+        finite = ends[np.isfinite(ends)]
+
+        def surprises(by: float) -> Surprises:
+            called = sum(control.share(by) for control in self.controls)
+            return Surprises.among(own > by, (planes > by).sum(axis=0), called, self.values.size)
+
+        if not finite.size or surprises(float(finite.max())).share(confidence) > share:
+            return np.inf, np.nan
+        low, high = float(finite.min()), float(finite.max())
+        if low < 0 < high:
+            low, high = (low, 0.0) if surprises(0.0).share(confidence) <= share else (0.0, high)
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            low, high = (low, middle) if surprises(middle).share(confidence) <= share else (middle, high)
+        step = _STEP * (float(np.ptp(finite)) or 1.0)
+        fall = sum(control.share(high - step) - control.share(high + step) for control in self.controls) / (2 * step)
+        return high, surprises(high).standard_error / max(fall, np.finfo(float).tiny)
+
+    def _furthest(self, share: float) -> tuple[Float[np.ndarray, " few"], Float[np.ndarray, "control few"]]:
+        """Return how far the units furthest beyond the limits lie, by themselves and by every plane.
+
+        Some times the share of them: all that lie further beyond than the least of them are among them.
+        """
+        planes, excess = np.array([own.excess for own in self.controls]), self.excess
+        few = largest_first(np.maximum(excess, planes.max(axis=0)), int(_FURTHER * share * excess.size) + _SURELY)
+        return excess[few], planes[:, few]
 
     @property
     def excess(self) -> Float[np.ndarray, " solved"]:
@@ -149,6 +297,25 @@ class DesignSample:
         planes = {output: LinearFunction.through(self.x, self.values(output)) for output in self.outputs}
         found = {output: LinearLaw.of(plane, errors, zones) for output, plane in planes.items() if plane}
         return {output: law for output, law in found.items() if law}
+
+    @cached_property
+    def nearest(self) -> dict[str, NearPlane]:
+        """Plane near every output that one is near, its own where it is linear; of a fast model, whose units are many.
+
+        What no plane is near to is judged by the units alone.
+        """
+        found = {output: NearPlane(law=law) for output, law in self.laws.items()}
+        if self.model.is_fast:
+            zones = self.space.zones(self.design)
+            rest = [output for output in self.outputs if output not in found]
+            near = {output: NearPlane.of(self.x, self.values(output), self.space.errors, zones) for output in rest}
+            found |= {output: own for output, own in near.items() if own}
+        return found
+
+    @cached_property
+    def planes(self) -> dict[str, Float[np.ndarray, " unit"]]:
+        """What these planes say of every unit [unit of the output]."""
+        return {output: near(self.x) for output, near in self.nearest.items()}
 
     def sensitivity(self, output: str) -> Float[np.ndarray, " source"]:
         """Return the change of an output with a deviation of each source; one of `exact` [unit of the output per m].
@@ -313,7 +480,15 @@ class OutputSample:
 
     def limited(self, limits: Limits) -> LimitedSample:
         """Return what the units say of limits; a search solves all of them."""
+        if near := self.near:
+            control = Control(near=near, values=self.units.planes[self.output], limits=limits)
+            return LimitedSample.all_of(self.units.values(self.output), limits, None, (control,))
         return LimitedSample.all_of(np.append(self.values, np.full(self.failed, np.nan)), limits, self.law)
+
+    @property
+    def near(self) -> NearPlane | None:
+        """The plane near the output, none where it is linear or no plane is near."""
+        return None if self.law else self.units.nearest.get(self.output)
 
     @property
     def law(self) -> LinearLaw | None:

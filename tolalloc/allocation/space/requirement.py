@@ -9,10 +9,10 @@ from typing import Annotated, ClassVar, Literal, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.allocation.space.output_sample import DesignSample, LimitedSample, OutputSample
+from tolalloc.allocation.space.output_sample import Control, DesignSample, LimitedSample, OutputSample
 from tolalloc.allocation.space.problem import OneSidedConstraint, Stack, root_sum_square_stack, worst_case_stack
 from tolalloc.capability.indices import Limits
-from tolalloc.capability.linear_function import LinearLaw
+from tolalloc.capability.linear_function import LinearLaw, NearPlane
 from tolalloc.capability.monte_carlo import CONFIDENCE, allowed_rejections
 from tolalloc.capability.near_limit import largest_first
 from tolalloc.exceptions import InputError
@@ -92,6 +92,21 @@ def _order_statistic(sample: LimitedSample, sign: Literal[1, -1], limit: float, 
             turned[outermost], sample.units.stand_for[outermost], further, float(sample.units.stand_for.sum())
         ),
     )
+
+
+def _controlled_bounds(sample: LimitedSample, share: float, confidence: float) -> tuple[QuantileBound, ...]:
+    """Return the outermost values that are no further beyond than what units and planes show of a share of failures.
+
+    The side that reaches furthest stands just there, so that the limits are kept exactly where that is shown.
+    """
+    excess, error = sample.controlled_excess(share, confidence)
+    found = [_order_statistic(sample, sign, limit, excess) for sign, limit in sample.limits.turned]
+    if not np.isfinite(excess):
+        return tuple(found)
+    furthest = max(range(len(found)), key=lambda at: found[at].excess)
+    own = found[furthest]
+    found[furthest] = replace(own, value=own.limit + own.sign * excess)
+    return tuple(replace(each, standard_error=error) for each in found)
 
 
 def bounds_of_law(sample: LimitedSample, law: LinearLaw, beyond: float) -> tuple[QuantileBound, ...]:
@@ -263,6 +278,8 @@ class AtYield(NamedFields):
         """Return what units show of every limit, or what its law does where they keep to it."""
         if sample.law:
             return bounds_of_law(sample, sample.law, 1 - self.target - sample.most_leaving(confidence))
+        if sample.controls:
+            return _controlled_bounds(sample, 1 - self.target, confidence)
         beyond = sample.units.kept_excess(sample.excess, self.target, confidence)
         return tuple(_order_statistic(sample, sign, limit, beyond) for sign, limit in sample.limits.turned)
 
@@ -270,6 +287,8 @@ class AtYield(NamedFields):
         """Return what is compared with every limit at its least."""
         if sample.law:
             return bounds_of_law(sample, sample.law, 1 - self.target + sample.most_leaving(confidence))
+        if sample.controls:
+            return _controlled_bounds(sample, 1 - self.target, 1 - confidence)
         beyond = sample.units.least_excess(sample.excess, self.target, confidence)
         return tuple(_order_statistic(sample, sign, limit, beyond) for sign, limit in sample.limits.turned)
 
@@ -539,6 +558,29 @@ class Requirement:
     ) -> Requirement:
         """Return the requirement as it is at settings of a model, with steps of differences; what is stated stays."""
         return self
+
+    def controls(
+        self,
+        nearest: Mapping[str, NearPlane],
+        planes: Mapping[str, Float[np.ndarray, " unit"]],
+        *,
+        relative: bool = False,
+    ) -> tuple[Control, ...]:
+        """Return the planes near what is limited.
+
+        Parameters
+        ----------
+        nearest
+            Output → plane near it.
+        planes
+            Output → what the plane says of every unit [unit of the output].
+        relative
+            Whether an excess is one over the limit.
+        """
+        if self.output not in nearest:
+            return ()
+        near, values = nearest[self.output], planes[self.output]
+        return (Control(near=near, values=values, limits=self.limits, relative=relative),)
 
     def check(self, sample: OutputSample) -> Check:
         """Return how a design stands against the requirement."""

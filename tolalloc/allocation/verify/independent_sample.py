@@ -12,7 +12,7 @@ from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.output_sample import LimitedSample
 from tolalloc.allocation.space.requirement import AtYield, Requirement
 from tolalloc.capability.experiment import Experiment
-from tolalloc.capability.linear_function import LinearLaw
+from tolalloc.capability.linear_function import LinearLaw, NearPlane
 from tolalloc.capability.near_limit import Drawn, SolvedUnits
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models.model import Evaluation, Response
@@ -113,15 +113,30 @@ class IndependentSample:
     units: SolvedUnits  # Which of the drawn units they are
     outputs: dict[str, Float[np.ndarray, " solved"]]  # Outputs of all requirements, NaN where a unit has none
     leaving: dict[str, int]  # Output with a law → units solved whatever was predicted that do not keep to it [-]
+    planes: dict[str, Float[np.ndarray, " solved"]]  # Output near a plane → what that says [unit of the output]
 
-    def limited(self, requirement: Requirement, law: LinearLaw | None) -> LimitedSample:
-        """Return what the units say of a requirement whose output has a law, or has none."""
+    def limited(
+        self, requirement: Requirement, law: LinearLaw | None, nearest: Mapping[str, NearPlane]
+    ) -> LimitedSample:
+        """Return what the units say of a requirement.
+
+        Parameters
+        ----------
+        requirement
+            What is limited.
+        law
+            Of its output, none where it has none.
+        nearest
+            Output → plane near it.
+        """
+        plain = self.units.drawn.whatever == self.units.drawn.units
         return LimitedSample(
             values=requirement.read(self.outputs),
             units=self.units,
             limits=requirement.limits,
             law=law,
             leaving=self.leaving.get(requirement.output, 0),
+            controls=requirement.controls(nearest, self.planes) if plain else (),
         )
 
 
@@ -132,6 +147,7 @@ class SolvedPart:
     evaluation: Evaluation  # All outputs that are limited, the leading one first
     units: SolvedUnits  # Which of the drawn units they are
     leaving: dict[str, int]  # Output with a law → units solved whatever was predicted that do not keep to it [-]
+    planes: dict[str, Float[np.ndarray, " solved"]]  # Output near a plane → what that says [unit of the output]
 
     @property
     def plain(self) -> Evaluation:
@@ -156,6 +172,7 @@ class SolvedPart:
                 whatever=np.concatenate([own.units.whatever for own in parts]),
             ),
             leaving={output: sum(own.leaving[output] for own in parts) for output in parts[0].leaving},
+            planes={output: np.concatenate([own.planes[output] for own in parts]) for output in parts[0].planes},
         )
 
 
@@ -167,6 +184,7 @@ class UnitSolver:
     space: DesignSpace  # The design variables
     design: Float[np.ndarray, " variable"]  # Scales [-] and settings
     laws: dict[str, LinearLaw]  # Law of every limited output that is linear, at the zones of the design
+    nearest: dict[str, NearPlane]  # Plane near every output that is near one, of a linear one its own
     screen: Screen | None  # Tells near units from far ones; without it all are solved
 
     def solved(self, seeds: SeedTree, drawn: Drawn) -> SolvedPart:
@@ -185,20 +203,24 @@ class UnitSolver:
                 parts.append(self._answered(np.concatenate(rows)))
                 rows.clear()
         parts += [self._answered(np.concatenate(rows))] if rows else []
-        evaluation = _joined([own for own, _ in parts])
-        off_the_law = {name: np.concatenate([own[name] for _, own in parts]) for name in self.laws}
+        evaluation = _joined([own for own, *_ in parts])
+        off_the_law = {name: np.concatenate([own[name] for _, own, _ in parts]) for name in self.laws}
         whatever = np.arange(evaluation.status.size) < drawn.whatever
         return SolvedPart(
             evaluation=evaluation,
             units=SolvedUnits(drawn=drawn, near=np.concatenate(near), whatever=whatever),
             leaving={name: int(np.count_nonzero(own[whatever])) for name, own in off_the_law.items()},
+            planes={name: np.concatenate([own[name] for *_, own in parts]) for name in self.nearest},
         )
 
-    def _answered(self, x: Float[np.ndarray, "unit column"]) -> tuple[Evaluation, dict[str, Bool[np.ndarray, " unit"]]]:
-        """Return what the model says of units, and which of them leave the laws of linear outputs."""
+    def _answered(
+        self, x: Float[np.ndarray, "unit column"]
+    ) -> tuple[Evaluation, dict[str, Bool[np.ndarray, " unit"]], dict[str, Float[np.ndarray, " unit"]]]:
+        """Return what the model says of units, which of them leave the laws of linear outputs, and what planes say."""
         evaluation = self.response(x)
         values = dict(zip(self.response.outputs, _known(evaluation).T, strict=True))
-        return evaluation, {output: law.function.leaves(x, values[output]) for output, law in self.laws.items()}
+        off_the_law = {output: law.function.leaves(x, values[output]) for output, law in self.laws.items()}
+        return evaluation, off_the_law, {output: near(x) for output, near in self.nearest.items()}
 
 
 def _known(evaluation: Evaluation) -> Float[np.ndarray, "solved output"]:

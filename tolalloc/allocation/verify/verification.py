@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -16,7 +17,7 @@ from tolalloc.allocation.space.requirement import Check, Guarantee, Requirement,
 from tolalloc.allocation.verify.independent_sample import IndependentSample
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.capability.indices import Limits
-from tolalloc.capability.linear_function import LinearLaw
+from tolalloc.capability.linear_function import LinearLaw, NearPlane
 from tolalloc.capability.monte_carlo import CONFIDENCE, RedrawnUnits, Yield, proportion, require_few_failures
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
@@ -54,6 +55,7 @@ class VerifiedDesign:
     # Change of the leading output with a deviation of each active source, `DesignSample.sensitivity`; none as above
     by_deviation: Float[np.ndarray, " source"] | None
     confidence: float  # With which the units show what is compared with the limits, one-sided [-]
+    near: Mapping[str, NearPlane] = field(default_factory=dict)  # Output → plane that was found near it
     independent: IndependentSample | None = None  # What tested it last, none if it was not tested
     accepted: bool = False  # Whether units that no search has seen showed every requirement, with the stated error
     # Cost before its zones and amounts were rounded to what the drawing states, none if they were not [cost units]
@@ -103,6 +105,12 @@ class VerifiedDesign:
         zones = self.space.zones(self.design)
         found = {check.requirement.output: check.constraints[0].law for check in self.checks}
         return {output: replace(law, zones=zones) for output, law in found.items() if law}
+
+    @property
+    def nearest(self) -> dict[str, NearPlane]:
+        """Plane near every output that one was found near, with its law at the zones of the design."""
+        zones = self.space.zones(self.design)
+        return {output: own.at(zones) for output, own in self.near.items()}
 
     @property
     def blocking(self) -> Check:
@@ -244,6 +252,7 @@ class Verifier:
             by_zone=_by_zone(sample, checks[0].constraints[0].value),
             by_deviation=sample.sensitivity(sample.outputs[0]) if sample.outputs[0] in sample.exact else None,
             confidence=self.confidence,
+            near=sample.nearest,
         )
 
 
