@@ -9,11 +9,11 @@ import pandas as pd
 from published.modification_comparison import compared, comparison_document
 
 import tolalloc as ta
-from tolalloc.cli.console import shown_progress
 from tolalloc.reading.units import MICROMETRE
 from tolalloc.reducers.modification import ModificationRequest, closed_form, reference, residual_gap
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reports.document import Document, Section
+from tolalloc.running.progress import Progress
 
 RADIAL_CLEARANCE = 15 * MICROMETRE
 
@@ -40,12 +40,12 @@ def ladder() -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def build(quick: bool) -> Document:
+def build(quick: bool, progress: Progress) -> Document:
     """Return the report."""
     reducer = load_reducer("rv40e_xi2015")
     request = ModificationRequest(method="li2018", radial_clearance=RADIAL_CLEARANCE)
-    with shown_progress("searches") as progress:
-        found = compared(request, reducer, -reducer.load.rated_torque, range(2 if quick else 30), progress)
+    found = compared(request, reducer, -reducer.load.rated_torque, range(2 if quick else 30), progress)
+    progress.begin("closed form")
     section = Section(
         heading="Closed form",
         paragraphs=(

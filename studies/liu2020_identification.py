@@ -20,7 +20,6 @@ from tolalloc.bench.least_squares import IdentificationProblem
 from tolalloc.bench.measurements import Measurements
 from tolalloc.bench.parameters import LIU2020, SYMBOLS, Parameter, parameter
 from tolalloc.bench.prediction import KernelPredictor, data_of
-from tolalloc.cli.console import shown_progress
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table
@@ -174,14 +173,14 @@ def renamed(sections: tuple[Section, ...], name: str, heading: str) -> tuple[Sec
     )
 
 
-def build(quick: bool) -> Document:
+def build(quick: bool, progress: Progress) -> Document:
     """Return the report."""
     given, seeds = load_reducer("rv20e_liu2020"), SeedTree(2020)
     true = replace(given, stiffness=replace(given.stiffness, **TRUTH))
     errors = ErrorModel(load_tolerance_table("rv20e_table4"))
-    with shown_progress() as progress:
-        first, methods = _peak_to_peaks(given, true, errors, seeds, quick, progress)
-        second, again = _curves_and_loops(given, true, errors, seeds, quick, progress)
+    first, methods = _peak_to_peaks(given, true, errors, seeds, quick, progress)
+    second, again = _curves_and_loops(given, true, errors, seeds, quick, progress)
+    progress.begin("tables and figures")
     document, curves = told(first).document, told(second).document
     compared = methods_section(methods, first.data.measured.size)
     printed, repeated = printed_section(), recovery_section(again, tuple(item.symbol for item in second.parameters))

@@ -22,6 +22,7 @@ from tolalloc.reducers.model import ReducerModel
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.running.chunks import one_thread
+from tolalloc.running.progress import Progress
 
 UNITS, QUICK = 200, 2
 READINGS = 1440
@@ -108,11 +109,15 @@ def figure(outcomes: list[Outcome], named: np.ndarray) -> Figure:
     )
 
 
-def build(quick: bool) -> Document:
+def build(quick: bool, progress: Progress) -> Document:
     """Diagnose all units and say what the promises came to."""
     units, workers = QUICK if quick else UNITS, os.cpu_count() or 1
     with ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), initializer=one_thread) as pool:
-        outcomes = list(pool.map(outcome, range(units)))
+        progress.begin("diagnosed units", units)
+        outcomes = []
+        for one in pool.map(outcome, range(units)):
+            outcomes.append(one)
+            progress.advance(1)
     owner, sources = np.array(ERRORS.source_of_column), ERRORS.active
     named = np.array([one.dominant in one.named for one in outcomes])
     columns, gauges = (np.array([getattr(one, name) for one in outcomes]) for name in ("columns_hold", "gauges_hold"))

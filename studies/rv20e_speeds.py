@@ -18,6 +18,7 @@ from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.unit_file import load_unit
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.figure import Figure, Series
+from tolalloc.running.progress import Progress
 
 TORQUE = -167.0
 LOADS = (0.0, 1.0, 100.0)
@@ -89,7 +90,7 @@ def critical_rows(found: Modes, load: float) -> list[dict[str, object]]:
     ]
 
 
-def build(quick: bool) -> Document:
+def build(quick: bool, progress: Progress) -> Document:
     """Return the report."""
     reducer = load_reducer("rv20e_liu2020")
     model = EquivalentModel(reducer)
@@ -99,6 +100,7 @@ def build(quick: bool) -> Document:
     rows: list[dict[str, object]] = []
     figures: list[Figure] = []
     spans: list[dict[str, object]] = []
+    progress.begin("motion at all speeds", len(LOADS), "loads")
     for load in LOADS:
         inertia = inertia_of(reducer, output_inertia=load)
         about = modes(model, errors[0], TORQUE, inertia, angles)
@@ -118,6 +120,8 @@ def build(quick: bool) -> Document:
             }
             for at, speed in enumerate(speeds)
         ]
+        progress.advance(1)
+    progress.begin("at rest")
     resting = float(model.extremes(errors, TORQUE).peak_to_peak[0] / ARCSECOND)
     table = pd.DataFrame(spans)
     worst = table.loc[table["peak-to-peak [arcsec]"].idxmax()]

@@ -12,7 +12,6 @@ import pandas as pd
 from published.modification_comparison import algorithms_table, compared, comparison_document, convergence_figure
 
 import tolalloc as ta
-from tolalloc.cli.console import shown_progress
 from tolalloc.reading.units import ARCMINUTE, DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.loaded_contact import assess
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile, flank_angle
@@ -21,6 +20,7 @@ from tolalloc.reducers.reducer.design import CycloidStage, Modification, Reducer
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.tellers.contact import clearance_figure
+from tolalloc.running.progress import Progress
 
 STAGE = CycloidStage(
     pin_count=40,
@@ -110,20 +110,20 @@ def printed_points() -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def build(quick: bool) -> Document:
+def build(quick: bool, progress: Progress) -> Document:
     """Return the report."""
     own = reducer()
-    with shown_progress("searches") as progress:
-        positive, negative = (
-            compared(
-                ModificationRequest(method="song2019", radial_clearance=0.0, shift_sign=sign),
-                own,
-                -own.load.rated_torque,
-                range(3 if quick else 30),
-                progress,
-            )
-            for sign in (1, -1)
+    positive, negative = (
+        compared(
+            ModificationRequest(method="song2019", radial_clearance=0.0, shift_sign=sign),
+            own,
+            -own.load.rated_torque,
+            range(3 if quick else 30),
+            progress,
         )
+        for sign in (1, -1)
+    )
+    progress.begin("printed amounts and readings")
     allowed = reference(rotated_profile_fit(STAGE, require_gap=True))
     without = assess(replace(own, modification=allowed.modification), -own.load.rated_torque)
     clearance = positive.answer.result.contact.assessment.clearance

@@ -26,6 +26,7 @@ from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.figure import Figure, Series
+from tolalloc.running.progress import Progress
 
 TORQUE = 572.0
 SHARE = 0.55
@@ -76,14 +77,16 @@ def force_figure(contacts: dict[str, LoadedContact]) -> Figure:
     )
 
 
-def build(quick: bool) -> Document:
+def build(quick: bool, progress: Progress) -> Document:
     """Return the report."""
     reducer = load_reducer("rv40e_xi2015")
     reducer = replace(reducer, stiffness=replace(reducer.stiffness, pin_contact_law="logarithmic"))
     phase, torque = default_phases(reducer, 100 if quick else PHASES), SHARE * TORQUE
     discs = PressedDiscs(reducer=reducer, torque=torque)
+    progress.begin("readings of the compliance", 3 + len(WIDTHS), "readings")
     deflection = implied_deflection(reducer)
     implied = pressed_linear(discs, phase, deflection)
+    progress.advance(1)
     rows, first = [row("compliance that the printed angles imply", implied)], default_phases(reducer, 1)
 
     def short_of(span_mm: float) -> float:
@@ -95,13 +98,17 @@ def build(quick: bool) -> Document:
     rows.append(
         row(f"pins that bend between supports {span:.1f} mm apart, linear method", pressed_linear(on_supports, phase))
     )
+    progress.advance(1)
     rows.append(row(f"the same, law at every pin ({span:.1f} mm)", pressed(on_supports, phase)))
+    progress.advance(1)
     steel = {}
     for width in WIDTHS:
         own = PressedDiscs(reducer=reducer.with_face_width(width * MILLIMETRE), torque=torque)
         steel[width] = pressed(own, phase)
         rows.append(row(f"steel line contact, {width:g} mm, linear method", pressed_linear(own, phase)))
         rows.append(row(f"steel line contact, {width:g} mm, law at every pin", steel[width]))
+        progress.advance(1)
+    progress.begin("loaded contact")
     share = float(np.mean(implied.pins_in_contact == 16))
     found = ta.contact(reducer="rv40e_xi2015", torque=-TORQUE)
     return Document(

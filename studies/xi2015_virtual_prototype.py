@@ -11,7 +11,6 @@ from math import inf
 import pandas as pd
 
 import tolalloc as ta
-from tolalloc.cli.console import shown_progress
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND, RPM
 from tolalloc.reducers.dynamics.prototype import engine, with_rigid_bearings
@@ -20,6 +19,7 @@ from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.simulation import SimulationRequest, SimulationResult, prepare_simulation, with_ideal_gears
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.tellers.simulation import error_figure, range_text, rest_row, run_figures, steady_row
+from tolalloc.running.progress import Progress
 from tolalloc.study.answer import Answer
 from tolalloc.study.inquiries.simulate import simulated
 
@@ -47,12 +47,14 @@ def readings() -> dict[str, Reducer]:
     }
 
 
-def run(reducer: Reducer, name: str, quick: bool, torque: float = TORQUE, speed: float = SPEED) -> Simulated:
+def run(
+    reducer: Reducer, name: str, quick: bool, progress: Progress, torque: float = TORQUE, speed: float = SPEED
+) -> Simulated:
     """Return a simulation of xi2015's run, or of a shorter one."""
     times = {"ramp": 0.2, "duration": 0.8} if quick else {}
     asked = SimulationRequest(reducer="rv40e_xi2015", engine=name, torque_nm=torque, speed_rpm=speed, **times)
-    with shown_progress("ms") as progress:
-        return simulated(replace(prepare_simulation(asked), reducer=reducer), progress)
+    progress.begin("nominal state")
+    return simulated(replace(prepare_simulation(asked), reducer=reducer), progress)
 
 
 def missing() -> str:
@@ -115,13 +117,15 @@ def answer(found: dict[str, dict[str, SimulationResult]], lacking: str) -> tuple
     )
 
 
-def build(quick: bool) -> Document:
+def build(quick: bool, progress: Progress) -> Document:
     """Return the report."""
     lacking = missing()
     engines = (MODEL, "newmark") if lacking else (MODEL, "newmark", PROTOTYPE)
     for each in engines:  # compiled functions load at first use, which is no computing time
-        run(readings()[STEEL], each, quick=True)
-    told = {name: {each: run(reducer, each, quick) for each in engines} for name, reducer in readings().items()}
+        run(readings()[STEEL], each, True, progress)
+    told = {
+        name: {each: run(reducer, each, quick, progress) for each in engines} for name, reducer in readings().items()
+    }
     found = {name: {each: own.result for each, own in by_engine.items()} for name, by_engine in told.items()}
     rows = [
         {"pin contact": name, **row}
@@ -131,7 +135,7 @@ def build(quick: bool) -> Document:
     table, shown = pd.DataFrame(rows), MODEL if lacking else PROTOTYPE
     differences: tuple[Section, ...] = ()
     if not lacking:
-        others = [run(readings()[SOFT], PROTOTYPE, quick, *other).result for other in OTHERS]
+        others = [run(readings()[SOFT], PROTOTYPE, quick, progress, *other).result for other in OTHERS]
         differences = (difference_section([found[SOFT][PROTOTYPE], *others]),)
     cautions = (
         f"{name}, {engine}: {text}"

@@ -21,9 +21,9 @@ from published.zhang2025_sections import (
 import tolalloc as ta
 from tolalloc.assembly.adjustment import AssemblyRequest
 from tolalloc.assembly.files import load_plan
-from tolalloc.cli.console import shown_progress
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reports.document import Document
+from tolalloc.running.progress import Progress
 from tolalloc.study.inquiries.assemble import assembled
 
 SEED = 20250711
@@ -35,7 +35,7 @@ def parts_drawn() -> np.ndarray:
     return np.round(np.random.default_rng(SEED).uniform(-60, 60, (4, 3)), 2) * ARCSECOND
 
 
-def build(quick: bool) -> Document:
+def build(quick: bool, progress: Progress) -> Document:
     """Return the report."""
     request = AssemblyRequest(
         plan=load_plan("bx40e"),
@@ -43,12 +43,13 @@ def build(quick: bool) -> Document:
         errors=parts_drawn(),
         assemblies=10_000 if quick else 100_000,
     )
-    with shown_progress("assemblies") as progress:
-        document = assembled(request, progress).document
+    document = assembled(request, progress).document
     plan = request.plan
+    progress.begin("random parts")
     drawn, shares = drawn_parts_section(plan, 40 if quick else 200)
-    mounting, mounted = mounting_section(3 if quick else 100)
-    genetic, searched = genetic_section(plan, 2 if quick else 10)
+    mounting, mounted = mounting_section(3 if quick else 100, progress)
+    genetic, searched = genetic_section(plan, 2 if quick else 10, progress)
+    progress.begin("price of effort")
     priced, prices = priced_section(plan)
     return replace(
         document,

@@ -70,13 +70,13 @@ def compared(
     study: ModificationRequest, reducer: Reducer, torque: float, seeds: range, progress: Progress
 ) -> ModificationComparison:
     """Return the best amounts and how every algorithm found them; each algorithm and finished search is told."""
-    progress.begin("reference")
+    progress.begin("reference", 1, "searches")
     answer = answer_of(choose(study, reducer, torque))
     chosen = answer.result
     progress.advance(1)
     spreads, polished = [], []
     for name, searcher in searchers(study.method).items():
-        progress.begin(name)
+        progress.begin(name, len(seeds), "searches")
         results = []
         for seed in seeds:
             results.append(searcher(chosen.problem, seed))

@@ -30,6 +30,7 @@ from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
+from tolalloc.running.progress import Progress
 
 SEEDS = SeedTree(1).child("zhang2025")
 PRECISIONS = (0.0, 5.0, 10.0)
@@ -224,12 +225,16 @@ def _row(name: str, allocation: AngularAllocation) -> dict[str, Any]:
     }
 
 
-def genetic_section(plan: AssemblyPlan, seeds: int) -> tuple[Section, str]:
+def genetic_section(plan: AssemblyPlan, seeds: int, progress: Progress) -> tuple[Section, str]:
     """Return what zhang2025's genetic algorithm ends above the certified cost."""
     rows = []
+    progress.begin("genetic algorithm", 2 * seeds, "searches")
     for precision in (0.0, plan.state_weight):
         certified = allocate_angles(plan, precision)
-        runs = [genetic_allocation(plan, certified, SEEDS.child("genetic", str(seed))) for seed in range(seeds)]
+        runs = []
+        for seed in range(seeds):
+            runs.append(genetic_allocation(plan, certified, SEEDS.child("genetic", str(seed))))
+            progress.advance(1)
         excess = np.array([run.total / certified.total - 1 for run in runs]) * 100
         rows.append(
             {
@@ -257,11 +262,12 @@ def genetic_section(plan: AssemblyPlan, seeds: int) -> tuple[Section, str]:
     )
 
 
-def mounting_section(sets: int) -> tuple[Section, str]:
+def mounting_section(sets: int, progress: Progress) -> tuple[Section, str]:
     """Return what choosing the mounting of measured parts is worth, over random sets of parts of an RV-20E."""
     errors = ta.drawing("rv20e_table4").errors
     kernel = ta.reducer("rv20e_liu2020").bound(errors, "zhang2025_assembly").kernel
-    rows = [_mounted(kernel, errors, units, sets) for units in SETS_OF]
+    progress.begin("mounting of measured parts", len(SETS_OF) * sets, "sets")
+    rows = [_mounted(kernel, errors, units, sets, progress) for units in SETS_OF]
     table = pd.DataFrame(rows)
     first = rows[0]
     sentence = (
@@ -283,7 +289,7 @@ def mounting_section(sets: int) -> tuple[Section, str]:
     )
 
 
-def _mounted(kernel: KernelResponse, errors: Any, units: int, sets: int) -> dict[str, Any]:
+def _mounted(kernel: KernelResponse, errors: Any, units: int, sets: int, progress: Progress) -> dict[str, Any]:
     random, worst, seconds, evaluations = [], [], [], []
     for number in range(sets):
         seeds = SEEDS.child("mounting", str(units), str(number))
@@ -297,6 +303,7 @@ def _mounted(kernel: KernelResponse, errors: Any, units: int, sets: int) -> dict
         random.append((1 - after / chance.mean) * 100)
         worst.append((1 - after / chance.worst) * 100)
         evaluations.append(found.evaluations)
+        progress.advance(1)
     row: dict[str, Any] = {"mounting": SETS_OF[units], "sets [-]": sets}
     for name, values in (("a random mounting", random), ("the worst mounting", worst)):
         low, median, high = np.quantile(values, [0.05, 0.5, 0.95])

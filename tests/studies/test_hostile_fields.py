@@ -62,6 +62,7 @@ def test_names_are_shown_as_they_are_and_never_as_markup(capsys):
     for shown in (Bars("units"), Lines("units")):
         with shown as progress:
             progress.begin("[/c]")
+            progress.advance(1)
         assert "[/c]" in capsys.readouterr().err
 
 

@@ -263,7 +263,7 @@ class Heard:
     def __init__(self):
         self.said = []
 
-    def begin(self, stage):
+    def begin(self, stage, units=0, counted=""):
         self.said.append(stage)
 
     def advance(self, units):

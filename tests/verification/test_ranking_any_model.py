@@ -87,7 +87,7 @@ ERRORS = ErrorModel(
 
 
 class Silent:
-    def begin(self, stage: str) -> None:
+    def begin(self, stage: str, units: int = 0, counted: str = "") -> None:
         pass
 
     def advance(self, units: int) -> None:

@@ -141,7 +141,7 @@ def difference(
     changed = repriced(space, wanted)
     outputs = tuple(dict.fromkeys(own.output for own in requirements))
     drawings = [np.array([source.zone for source in own]) for own in (errors.active, changed)]
-    with record.stage("difference"):
+    with record.stage("difference", 2 * units):
         values = _solved(model.observed(record.observe).reading(outputs), errors, drawings, units, seeds)
     pairs = [(old, new) for old, new in zip(errors.active, changed, strict=True) if old.name in wanted]
     return DifferenceResult(

@@ -33,7 +33,7 @@ from tolalloc.reducers.choice import bind
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.running.blas import one_blas_thread
-from tolalloc.running.progress import RunRecord
+from tolalloc.running.progress import SILENT, Progress, RunRecord
 
 IMPLAUSIBLE = 0.001
 """Probability of residuals as large, were the model true, below which a curve is not explained [-]."""
@@ -103,11 +103,13 @@ def diagnose(
     seeds: SeedTree,
     effort: DiagnosisEffort,
     level: float = 0.97,
+    progress: Progress = SILENT,
 ) -> Diagnosis:
     """Return what a measured curve tells of the errors of the unit's parts.
 
     The kernel is solved at the curve's torque and has the columns of the errors; zones are those of the sources that
-    vary [m]. The named sources contain the dominant one with the probability ``level`` [-].
+    vary [m]. The named sources contain the dominant one with the probability ``level`` [-]. Each stage of the work is
+    told as it begins.
 
     Raises
     ------
@@ -138,10 +140,13 @@ def diagnose(
         zones=zones,
         readings=thinned(curve, noise, effort.angles),
     )
+    progress.begin("explanations of the curve")
     explanation = explain(problem, seeds.child("search"), effort)
+    progress.begin("errors that the curve allows")
     numbers = posterior(problem, explanation, seeds.child("posterior").generator(), effort)
     deviations = with_twins(problem, problem.deviations(numbers), seeds.child("twins").generator())
     judged = deviations[seeds.child("judged").generator().permutation(len(deviations))[: effort.judged]]
+    progress.begin("dominant source")
     fit = _fit(problem, numbers, judged)
     names, probability = tuple(source.name for source in errors.active), np.zeros(len(errors.active))
     if fit.explained:
@@ -274,7 +279,8 @@ def diagnose_unit(request: DiagnosisRequest, record: RunRecord) -> DiagnosisResu
     )
     with one_blas_thread(), record.stage("diagnosis"):
         seeds = SeedTree(request.seed).child("diagnosis")
-        found = diagnose(curve, kernel, errors, errors.zones, noise, seeds, request.effort, request.level)
+        asked, progress = request.effort, record.progress
+        found = diagnose(curve, kernel, errors, errors.zones, noise, seeds, asked, request.level, progress)
     return DiagnosisResult(
         reducer=request.reducer,
         torque=kernel.torque,

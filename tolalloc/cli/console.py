@@ -6,8 +6,10 @@ import json
 import sys
 import time
 from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
 from math import isnan
 from pathlib import Path
+from threading import Event, RLock, Thread
 from types import TracebackType
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -23,7 +25,9 @@ if TYPE_CHECKING:
     from tolalloc.study.answer import Answer
 
 _PAUSE = 5.0
-"""Time between two lines of one stage in a log [s]."""
+"""Time between two lines of a log [s]."""
+_SHORT = 2.0
+"""Stages that solve nothing and take less are not worth a line [s]."""
 
 
 def shown_progress(counted: str = "units") -> AbstractContextManager[Progress]:
@@ -31,53 +35,109 @@ def shown_progress(counted: str = "units") -> AbstractContextManager[Progress]:
     return Bars(counted) if sys.stderr.isatty() else Lines(counted)
 
 
+@dataclass
+class _Stage:
+    """How far one stage has come."""
+
+    name: str
+    expected: int  # Units of the whole stage; 0 where nobody knows [-]
+    counted: str
+    units: int = 0
+    began: float = field(default_factory=lambda: time.perf_counter())
+
+    @property
+    def seconds(self) -> float:
+        """Time since it began [s]."""
+        return time.perf_counter() - self.began
+
+    @property
+    def known(self) -> int:
+        """Units of the whole stage; 0 where nobody knows, as where it has solved all that were expected and goes on."""
+        return self.expected if self.units < self.expected else 0
+
+    def solved(self, *, over: bool = False) -> str:
+        """Return what is done, at which rate, and what is left at this rate; nothing before the first unit."""
+        if not self.units:
+            return ""
+        of = f" of {self.known:,}" if self.known and not over else ""
+        rate = self.units / max(self.seconds, 1e-9)
+        said = f"{self.units:,}{of} {self.counted}, {_rounded(rate)} {self.counted}/s"
+        return f"{said}, {_duration((self.known - self.units) / rate)} left" if of else said
+
+
+def _rounded(rate: float) -> str:
+    """Return a rate with two digits at least."""
+    return f"{rate:,.0f}" if rate >= 10 else f"{rate:.2g}"
+
+
+def _duration(seconds: float) -> str:
+    """Return a time to come."""
+    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
+
+
 class Lines:
-    """A line every few seconds while a stage works, and one when it ends."""
+    """A line every few seconds while a stage works, whether or not units are done, and one when it ends."""
 
     def __init__(self, counted: str) -> None:
-        self._counted, self._stage = counted, ""
-        self._began = self._told = self._units = 0.0
+        self._counted = counted
+        self._stage: _Stage | None = None
+        self._told = 0.0
+        self._lock, self._over = RLock(), Event()
+        self._clock = Thread(target=self._keep_telling, daemon=True, name="progress")
 
     def __enter__(self) -> Lines:
+        self._told = time.perf_counter()
+        self._clock.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._end("stopped" if kind else "done")
+        self._over.set()
+        self._end("stopped" if kind else "done", short=kind is KeyboardInterrupt)
 
-    def begin(self, stage: str) -> None:
-        """Begin a stage; the one before is finished."""
+    def begin(self, stage: str, units: int = 0, counted: str = "") -> None:
+        """Begin a stage of so many units, or of what is counted; the one before is finished."""
         self._end("done")
-        self._stage, self._units = stage, 0
-        self._began = self._told = time.perf_counter()
+        with self._lock:
+            self._stage = _Stage(stage, units, counted or self._counted)
 
     def advance(self, units: int) -> None:
         """So many more units are solved."""
-        self._units += units
-        if self._stage and time.perf_counter() - self._told >= _PAUSE:
-            self._tell("so far")
+        with self._lock:
+            if self._stage:
+                self._stage.units += units
+        self._tell_at_times()
 
     def tell(self, sentence: str) -> None:
         """Say what is known already; the stage that found it is finished."""
         self._end("done")
         note(sentence)
 
-    def _end(self, how: str) -> None:
-        if self._stage:
-            self._tell(how)
-        self._stage = ""
+    def _keep_telling(self) -> None:
+        """Tell how far it is where nothing is solved for long, as while functions are compiled."""
+        while not self._over.wait(1.0):
+            self._tell_at_times()
 
-    def _tell(self, how: str) -> None:
+    def _tell_at_times(self) -> None:
+        with self._lock:
+            if self._stage and time.perf_counter() - self._told >= _PAUSE:
+                self._tell(self._stage, "so far")
+
+    def _end(self, how: str, *, short: bool = False) -> None:
+        with self._lock:
+            if self._stage and (short or self._stage.units or self._stage.seconds >= _SHORT):
+                self._tell(self._stage, how)
+            self._stage = None
+
+    def _tell(self, stage: _Stage, how: str) -> None:
         self._told = time.perf_counter()
-        took = self._told - self._began
-        solved = f"{self._units:.0f} {self._counted} in " if self._units else ""
-        rate = f", {self._units / took:.0f} {self._counted}/s" if self._units and took > 0 else ""
-        typer.echo(f"{self._stage}: {how}, {solved}{took:.1f} s{rate}", err=True)
+        solved = stage.solved(over=how != "so far")
+        typer.echo(f"{stage.name}: {how}, {stage.seconds:.1f} s" + (f", {solved}" if solved else ""), err=True)
 
 
 class Bars:
-    """A moving bar per stage with the number of solved units, or of other things, and their rate."""
+    """A moving bar per stage with what is done, its rate, and the time that is left where it is known."""
 
     def __init__(self, counted: str) -> None:
         from rich.console import Console
@@ -87,13 +147,13 @@ class Bars:
             SpinnerColumn(),
             TextColumn("{task.description:<24}", markup=False),
             BarColumn(bar_width=24),
-            TextColumn(f"{{task.fields[counted]:>8.0f}} {counted}"),
-            TextColumn(f"{{task.fields[rate]:>7.1f}} {counted}/s"),
             TimeElapsedColumn(),
+            TextColumn("{task.fields[solved]}", markup=False),
             console=Console(stderr=True),
         )
+        self._counted = counted
         self._task: TaskID | None = None
-        self._began, self._units = 0.0, 0
+        self._stage = _Stage("", 0, counted)
 
     def __enter__(self) -> Bars:
         self._bar.start()
@@ -102,32 +162,41 @@ class Bars:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._end()
+        self._end(stopped=kind is not None)
         self._bar.stop()
 
-    def begin(self, stage: str) -> None:
-        """Begin a stage; the one before is finished."""
+    def begin(self, stage: str, units: int = 0, counted: str = "") -> None:
+        """Begin a stage of so many units, or of what is counted; the one before is finished."""
         self._end()
-        self._task = self._bar.add_task(stage, total=None, rate=0.0, counted=0)
-        self._began, self._units = time.perf_counter(), 0
+        self._stage = _Stage(stage, units, counted or self._counted)
+        self._task = self._bar.add_task(stage, total=units or None, solved="")
 
     def advance(self, units: int) -> None:
         """So many more units are solved."""
         if self._task is None:
             return
-        self._units += units
-        rate = self._units / max(time.perf_counter() - self._began, 1e-9)
-        self._bar.update(self._task, counted=self._units, rate=rate)
+        self._stage.units += units
+        if not self._stage.known:  # all that were expected are done, and it goes on: a full bar would say that it ends
+            self._bar.tasks[self._task].total = None
+        self._bar.update(self._task, completed=self._stage.units, solved=self._stage.solved())
 
     def tell(self, sentence: str) -> None:
         """Say what is known already, above the bars; the stage that found it is finished."""
         self._end()
-        self._task = None
         self._bar.console.print(sentence, markup=False, highlight=False)
 
-    def _end(self) -> None:
-        if self._task is not None:
-            self._bar.update(self._task, total=1, completed=1)
+    def _end(self, *, stopped: bool = False) -> None:
+        if self._task is None:
+            return
+        stage = self._stage
+        if stopped:
+            self._bar.update(self._task, total=stage.known or 1, completed=stage.units if stage.known else 0)
+            self._bar.stop_task(self._task)
+        elif stage.units or stage.seconds >= _SHORT:
+            self._bar.update(self._task, total=1, completed=1, solved=stage.solved(over=True))
+        else:
+            self._bar.remove_task(self._task)
+        self._task = None
 
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print machine-readable output only.")]
@@ -241,7 +310,8 @@ def tell(answer: Answer[Any], as_json: bool, *tables: tuple[pd.DataFrame, str]) 
         typer.secho(warning, fg="yellow")
 
 
-def write_report(answer: Answer[Any], out: Path | None) -> None:
+def write_report(answer: Answer[Any], out: Path | None, progress: Progress) -> None:
     """Write the report on an answer into a folder, if one was asked for."""
     if out:
-        note(f"Report: {answer.save(out) / 'report.html'}")
+        progress.begin("report")
+        progress.tell(f"Report: {answer.save(out) / 'report.html'}")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import typer
 
-from tolalloc.cli.console import AsJson, announce_compilation, print_json
+from tolalloc.cli.console import AsJson, announce_compilation, print_json, shown_progress
 from tolalloc.exceptions import SolveError
 
 _KNOWN = 96.629
@@ -36,7 +36,9 @@ def doctor(as_json: AsJson = False) -> None:
     }
     announce_compilation()
     start = time.perf_counter()
-    value = _peak_to_peak()
+    with shown_progress() as progress:
+        progress.begin("self-test")
+        value = _peak_to_peak()
     found |= {"self-test [arcsec]": value, "known [arcsec]": _KNOWN, "seconds": round(time.perf_counter() - start, 1)}
     if as_json:
         print_json(found)

@@ -29,8 +29,9 @@ def inquiry_command(name: str) -> Callable[..., None]:
         if room := asked.room(prepared):
             announce_compilation(room)
         with shown_progress(inquiry.counted) as progress:
+            progress.begin(inquiry.word)
             answer = asked.solve(prepared, progress)
-        write_report(answer, out)
+            write_report(answer, out, progress)
         for sentence in asked.write(answer):
             note(sentence)
         tell(answer, as_json, *answer.teller.terminal)

@@ -207,7 +207,9 @@ def _run(study: Study, kinds: tuple[str, ...], place: _Place, checkpoint: Path |
         ) from None
     note(f"Report: {folder / 'report.html'}")
     if way.paper:
-        write_pdf(folder / "report.html", folder / "report.pdf", way.paper)
+        with shown_progress() as progress:
+            progress.begin("printing")
+            write_pdf(folder / "report.html", folder / "report.pdf", way.paper)
         note(f"Printed: {folder / 'report.pdf'}")
     if way.as_json:
         print_json({"folder": str(folder), **found.document.summary})

@@ -38,7 +38,9 @@ def check(script: Script, timed: Timed = False, as_json: AsJson = False) -> None
     study = load_study(script)
     if timed:
         announce_kernel(study.model)
-    answer = checked(study, timed=timed, script=str(script))
+    with shown_progress() as progress:
+        progress.begin("check")
+        answer = checked(study, timed=timed, script=str(script))
     if as_json:
         print_json(answer.summary)
     else:
@@ -68,10 +70,10 @@ def whatif(
     wanted = dict(_zone(text) for text in zones)
     with shown_progress() as progress:
         answer = changed(study, wanted, units=units, progress=progress)
+        write_report(answer, out, progress)
     tell(
         answer, as_json, (answer.to_frame("changes"), "What changes"), (answer.to_frame("changed zones"), "Which zones")
     )
-    write_report(answer, out)
 
 
 def series(

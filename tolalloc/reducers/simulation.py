@@ -422,7 +422,7 @@ def simulate(prepared: PreparedSimulation, progress: Progress) -> SimulationResu
         A time step or an angle without equilibrium.
     """
     asked, motion = prepared.asked, prepared.motion
-    progress.begin(f"in motion, {asked.engine}")
+    progress.begin(f"in motion, {asked.engine}", int(1e3 * asked.duration + 1e-6), "ms")
     start = time.perf_counter()
     simulated = _prototype if asked.engine == "exudyn" else _equivalent
     series = simulated(prepared, motion, _milliseconds(asked.duration, progress))

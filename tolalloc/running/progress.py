@@ -19,8 +19,8 @@ from jaxtyping import UInt8
 class Progress(Protocol):
     """What shows a person how far the work has come."""
 
-    def begin(self, stage: str) -> None:
-        """Begin a stage."""
+    def begin(self, stage: str, units: int = 0, counted: str = "") -> None:
+        """Begin a stage of so many units, 0 where nobody knows, or of other things that are counted."""
         ...
 
     def advance(self, units: int) -> None:
@@ -35,7 +35,7 @@ class Progress(Protocol):
 class Silent:
     """Progress that nobody is shown, as in a script or a notebook."""
 
-    def begin(self, stage: str) -> None:
+    def begin(self, stage: str, units: int = 0, counted: str = "") -> None:
         """Begin a stage."""
 
     def advance(self, units: int) -> None:
@@ -43,6 +43,10 @@ class Silent:
 
     def tell(self, sentence: str) -> None:
         """Say what is known already."""
+
+
+SILENT = Silent()
+"""Whom functions tell of their stages where nobody listens."""
 
 
 @dataclass
@@ -63,9 +67,9 @@ class RunRecord:
     stages: dict[str, dict[str, float]] = field(default_factory=dict)
 
     @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """Time a stage and count its units."""
-        self.progress.begin(name)
+    def stage(self, name: str, expected: int = 0) -> Iterator[None]:
+        """Time a stage and count its units, of which so many are expected; 0 where nobody knows."""
+        self.progress.begin(name, expected)
         _give_back()
         units, start = sum(self.statuses.values()), time.perf_counter()
         yield

@@ -225,7 +225,7 @@ def rank(asked: Measures, record: RunRecord) -> RankingResult:
     measures, model, effort = replace(asked, model=asked.model.observed(record.observe)), asked.model, asked.effort
     leading, spectra, own = measures.leading, model.spectra, measures.experiment
     with one_blas_thread():
-        with record.stage("random units"):
+        with record.stage("random units", effort.units):
             sample = measures.sample()
         with record.stage("Sobol indices"):
             effect = measures.uncertain(sample)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
@@ -191,23 +192,32 @@ class Calculation(Question):
     Parameters
     ----------
     build
-        Makes the report from whether it should be quick.
+        Makes the report from whether it should be quick; one that takes long has an argument ``progress`` too, the
+        `tolalloc.running.progress.Progress` that it tells of its stages.
     """
 
     kind: ClassVar[str] = "calculation"
     by_position: ClassVar[int] = 1
     reads: ClassVar[frozenset[str]] = frozenset()
 
-    build: Callable[[bool], Document]
+    build: Callable[..., Document]
 
     def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any]:  # noqa: ARG002
         """Return what the function made."""
         study = prepared.study
         with record.stage(study.name):
-            made = self.build(study.quick)
+            made = self.build(study.quick, **({"progress": record.progress} if _takes_progress(self.build) else {}))
         return Answer(
             kind=self.kind, header=Header(name=study.name, model="", seed=made.seed, quick=study.quick), result=made
         )
+
+
+def _takes_progress(build: Callable[..., Document]) -> bool:
+    """Return whether a function that makes a report tells of its stages."""
+    try:
+        return "progress" in signature(build).parameters
+    except ValueError:  # some functions in C tell nothing of their arguments
+        return False
 
 
 def _answer(kind: str, header: Header, record: RunRecord, result: Result) -> Answer[Result]:

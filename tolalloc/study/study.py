@@ -252,6 +252,8 @@ def run(
         }
         from tolalloc.reports.writer import write_document
 
+        if progress:
+            progress.begin("report")
         document = _document(prepared, answers)
         if study.model is not None:
             prepared.model.release()  # drawing the figures takes as much memory
@@ -264,7 +266,7 @@ def run(
 def _tell_today(prepared: Prepared, asked: tuple[Question, ...], progress: Progress | None) -> None:
     """Say how the drawing stands as it is, some seconds after the start; what is asked takes minutes."""
     if progress and any("limits" in question.reads for question in asked):
-        progress.begin("the drawing as it is")
+        progress.begin("the drawing as it is", _JUDGED)
         kept = prepared.kept_limits(_JUDGED)
         progress.advance(kept.joint.units)
         progress.tell(today_sentence(kept))

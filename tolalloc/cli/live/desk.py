@@ -60,7 +60,7 @@ class Job:
         """Stop it as soon as the next units are solved."""
         self._stop.set()
 
-    def begin(self, stage: str) -> None:
+    def begin(self, stage: str, units: int = 0, counted: str = "") -> None:  # noqa: ARG002
         """Begin a stage."""
         self._look()
         self.stage, self.units = stage, 0
