@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+import tolalloc as ta
 from tests.builders import says
 from tolalloc.capability.indices import Limits
 from tolalloc.drawings.correlation import CorrelatedSource
@@ -18,7 +19,7 @@ from tolalloc.models.model import Evaluation, Model, Response
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.running.progress import RunRecord
-from tolalloc.sensitivity.effort import RankingEffort, SobolEffort
+from tolalloc.sensitivity.effort import QUICK_RANKING, RankingEffort, SobolEffort
 from tolalloc.sensitivity.measures import Measures, rank
 from tolalloc.sensitivity.result import RankingResult
 from tolalloc.study.answer import Answer
@@ -190,3 +191,20 @@ def test_an_own_model_without_a_portrait_says_its_assumptions_itself():
 
     assert portrait_of(Said()).assumptions == ("all holes are round",)
     assert portrait_of(Said()).facts == {}
+
+
+def test_a_function_of_arrays_has_the_shares_of_a_sum_to_a_hundredth_in_a_quick_run():
+    """y = 2·a + b + c at equal zones has the shares 4/6, 1/6, 1/6; single numbers have the blocks of any model."""
+    span = {"plus": 10.0, "minus": -10.0, "unit": "µm", "min": 1.0, "max": 90.0, "cost": 1.0}
+    study = ta.Study(
+        ta.model(lambda a, b, c: 2 * a + b + c, inputs=("a", "b", "c"), outputs=("sum [mm]",)),
+        ta.Drawing.of_rows([{"id": name, **span} for name in "abc"]),
+        limits={"sum [mm]": ta.Limit(upper=0.06)},
+        questions=[ta.Ranking()],
+        name="sum",
+    )
+    found = study.rank("quick").result.sobol.of(0)
+    np.testing.assert_allclose(found.total, [4 / 6, 1 / 6, 1 / 6], atol=0.01)
+    assert found.blocks == QUICK_RANKING.of_fast_model(3).sobol.limit > 100 * QUICK_RANKING.sobol.limit
+    assert (found.total_interval[1] - found.total_interval[0] < 0.05).all()
+    assert EFFORT.of_fast_model(3) is EFFORT  # numbers of a user stay

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import ceil
 from typing import Annotated, ClassVar
 
@@ -21,6 +21,12 @@ FEWEST_UNITS_OF_CLASS = 10
 """Units of a class of PAWN, below which its distance to the whole sample is chance [-]."""
 CLASSES = 10
 """Classes of equal size that PAWN divides each measure into, SALib's number [-]."""
+
+
+FAST_RATE = 500_000
+"""Units a second that a model which takes whole arrays is taken to answer, assumed: no clock is read [1/s]."""
+FAST_SECONDS = {True: 0.25, False: 1.0}
+"""Whether a run is quick → what the Sobol analysis of such a model may take at that rate [s]."""
 
 
 def fewest_units() -> int:
@@ -141,6 +147,28 @@ class RankingEffort(NamedFields):
             (whole("2 or more", 2), "resamples"),
         ):
             rule.check("study", f"effort.ranking.sobol.{name}", getattr(self.sobol, name))
+
+    def of_fast_model(self, sources: int) -> RankingEffort:
+        """Return the effort for a model that answers for whole arrays, unless its numbers are the user's own.
+
+        The Sobol analysis has as many blocks of sources + 2 units, a power of two, as the stated rate allows, and at
+        least those of any model: counted work and no clock decides, so the same study has the same bits.
+
+        Parameters
+        ----------
+        sources
+            Sources, or blocks of dependent ones, whose columns are exchanged together [-].
+
+        Examples
+        --------
+        >>> QUICK_RANKING.of_fast_model(4).sobol.limit, QUICK_RANKING.of_fast_model(100).sobol.limit
+        (16384, 1024)
+        """
+        if self not in (RankingEffort(), QUICK_RANKING):
+            return self
+        allowed = int(FAST_RATE * FAST_SECONDS[self == QUICK_RANKING]) // (sources + 2)
+        blocks = max(self.sobol.limit, 1 << max(allowed.bit_length() - 1, 0))
+        return replace(self, sobol=replace(self.sobol, start=blocks, limit=blocks))
 
 
 QUICK_RANKING = RankingEffort(

@@ -77,7 +77,7 @@ class _Part:
 
 def _of_ranking(prepared: Prepared) -> tuple[_Part, ...]:
     """Return random units, Saltelli blocks and units of the leading output alone, each with what is asked of them."""
-    model, errors, effort = prepared.model, prepared.errors, prepared.study.effort.ranking
+    model, errors, effort = prepared.model, prepared.errors, prepared.ranking_effort
     leading = prepared.requirements[0].output
     outputs = tuple(name for name in model.outputs if name in {*model.ranked, *prepared.study.limits})
     waves = tuple(name for names in model.spectra.values() for name in names)

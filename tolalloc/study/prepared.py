@@ -26,6 +26,7 @@ from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.running.chunks import Mapper
 from tolalloc.running.progress import RunRecord
+from tolalloc.sensitivity.effort import RankingEffort
 from tolalloc.study.problem import COMMON, Limit, Problem
 
 _SHARED = "Rows without a group are one line where identical parts have the same zone, limits and price: {lines}."
@@ -173,6 +174,12 @@ class Prepared:
             # What a person writes in Python is a tolerance ± t, half a zone.
             return priced(costs, self._stated.sources, "half zone")
         return load_process_costs(costs, self._stated.sources) if costs else {}
+
+    @property
+    def ranking_effort(self) -> RankingEffort:
+        """How much a ranking may compute, more blocks for a model that answers for whole arrays."""
+        effort = self.study.effort.ranking
+        return effort.of_fast_model(len(self.errors.blocks)) if self.model.is_fast else effort
 
     @property
     def allocation_effort(self) -> AllocationEffort:

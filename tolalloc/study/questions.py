@@ -78,7 +78,7 @@ class Ranking(Question):
             errors=prepared.errors,
             limits={requirement.output: requirement.limits for requirement in prepared.requirements},
             target=prepared.target,
-            effort=study.effort.ranking,
+            effort=prepared.ranking_effort,
             seeds=SeedTree(study.seed).child("rank"),
             largest_failed_share=study.largest_failed_share,
         )

@@ -140,6 +140,7 @@ class AllocationEffort(NamedFields):
             verification_units=2**16,
             confirmation_units=2**20 if self == QUICK_ALLOCATION else 2**22,
             search=replace(self.search, steps=AllocationEffort().search.steps),
+            share_blocks=2**12,
             gain=0.002,
             error=AllocationEffort().error,
         )
