@@ -22,7 +22,7 @@ from tolalloc.exceptions import InputError
 from tolalloc.models.differences import derived
 from tolalloc.models.model import Evaluation, Model, ResponseWithDerivatives, SettingDerivatives
 
-_EVEN_ODDS = 0.5
+_EVEN_ODDS, _TENTH = 0.5, 0.1
 _FURTHER, _SURELY = 4, 200
 """Units that are compared with planes: so many times the share that may fail, and so many more [-]."""
 _HALVINGS = 40
@@ -61,6 +61,27 @@ class Control:
         return abs(limit) or 1.0 if self.relative else 1.0
 
 
+def _half(error: float) -> float:
+    """Return the error of each of two kinds of units that together err no more than so much [-].
+
+    Notes
+    -----
+    Half of it up to 10 %. Above, where a search with few units aims at what a test with many takes, 1 − Φ(1.28·z) with
+    the z of the error: like that of one kind it falls to the estimate itself at even odds, in proportion to z. 1.28 is
+    z(5 %)/z(10 %), and z·√(s₁² + s₂²) ≤ 1.28·z·(s₁ + s₂) for the standard errors s of the kinds (own derivation).
+
+    Examples
+    --------
+    >>> _half(0.05), round(_half(0.1), 6), round(_half(0.33), 3), _half(0.5)
+    (0.025, 0.05, 0.286, 0.5)
+    """
+    from scipy.special import ndtr, ndtri
+
+    if error <= _TENTH:
+        return error / 2
+    return float(ndtr(ndtri(_TENTH / 2) / ndtri(_TENTH) * ndtri(error)))
+
+
 @dataclass(frozen=True, kw_only=True)
 class Surprises:
     """Units of which planes say something else than the units themselves, and what the planes say of all units."""
@@ -88,8 +109,9 @@ class Surprises:
     def share(self, confidence: float) -> float:
         """Return what fails at most, with one-sided confidence; at one half the estimate itself [-].
 
-        Each kind of V takes half of the error, by Clopper–Pearson's bounds (1934). Below even odds it is what fails at
-        least, of one output: where planes call a unit twice, V below −1 would make that too large.
+        Each kind of V takes half of the error, by Clopper–Pearson's bounds (1934); see `_half` for errors above 10 %.
+        Below even odds it is what fails at least, of one output: where planes call a unit twice, V below −1 would make
+        that too large.
 
         Examples
         --------
@@ -99,10 +121,10 @@ class Surprises:
         """
         if confidence == _EVEN_ODDS:
             return self.by_law + self.sum / self.units
+        tail = _half(min(confidence, 1 - confidence))
         if confidence > _EVEN_ODDS:
-            tail = (1 - confidence) / 2
             return self.by_law + self._end(self.more, 1 - tail) - self._end(self.fewer, tail)
-        return self.by_law + self._end(self.more, confidence / 2) - self._end(self.fewer, 1 - confidence / 2)
+        return self.by_law + self._end(self.more, tail) - self._end(self.fewer, 1 - tail)
 
     def _end(self, count: int, at: float) -> float:
         """Return an end of the interval of the share of so many units, the upper one above one half [-]."""
