@@ -138,12 +138,16 @@ def test_a_script_finds_its_modules_and_files_beside_it_from_any_folder(tmp_path
         "import tolalloc as ta\nfrom own_helper_of_a_study import TABLE, UPPER\n"
         "limits = {ta.PEAK_TO_PEAK: ta.Limit(upper=UPPER)}\n"
         "study = ta.Study(ta.reducer('rv20e_liu2020'), ta.drawing(TABLE), limits=limits)\n"
+        "if __name__ == '__main__':\n    ta.run_script()\n"
     )
     environment = {"PYTHONPATH": str(ROOT), "PATH": "", "COLUMNS": "200"}
     words = command("check", script)
     found = subprocess.run(words, capture_output=True, text=True, cwd=elsewhere, check=False, env=environment)
     assert found.returncode == 0, found.stderr
     assert "Study study can be run, but" in found.stdout and "at most 55" in found.stdout
+    words = [sys.executable, str(script), "--help"]  # Python reads the study itself before any command does
+    found = subprocess.run(words, capture_output=True, text=True, cwd=elsewhere, check=False, env=environment)
+    assert found.returncode == 0, found.stderr
     table.unlink()
     refused(tolalloc("check", script), str(table), "no such file")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import sys
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -61,9 +62,16 @@ def relative_to(folder: Path) -> Iterator[None]:
 
 
 def found_from_here(path: str | Path) -> Path:
-    """Return the user's path, as the folder means it that relative paths are taken from."""
-    folder = _FOLDER.get()
-    return Path(path) if folder is None else folder / path
+    """Return the user's path, as the folder means it that relative paths are taken from.
+
+    A script that Python itself runs finds the files beside it too, from wherever it is run.
+    """
+    folder, own = _FOLDER.get(), Path(path)
+    if folder is not None:
+        return folder / own
+    script = getattr(sys.modules.get("__main__"), "__file__", None)
+    beside = Path(script).parent / own if script else own
+    return own if own.exists() or not beside.exists() else beside
 
 
 def read_toml(path: Path) -> dict[str, Any]:
