@@ -18,7 +18,7 @@ from tolalloc.drawings.zones import Feature
 from tolalloc.models.model import Evaluation, Model, Response
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
-from tolalloc.running.progress import RunRecord
+from tolalloc.running.progress import SILENT, RunRecord
 from tolalloc.sensitivity.effort import QUICK_RANKING, RankingEffort, SobolEffort
 from tolalloc.sensitivity.measures import Measures, rank
 from tolalloc.sensitivity.result import RankingResult
@@ -87,16 +87,8 @@ ERRORS = ErrorModel(
 )
 
 
-class Silent:
-    def begin(self, stage: str, units: int = 0, counted: str = "") -> None:
-        pass
-
-    def advance(self, units: int) -> None:
-        pass
-
-
 def ranked(limits: dict[str, Limits], model: Chain = Chain()) -> Answer[RankingResult]:
-    record = RunRecord(Silent(), portrait_of(model).outcomes)
+    record = RunRecord(SILENT, portrait_of(model).outcomes)
     asked = Measures(
         model=model,
         errors=ERRORS,
