@@ -125,6 +125,19 @@ def test_a_limit_beside_the_leading_one_is_part_of_the_question(tmp_path):
     assert same == [True, False, False, True]  # the last is of a version that did not say it
 
 
+def test_rankings_of_the_same_limits_are_of_one_question(tmp_path):
+    def ranked(upper):
+        rows = [{"requirement": "lost motion", "USL": upper, "OK": "yes"}, {"requirement": "twist"}]
+        return run_folder(tmp_path / str(upper), asked="ranking", requirements=rows)
+
+    one, other = ranked(1.0), ranked(1.2)
+    shown = {"requirement": "lost motion [arcmin]", "limit": "at most 1 arcmin", "shown for": "99.73 % of units"}
+    allocated = run_folder(tmp_path / "allocated", requirements=[shown])
+    pairs = ((one, one), (one, other), (one, allocated))
+    same = [json.loads(tolalloc("compare", *pair, "--json").stdout)["same question"] for pair in pairs]
+    assert same == [True, False, True]
+
+
 def test_rankings_with_a_lower_limit_alone_are_compared(tmp_path):
     runs = []
     for name, index in (("one", 0.3), ("two", 0.4)):

@@ -23,6 +23,7 @@ TOTAL, LOW, HIGH = "total index ST [-]", "ST low 5 % [-]", "ST high 95 % [-]"
 _YIELD, _OF_ALL = "yield of {} [-]", "all limits"
 _RANKED = ("source", "rank [-]", TOTAL, LOW, HIGH)
 _LIMITS = ("limit", "lower limit")
+_REQUIRED, _LIMITED = ("limit", "shown for"), ("LSL", "USL")
 _ZONED = ("id", "unit", "plus [unit]", "minus [unit]", "cost [cost units]")
 
 
@@ -75,10 +76,19 @@ class FinishedRun:
         return {name: value for name, value in self.summary.items() if name.startswith(_LIMITS)}
 
     @property
-    def requirements(self) -> dict[str, tuple[str, str]]:
-        """Limited output → its limits and what was to be shown, in words; none in a ranking."""
-        rows = self.summary.get("requirements") or ()
-        return {str(row["requirement"]): (str(row["limit"]), str(row["shown for"])) for row in rows}
+    def requirements(self) -> dict[str, tuple[object, ...]]:
+        """Output → its limits and what was to be shown, as an allocation says them, or its limits in a ranking."""
+        said = _REQUIRED if self.allocates else _LIMITED
+        return {str(row["requirement"]): tuple(row.get(name) for name in said) for row in self._required}
+
+    @property
+    def allocates(self) -> bool:
+        """Whether its requirements are those of an allocation, which says what was to be shown."""
+        return any(_REQUIRED[0] in row for row in self._required)
+
+    @property
+    def _required(self) -> list[dict[str, object]]:
+        return self.summary.get("requirements") or []
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,10 +107,11 @@ class Comparison:
     def same_question(self) -> bool:
         """Whether both were asked for the same reducer or model, torque, limits and yield."""
         asked = ("reducer", "model", "torque [N·m]", "yield target [-]", *self.first.limits, *self.second.limits)
-        required = [run.requirements for run in self.runs if run.requirements]
-        return all(self.first.summary.get(name) == self.second.summary.get(name) for name in asked) and all(
-            own == required[0] for own in required
-        )
+        if any(self.first.summary.get(name) != self.second.summary.get(name) for name in asked):
+            return False
+        first, second = (run.requirements for run in self.runs)
+        unsaid = not (first and second) or self.first.allocates != self.second.allocates
+        return unsaid or first == second
 
     @property
     def same_versions(self) -> bool:
