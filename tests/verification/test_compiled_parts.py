@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import stat
@@ -176,7 +177,7 @@ def test_a_user_who_can_write_nowhere_compiles_into_a_temporary_folder(bare_plac
 def test_te_answers_a_user_who_can_write_nowhere(bare_place):
     done = as_a_user_without_a_home(bare_place, "-m", "tolalloc.cli.main", "te", "--reducer", "rv20e", "--json")
     assert done.returncode == 0, done.stderr
-    assert "peak-to-peak" in done.stdout
+    assert json.loads(done.stdout)["peak_to_peak_arcsec"] == pytest.approx(0.150, abs=0.001)
     assert "Traceback" not in done.stderr
 
 
