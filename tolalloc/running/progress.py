@@ -6,7 +6,7 @@ import ctypes
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
@@ -59,16 +59,22 @@ class RunRecord:
         Told of every stage and every chunk of units.
     outcomes
         Status → outcome in words; the model's own.
+    opening
+        What is done before the first stage, once everything that can be refused has been.
     """
 
     progress: Progress
     outcomes: Mapping[int, str]
     statuses: Counter[int] = field(default_factory=Counter)
     stages: dict[str, dict[str, float]] = field(default_factory=dict)
+    opening: Callable[[], None] | None = None
 
     @contextmanager
     def stage(self, name: str, expected: int = 0) -> Iterator[None]:
         """Time a stage and count its units, of which so many are expected; 0 where nobody knows."""
+        if self.opening:
+            opening, self.opening = self.opening, None
+            opening()
         self.progress.begin(name, expected)
         _give_back()
         units, start = sum(self.statuses.values()), time.perf_counter()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 
@@ -245,11 +246,7 @@ def run(
     kept = replace(cache_beside(folder), solved_by=solved_by).pruned()
     prepared = Prepared(study=study, mapper=solved_by if fresh else kept)
     with claimed(folder) as beside:
-        _tell_today(prepared, asked, progress)
-        answers = {
-            question.kind: question.answer(prepared, _record(prepared, question, progress), checkpoint)
-            for question in asked
-        }
+        answers = _answers(prepared, asked, progress, checkpoint)
         from tolalloc.reports.writer import write_document
 
         if progress:
@@ -263,13 +260,25 @@ def run(
     return Run(answers=answers, folder=folder, document=document)
 
 
-def _tell_today(prepared: Prepared, asked: tuple[Question, ...], progress: Progress | None) -> None:
+def _answers(
+    prepared: Prepared, asked: tuple[Question, ...], progress: Progress | None, checkpoint: Path | None
+) -> dict[str, Answer[Any]]:
+    """Return the answer to every question; the first of the limits begins with how the drawing stands as it is."""
+    answers, opening = dict[str, Answer[Any]](), partial(_tell_today, prepared, progress) if progress else None
+    for question in asked:
+        record = _record(prepared, question, progress)
+        if "limits" in question.reads:
+            record.opening, opening = opening, None
+        answers[question.kind] = question.answer(prepared, record, checkpoint)
+    return answers
+
+
+def _tell_today(prepared: Prepared, progress: Progress) -> None:
     """Say how the drawing stands as it is, some seconds after the start; what is asked takes minutes."""
-    if progress and any("limits" in question.reads for question in asked):
-        progress.begin("the drawing as it is", _JUDGED)
-        kept = prepared.kept_limits(_JUDGED)
-        progress.advance(kept.joint.units)
-        progress.tell(today_sentence(kept))
+    progress.begin("the drawing as it is", _JUDGED)
+    kept = prepared.kept_limits(_JUDGED)
+    progress.advance(kept.joint.units)
+    progress.tell(today_sentence(kept))
 
 
 def cache_beside(folder: Path) -> ResultCache:
