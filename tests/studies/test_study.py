@@ -7,6 +7,7 @@ import doctest
 import pickle
 import subprocess
 import sys
+from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
@@ -18,6 +19,7 @@ from tests.studies.command import ROOT, command, refused, tolalloc
 from tests.studies.scripts import study_script
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
+from tolalloc.sensitivity.effort import QUICK_RANKING
 from tolalloc.study.prepared import Prepared
 
 LIMITS = {ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)}
@@ -277,6 +279,7 @@ class Heard:
         self.said.append(sentence)
 
 
+@pytest.mark.slow
 def test_a_run_first_says_how_the_drawing_stands_as_it_is(tmp_path):
     """Of a uniform deviation within ±3 µm five sixths lie below 2 µm and two thirds above −1 µm, one half between."""
     row = {
@@ -302,6 +305,8 @@ def test_a_run_first_says_how_the_drawing_stands_as_it_is(tmp_path):
     found, heard = Prepared(study=study).kept_limits(1024), Heard()
     for share, own in zip((5 / 6, 2 / 3, 1 / 2), (*found.each.values(), found.joint), strict=True):
         assert own.estimate == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / 1024))
-    study.run(tmp_path / "run", "quick", heard)
+    few = {"trajectories": 2, "derivative_units": 10, "surrogate_units": 96, "moment_units": 100, "level_units": 100}
+    sobol = ta.SobolEffort(start=16, limit=16, resamples=50)
+    study.run(tmp_path / "run", ta.Effort(ranking=replace(QUICK_RANKING, sobol=sobol, **few)), heard)
     assert heard.said[:2] == ["the drawing as it is", 1024]
     assert says(heard.said[2], "check.today", share=found.joint.estimate)

@@ -185,6 +185,7 @@ def test_an_own_model_without_a_portrait_says_its_assumptions_itself():
     assert portrait_of(Said()).facts == {}
 
 
+@pytest.mark.slow
 def test_a_function_of_arrays_has_the_shares_of_a_sum_to_a_hundredth_in_a_quick_run():
     """y = 2·a + b + c at equal zones has the shares 4/6, 1/6, 1/6; single numbers have the blocks of any model."""
     span = {"plus": 10.0, "minus": -10.0, "unit": "µm", "min": 1.0, "max": 90.0, "cost": 1.0}

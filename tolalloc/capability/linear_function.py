@@ -24,7 +24,10 @@ _TAIL = 1e-13
 """Probability beyond which an endless distribution is cut [-]."""
 _FAR = 0.5
 """Standard deviation from a plane, over that of the output, from which the plane says too little of it [-]."""
-_DEGREE, _POINTS_OF_CURVE, _ENDS = 5, 2049, 100.0
+_DEGREE, _POINTS_OF_CURVE = 5, 2049
+"""Degree of the polynomial behind which a plane may lie, and points at which it is tabulated [-]."""
+_ENDS = 100.0
+"""How far the curve goes on straight beyond the values that made it, over their range [-]."""
 _REACH = 12.0
 """Standard deviations of the normal part that the points cover to either side [-]."""
 

@@ -162,24 +162,24 @@ class _Place:
     def of(cls, named: Path | None, name: str) -> _Place:
         """Return the named folder; else the next numbered one in runs, so that the study runs again after an edit."""
         from tolalloc.reports.finished_run import finished
-        from tolalloc.reports.folder import numbered
+        from tolalloc.reports.folder import RUNS, numbered
 
         if named:
             return cls(named, None)
-        *earlier, folder = numbered(Path("runs") / name)
+        *earlier, folder = numbered(RUNS / name)
         last = finished(earlier)[-1:]
         return cls(folder, last[0].folder if last else None)
 
     def tell_changes(self) -> None:
         """Say what changed since the run before; nothing where one of the two is no ranking and no allocation."""
         from tolalloc.reports.tellers.comparison import ComparisonTeller
-        from tolalloc.running.progress import Silent
+        from tolalloc.running.progress import SILENT
         from tolalloc.study.inquiries.compare import Compare
 
         if self.before:
             with suppress(InputError):
                 asked = Compare(first=self.before, second=self.folder)
-                found = asked.solve(asked.prepare(), Silent())
+                found = asked.solve(asked.prepare(), SILENT)
                 for sentence in ComparisonTeller(found.result, found.header).since:
                     typer.echo(sentence)
 

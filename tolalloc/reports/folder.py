@@ -13,6 +13,8 @@ from tempfile import mkdtemp
 
 from tolalloc.exceptions import RunFolderError
 
+RUNS = Path("runs")
+"""Where runs stand whose folder nobody names."""
 _UNFINISHED = ".unfinished"
 """How the name of a folder ends that is being filled."""
 

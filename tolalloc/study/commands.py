@@ -17,7 +17,7 @@ from tolalloc.reports.folder import numbered
 from tolalloc.reports.header import Header
 from tolalloc.reports.tellers.check import Checked, CheckedTime
 from tolalloc.running.chunks import Mapper
-from tolalloc.running.progress import Progress, Silent
+from tolalloc.running.progress import SILENT, Progress
 from tolalloc.study.answer import Answer
 from tolalloc.study.prepared import Prepared
 from tolalloc.study.problem import Effort
@@ -167,7 +167,7 @@ def series(
     read = [_with_modules(study) for study in studies]
     asked = [(study.with_effort(effort), in_force) for study, in_force in read]
     members = []
-    for member in run_series(asked, Path(folder), progress or Silent(), fresh=fresh, solved_by=solved_by):
+    for member in run_series(asked, Path(folder), progress or SILENT, fresh=fresh, solved_by=solved_by):
         members.append(member)
         if told:
             told(member)

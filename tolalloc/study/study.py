@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 from tolalloc.exceptions import InputError
 from tolalloc.reading.named_fields import Rule
 from tolalloc.reports.document import Document, joined
-from tolalloc.reports.folder import claimed, numbered
+from tolalloc.reports.folder import RUNS, claimed, numbered
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.tellers.check import today_sentence
 from tolalloc.running.chunks import Mapper
-from tolalloc.running.progress import Progress, RunRecord, Silent
+from tolalloc.running.progress import SILENT, Progress, RunRecord
 from tolalloc.running.result_cache import ResultCache
 from tolalloc.study.answer import Answer
 from tolalloc.study.prepared import Prepared
@@ -212,13 +212,13 @@ class Study(Problem):
         TolallocError
             One sentence on what is wrong; nothing is written then.
         """
-        place = Path(folder) if folder else numbered(Path("runs") / self.name)[-1]
+        place = Path(folder) if folder else numbered(RUNS / self.name)[-1]
         return run(self.with_effort(effort), place, progress=progress, fresh=fresh)
 
 
 def _record(prepared: Prepared, question: Question, progress: Progress | None) -> RunRecord:
     outcomes = portrait_of(prepared.model).outcomes if "model" in question.reads else {}
-    return RunRecord(progress or Silent(), outcomes)
+    return RunRecord(progress or SILENT, outcomes)
 
 
 def run(

@@ -8,13 +8,11 @@ from typing import Annotated, ClassVar
 
 from tolalloc.exceptions import InputError
 from tolalloc.reports.finished_run import Comparison, common_currency, finished, read_run
+from tolalloc.reports.folder import RUNS
 from tolalloc.reports.header import Header
 from tolalloc.running.progress import Progress
 from tolalloc.study.answer import Answer
 from tolalloc.study.inquiry import Inquiry, Word
-
-_RUNS = Path("runs")
-"""Where runs stand whose folder nobody names."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,11 +36,11 @@ class Compare(Inquiry[Comparison]):
         if self.first and self.second:
             return Comparison(first=read_run(self.first), second=read_run(self.second))
         if self.first or self.second:
-            raise InputError(f"{self.called}: one folder is named; name two, or none for the last two runs in {_RUNS}.")
-        places = sorted(_RUNS.glob("*/manifest.json"), key=lambda path: path.stat().st_mtime)
+            raise InputError(f"{self.called}: one folder is named; name two, or none for the last two runs in {RUNS}.")
+        places = sorted(RUNS.glob("*/manifest.json"), key=lambda path: path.stat().st_mtime)
         found = finished(path.parent for path in places)[-2:]
         if len(found) < 2:
-            raise InputError(f"{self.called}: {_RUNS} holds {len(found)} finished runs; name two folders, A and B.")
+            raise InputError(f"{self.called}: {RUNS} holds {len(found)} finished runs; name two folders, A and B.")
         return Comparison(first=found[0], second=found[1])
 
     def solve(self, prepared: Comparison, progress: Progress) -> Answer[Comparison]:  # noqa: ARG002
