@@ -71,7 +71,7 @@ def found_from_here(path: str | Path) -> Path:
         return folder / own
     script = getattr(sys.modules.get("__main__"), "__file__", None)
     beside = Path(script).parent / own if script else own
-    return own if own.exists() or not beside.exists() else beside
+    return own if os.path.exists(own) or not os.path.exists(beside) else beside  # a name too long is no file
 
 
 def read_toml(path: Path) -> dict[str, Any]:
