@@ -47,7 +47,7 @@ class Product:
 
 def test_a_group_is_ranked_together():
     errors = ErrorModel(TWINS)
-    experiment, effort = Experiment.of(Product(), errors, SeedTree(1), 0.0), SobolEffort(start=1024, limit=1024)
+    experiment, effort = Experiment.of(Product(), errors, SeedTree(1), 0.0), SobolEffort(start=8192, limit=8192)
     alone = sobol_indices(experiment, effort).of(0)
     grouped = sobol_indices(experiment, effort, factor_groups=errors.dimension_of_column).of(0)
     assert grouped.sources == ("a", "b")

@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from SALib.analyze import sobol as salib
+from scipy.stats import t
 
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
@@ -21,12 +22,19 @@ from tolalloc.sensitivity.ranking import (
     ranks,
     until_converged,
 )
-from tolalloc.sensitivity.saltelli import SaltelliIndices, resample_counts, saltelli_indices
+from tolalloc.sensitivity.saltelli import (
+    SaltelliIndices,
+    drawn,
+    one_pass,
+    saltelli_indices,
+    t_weights,
+    without_each,
+)
 
-SOURCES, BLOCKS, RESAMPLES, OUTPUTS = 5, 96, 60, 7
+SOURCES, BLOCKS, RESAMPLES, OUTPUTS, REPLICATES = 5, 96, 60, 7, 8
 FIELDS = (
     *("first", "total", "second", "first_resamples", "total_resamples", "second_resamples"),
-    *("variance", "variance_resamples"),
+    *("variance", "first_left_out", "total_left_out", "variance_left_out"),
 )
 
 
@@ -47,7 +55,13 @@ def evaluation(values: np.ndarray) -> Evaluation:
 
 def indices(values: np.ndarray, second_order: bool = True, seed: int = 4, **options: object) -> SaltelliIndices:
     found = saltelli_indices(
-        evaluation(values), SOURCES, SeedTree(seed), second_order=second_order, resamples=RESAMPLES, **options
+        evaluation(values),
+        SOURCES,
+        SeedTree(seed),
+        replicates=REPLICATES,
+        second_order=second_order,
+        resamples=RESAMPLES,
+        **options,
     )
     assert found.pairs == (tuple(combinations(range(SOURCES), 2)) if second_order else ())
     return found
@@ -75,35 +89,51 @@ def test_estimates_are_those_of_salib(second_order):
             close(found.second[output], [theirs["S2"][pair] for pair in found.pairs])
 
 
-def test_resamples_are_those_of_salib():
+def test_indices_without_a_replicate_are_those_of_salib_from_the_other_blocks():
     values = answers()
-    found = indices(values)
-    counts = resample_counts(BLOCKS, RESAMPLES, SeedTree(4))[1:].astype(int)
-    chosen = np.stack([np.repeat(np.arange(BLOCKS), row) for row in counts], axis=1)
+    found, replicate = indices(values), np.arange(BLOCKS) % REPLICATES
     for output in range(OUTPUTS):
         y = values[:, output]
-        y = (y - y.mean()) / y.std()
-        a, b, ab, ba = salib.separate_output_values(y, SOURCES, BLOCKS, True)
-        for j in range(SOURCES):
-            own = (a[chosen], ab[chosen, j], b[chosen])
-            close(found.first_resamples[output, :, j], salib.first_order(*own))
-            close(found.total_resamples[output, :, j], salib.total_order(*own))
-        for at, (j, k) in enumerate(found.pairs):
-            theirs = salib.second_order(a[chosen], ab[chosen, j], ab[chosen, k], ba[chosen, j], b[chosen])
-            close(found.second_resamples[output, :, at], theirs)
+        a, b, ab, ba = salib.separate_output_values((y - y.mean()) / y.std(), SOURCES, BLOCKS, True)
+        rows = one_pass(
+            np.ascontiguousarray(y.reshape(BLOCKS, -1).T[np.newaxis]), without_each(replicate, REPLICATES), SOURCES
+        )[4]
+        for left in range(REPLICATES):
+            rest = replicate != left
+            for j in range(SOURCES):
+                own = (a[rest], ab[rest, j], b[rest])
+                close(found.first_left_out[output, left, j], salib.first_order(*own))
+                close(found.total_left_out[output, left, j], salib.total_order(*own))
+            for at, (j, k) in enumerate(found.pairs):
+                close(
+                    rows[0, left + 1, at],
+                    salib.second_order(a[rest], ab[rest, j], ab[rest, k], ba[rest, j], b[rest]),
+                )
+
+
+def test_draws_from_the_errors_of_means_are_students_interval():
+    """Means of normal numbers: the ends of 90 % are the mean ∓ t₁₅·s/√16, within what 40,000 draws tell."""
+    numbers = SeedTree(3).generator().normal(5.0, 1.0, size=16)
+    rows = np.array([numbers.mean(), *(np.delete(numbers, at).mean() for at in range(16))])[np.newaxis, :, np.newaxis]
+    ends = percentile_interval(drawn(rows, t_weights(16, 40_000, SeedTree(1)))[0])[:, 0]
+    np.testing.assert_allclose(ends, t.interval(0.9, 15, numbers.mean(), numbers.std(ddof=1) / 4), atol=0.01)
+    positive = drawn(rows, t_weights(16, 40_000, SeedTree(1)), positive=True)[0]
+    logarithms = np.log(percentile_interval(positive)[:, 0] / numbers.mean())
+    np.testing.assert_allclose(logarithms, ends / numbers.mean() - 1, atol=1e-3)
+    assert drawn(-rows * 0.0, t_weights(16, 10, SeedTree(1)), positive=True).max() == 0.0
 
 
 @pytest.mark.parametrize("blocks", [6, 7, 96])
-def test_resamples_without_the_only_different_block_have_no_index(blocks):
-    """The answers of such a resample are equal, so the difference of its moments is rounding, as large as an index."""
+def test_blocks_without_the_only_different_one_have_no_index(blocks):
+    """Their answers are equal, so the difference of their moments is rounding, as large as an index."""
     y = np.zeros((blocks, SOURCES + 2))
     y[3, 0] = y[4, 2] = 1.0
-    found = saltelli_indices(evaluation(y.reshape(-1, 1)), SOURCES, SeedTree(4), resamples=RESAMPLES)
-    without = resample_counts(blocks, RESAMPLES, SeedTree(4))[1:, 3] == 0
-    assert without.any()
-    assert (found.first_resamples[0, without] == 0).all()
-    assert (found.total_resamples[0, without] == 0).all()
-    assert (found.total_resamples[0, ~without].max(axis=1) > 0).all()
+    found = saltelli_indices(evaluation(y.reshape(-1, 1)), SOURCES, SeedTree(4), replicates=6, resamples=RESAMPLES)
+    assert (found.first_left_out[0, 3] == 0).all()
+    assert (found.total_left_out[0, 3] == 0).all()
+    assert (np.delete(found.total_left_out[0], 3, axis=0).max(axis=1) > 0).all()
+    assert np.isfinite(found.total_resamples).all()
+    assert (found.total_resamples >= 0).all()
 
 
 def test_a_single_source_has_no_pairs():
@@ -126,13 +156,19 @@ def test_one_failed_sample_drops_its_block_and_nothing_else():
     broken[17 * size + 3, 2] = np.nan
     found = indices(broken, largest_failed_share=0.02)
     assert (found.blocks, found.dropped) == (BLOCKS - 1, 1)
-    same_bits(found, indices(np.delete(values, np.arange(17 * size, 18 * size), axis=0)))
+    rest, own = indices(np.delete(values, np.arange(17 * size, 18 * size), axis=0)), 17 % REPLICATES
+    for name in ("first", "total", "second", "variance"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(rest, name))
+    # Without the replicate of that block nothing is missing.
+    close(found.total_left_out[:, own], indices(values).total_left_out[:, own])
+    assert (found.total_left_out[:, own - 1] != indices(values).total_left_out[:, own - 1]).all()
     status = np.zeros(values.shape[0], np.uint8)
     status[17 * size] = 1
     by_status = saltelli_indices(
         Evaluation(values=values, status=status),
         SOURCES,
         SeedTree(4),
+        replicates=REPLICATES,
         second_order=True,
         resamples=RESAMPLES,
         largest_failed_share=0.02,
@@ -161,17 +197,17 @@ def test_an_output_that_does_not_vary_concerns_itself_alone():
         assert np.isnan(getattr(found, name)[[2, 5]]).all()
     same_bits(found, indices(values), others)
     assert (found.variance[[2, 5]] == 0).all()
-    assert (found.variance_resamples[[2, 5]] == 0).all()
+    assert (found.variance_left_out[[2, 5]] == 0).all()
 
 
 def test_the_variance_is_that_of_a_and_b_in_the_units_of_the_output():
     values = answers()
-    found, counts = indices(values), resample_counts(BLOCKS, RESAMPLES, SeedTree(4))
+    found, replicate = indices(values), np.arange(BLOCKS) % REPLICATES
     base = values.reshape(BLOCKS, -1, OUTPUTS)[:, [0, -1]]
     for output in range(OUTPUTS):
-        expected = [np.repeat(base[:, :, output], row.astype(int), axis=0).var() for row in counts]
-        np.testing.assert_allclose(found.variance[output], expected[0], rtol=1e-10)
-        np.testing.assert_allclose(found.variance_resamples[output], expected[1:], rtol=1e-10)
+        without = [base[replicate != left, :, output].var() for left in range(REPLICATES)]
+        np.testing.assert_allclose(found.variance[output], base[:, :, output].var(), rtol=1e-10)
+        np.testing.assert_allclose(found.variance_left_out[output], without, rtol=1e-10)
 
 
 def test_seed_zero_is_a_seed_like_every_other():

@@ -69,7 +69,7 @@ class SobolEffort(NamedFields):
     probability
         Share of resamples that must have that order [-].
     resamples
-        Bootstrap resamples [-].
+        Draws from the errors of the indices [-].
     second_order
         Whether pairs of sources get an index, at nearly twice the samples.
     """

@@ -1,4 +1,4 @@
-"""How far a ranking can be trusted, from bootstrap resamples of its indices, and a design grown until it is stable."""
+"""How far a ranking can be trusted, from draws from the errors of its indices, and a design grown until it is stable."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class SourceRanking:
     """Sources by their total index."""
 
     sources: tuple[str, ...]  # Names, in the order of all arrays
-    # Total index, and the same from bootstrap resamples of the blocks [-]
+    # Total index, and draws from its error, those of a row together [-]
     total: Float[np.ndarray, " source"]
     total_resamples: Float[np.ndarray, "resample source"]
     blocks: int  # Saltelli blocks used [-]

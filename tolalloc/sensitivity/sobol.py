@@ -1,8 +1,8 @@
 """Sobol indices of all outputs from one Saltelli design that grows until the ranking is stable.
 
-SALib draws and estimates (`tolalloc.sensitivity.saltelli`). Its traps and the guards against them: seed 0 is no seed,
-so seeds are positive; one NaN makes every index zero, so blocks with a failed sample are dropped whole and counted;
-``conf`` is a multiple of a standard deviation, so intervals are percentiles of kept resamples.
+Points and estimates are SALib's (`tolalloc.sensitivity.saltelli`). Its traps and the guards against them: seed 0 is no
+seed, so seeds are positive; one NaN makes every index zero, so blocks with a failed sample are dropped whole and
+counted; ``conf`` takes the blocks of a Sobol' sequence for independent, so intervals come from replicates.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from tolalloc.sensitivity.ranking import (
     percentile_interval,
     until_converged,
 )
-from tolalloc.sensitivity.saltelli import SaltelliDesign, SaltelliIndices, saltelli_indices
+from tolalloc.sensitivity.saltelli import REPLICATES, SaltelliDesign, SaltelliIndices, drawn, saltelli_indices
 
 
 @dataclass(frozen=True, kw_only=True)
 class SobolIndices(SourceRanking):
     """Indices of every source for one output; a block of dependent sources counts as one source, named "a + b"."""
 
-    # First-order index, and the same from bootstrap resamples of the blocks [-]
+    # First-order index, and draws from its error [-]
     first: Float[np.ndarray, " source"]
     first_resamples: Float[np.ndarray, "resample source"]
     # Positions of the two sources of every pair, their second-order index, and the same from the resamples; no pairs
@@ -219,7 +219,7 @@ class OrderContribution:
     # vary [-]
     first: Float[np.ndarray, "order source"]
     total: Float[np.ndarray, "order source"]
-    # The same from bootstrap resamples of the blocks [-]
+    # The same as draws from their errors [-]
     first_resamples: Float[np.ndarray, "order resample source"]
     total_resamples: Float[np.ndarray, "order resample source"]
     # Root of the sum of the variances of cosine and sine, the standard deviation of the wave [output]
@@ -249,7 +249,7 @@ def order_contribution(analysis: SobolAnalysis, waves: Mapping[int, tuple[str | 
     Notes
     -----
     The index of a vector is Σ V_o·S_o / Σ V_o over its components o. It does not depend on where the turn begins, which
-    the indices of cosine and sine alone do. Resamples weigh the components with their own variances.
+    the indices of cosine and sine alone do. Without a replicate the components have their own variances.
 
     References
     ----------
@@ -260,7 +260,7 @@ def order_contribution(analysis: SobolAnalysis, waves: Mapping[int, tuple[str | 
     A wave whose cosine and sine are the same sum has the shares of that sum, 1/5 and 4/5.
 
     >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> found = sobol_indices(sum_of_sizes(6.0, 12.0), SobolEffort(start=512, limit=512, places=1))
+    >>> found = sobol_indices(sum_of_sizes(6.0, 12.0), SobolEffort(start=4096, limit=4096, places=1))
     >>> order_contribution(found, {1: (0, 0)}).total.round(2).tolist()
     [[0.2, 0.8]]
     """
@@ -268,18 +268,18 @@ def order_contribution(analysis: SobolAnalysis, waves: Mapping[int, tuple[str | 
         raise InputError("Contribution to orders: no order is given.")
     found = analysis.indices
     pairs = np.array([[analysis.position(output) for output in pair] for pair in waves.values()])
-    variance = np.concatenate([found.variance[:, np.newaxis], found.variance_resamples], axis=1)[pairs]
+    variance = np.concatenate([found.variance[:, np.newaxis], found.variance_left_out], axis=1)[pairs]
     first, total = (
-        _of_waves(np.concatenate([estimate[:, np.newaxis], resamples], axis=1)[pairs], variance)
-        for estimate, resamples in ((found.first, found.first_resamples), (found.total, found.total_resamples))
+        _of_waves(np.concatenate([estimate[:, np.newaxis], left_out], axis=1)[pairs], variance)
+        for estimate, left_out in ((found.first, found.first_left_out), (found.total, found.total_left_out))
     )
     return OrderContribution(
         orders=tuple(waves),
         sources=analysis.sources,
         first=first[:, 0],
         total=total[:, 0],
-        first_resamples=first[:, 1:],
-        total_resamples=total[:, 1:],
+        first_resamples=drawn(first, found.weights),
+        total_resamples=drawn(total, found.weights, positive=True),
         deviation=np.sqrt(variance[:, :, 0].sum(axis=1)),
     )
 
@@ -292,7 +292,7 @@ def _of_waves(
     # A cosine or sine that does not vary has no index and no weight.
     parts = np.multiply(weights, indices, out=np.zeros_like(indices), where=weights > 0).sum(axis=1)
     whole = weights.sum(axis=1)
-    # A resample without variance has the index 0, as for a single output; a wave that never varies has none.
+    # Blocks without variance have the index 0, as for a single output; a wave that never varies has none.
     shares = np.divide(parts, whole, out=np.zeros_like(parts), where=whole > 0)
     shares[whole[:, 0, 0] == 0] = np.nan
     return np.asarray(shares)
@@ -346,7 +346,7 @@ def sobol_indices(
     A sum with σ of 1 and 2 has the total indices 1/5 and 4/5.
 
     >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> found = sobol_indices(sum_of_sizes(6.0, 12.0), SobolEffort(start=512, limit=512, places=1))
+    >>> found = sobol_indices(sum_of_sizes(6.0, 12.0), SobolEffort(start=4096, limit=4096, places=1))
     >>> found.of(0).total.round(2).tolist()
     [0.2, 0.8]
     """
@@ -357,6 +357,7 @@ def sobol_indices(
         seed=sample,
         second_order=effort.second_order,
         columns=errors.columns,
+        replicates=min(REPLICATES, effort.start),
     )
     blocks = _Blocks(experiment, design, effort, counted, further or experiment.response)
     convergence = until_converged(
@@ -421,6 +422,7 @@ class _Blocks:
             answers,
             len(self.design.names),
             self.experiment.seeds.child("resamples"),
+            replicates=self.design.replicates,
             second_order=self.effort.second_order,
             resamples=self.effort.resamples,
             largest_failed_share=self.experiment.largest_failed_share,
@@ -481,7 +483,7 @@ def regrouped(
 
     >>> from tolalloc.capability.experiment import sum_of_sizes
     >>> experiment = sum_of_sizes(6.0, 6.0, 12.0)
-    >>> found = sobol_indices(experiment, SobolEffort(start=512, limit=512, places=1))
+    >>> found = sobol_indices(experiment, SobolEffort(start=4096, limit=4096, places=1))
     >>> regrouped(experiment, found, ("both", "both", "last")).total.round(2).tolist()
     [0.33, 0.67]
     """
@@ -505,6 +507,7 @@ def regrouped(
         together,
         len(design.names),
         experiment.seeds.child("resamples"),
+        replicates=before.replicates,
         largest_failed_share=experiment.largest_failed_share,
         resamples=analysis.indices.total_resamples.shape[1],
     )
