@@ -26,6 +26,7 @@ from tolalloc.reducers.response.kernel import (
     KernelResponse,
     OutputsWithStiffness,
     StiffnessResponse,
+    principal_axes,
     stiffness_source,
 )
 from tolalloc.reducers.response.outputs import (
@@ -284,10 +285,8 @@ class ReducerModel(Model):
         peak = self._peak_with_stiffness
         if outputs == peak.outputs:
             return peak
-        deviations = np.sqrt(np.diag(self.identified.covariance))
-        return OutputsWithStiffness(
-            peak=peak, outputs=outputs, reading=self._reading_on, steps=tuple(deviations.tolist())
-        )
+        axes = principal_axes(self.identified.covariance)
+        return OutputsWithStiffness(peak=peak, outputs=outputs, reading=self._reading_on, axes=axes)
 
     def changed(self, change: Float[np.ndarray, " uncertain_column"]) -> ReducerModel:
         """Return the model of the reducer whose identified stiffnesses are changed, by ln K/K0 [-]."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from tolalloc.reports.drawing_files import centre, new_drawing
 from tolalloc.reports.feature_frame import HEIGHT, FeatureFrame, boxes, drawn_symbol
-from tolalloc.reports.sign_sketch import SignSketch
+from tolalloc.reports.portrait import SignSketch
 
 if TYPE_CHECKING:
     from ezdxf.layouts.layout import Modelspace

@@ -13,7 +13,6 @@ from jaxtyping import Float
 from tolalloc.models.model import Model, Units
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure
-from tolalloc.reports.sign_sketch import SignSketch
 
 if TYPE_CHECKING:
     from tolalloc.drawings.error_model import ErrorModel
@@ -30,6 +29,28 @@ class Examination:
     but: str = ""  # What speaks against the drawing, as the end of a sentence; empty if nothing
     fault: str = ""  # Why units of the drawing cannot be built, a sentence for a first page; empty if they can
     figures: Mapping[str, float] = field(default_factory=dict)  # What was counted, units in the names
+
+
+@dataclass(frozen=True, kw_only=True)
+class SignSketch:
+    """Two positions of a grinding wheel in a groove of the part below it, whose axis lies further down.
+
+    Parameters
+    ----------
+    caption
+        What the amount is, and what its two signs do.
+    nominal
+        Height of the wheel's middle and its radius without the amount [mm of the picture].
+    changed
+        The same with the amount negative [mm of the picture].
+    arrow
+        Heights at which the arrow from one to the other begins and ends [mm of the picture].
+    """
+
+    caption: str
+    nominal: tuple[float, float]
+    changed: tuple[float, float]
+    arrow: tuple[float, float]
 
 
 class Portrait(Generic[Own]):

@@ -18,12 +18,13 @@ from tolalloc.models.model import KeepsTables, Model, Response, ResponseWithDeri
 from tolalloc.running.blas import one_blas_thread
 from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.derivatives import classical_estimate, derivative_measures, local_derivatives
-from tolalloc.sensitivity.effort import RankingEffort, SobolEffort
+from tolalloc.sensitivity.effort import RankingEffort
 from tolalloc.sensitivity.inverse import InverseSensitivity, fewest_units, inverse_sensitivity
 from tolalloc.sensitivity.result import RankingResult
 from tolalloc.sensitivity.screening import MomentIndependent, elementary_effects, moment_independent
 from tolalloc.sensitivity.shapley import ShapleyEffects, shapley_effects
-from tolalloc.sensitivity.sobol import SobolAnalysis, SobolIndices, order_contribution, sobol_indices
+from tolalloc.sensitivity.sobol import SobolAnalysis, SobolIndices, order_contribution, regrouped, sobol_indices
+from tolalloc.sensitivity.surrogate.control_variate import CheapModel, cheap_model
 from tolalloc.sensitivity.surrogate.regression import (
     RegressionCandidate,
     quadratic_regression,
@@ -35,6 +36,8 @@ from tolalloc.sensitivity.uncertain import UncertainEffect, uncertain_effect
 
 _MOST_COLUMNS = 100
 """Columns beyond which all products of two are more than the samples can tell apart [-]."""
+_MOST_CONTROLLED = 2048
+"""First blocks beyond which a model needs no cheap one: it answers as many samples itself [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +82,13 @@ class Measures:
         units = self.experiment("units", self.model.reading(self.outputs))
         return monte_carlo(units, self.effort.units, self.effort.design)
 
-    def sobol(self, waves: tuple[str, ...]) -> SobolAnalysis:
+    def cheap(self, sample: MonteCarlo) -> CheapModel | None:
+        """Return what carries most of a Sobol analysis, learnt from random units; none where the model is as cheap."""
+        if self.effort.sobol.start > _MOST_CONTROLLED:
+            return None
+        return cheap_model(sample, self.model.columns, self.outputs)
+
+    def sobol(self, waves: tuple[str, ...], cheap: CheapModel | None = None) -> SobolAnalysis:
         """Return the indices of all outputs and of waves of the model's spectra, with as many blocks as are needed.
 
         What is uncertain of the model is among the sources. Blocks are added for the order of the sources of what is
@@ -87,23 +96,23 @@ class Measures:
         """
         limited = tuple(self.limits)
         experiment, further = self._sobol_experiment("sobol", (*self.outputs, *waves)), self._with_uncertain(limited)
-        return sobol_indices(experiment, self.effort.sobol, ranked=limited, further=further)
+        return sobol_indices(experiment, self.effort.sobol, ranked=limited, further=further, cheap=cheap)
 
-    def second_seed(self, blocks: int) -> SobolIndices:
+    def second_seed(self, blocks: int, cheap: CheapModel | None = None) -> SobolIndices:
         """Return the indices of the leading output from other random numbers, with so many blocks and no pairs."""
         effort = replace(self.effort.sobol, start=blocks, limit=blocks, second_order=False)
-        return sobol_indices(self._sobol_experiment("second seed", (self.leading,)), effort).of(0)
+        return sobol_indices(self._sobol_experiment("second seed", (self.leading,)), effort, cheap=cheap).of(0)
 
-    def dimensions(self, blocks: int) -> SobolIndices | None:
-        """Return the indices of the leading output by the dimensions of the drawing, with so many blocks.
+    def dimensions(self, analysis: SobolAnalysis, cheap: CheapModel | None = None) -> SobolIndices | None:
+        """Return the indices of the leading output by the dimensions of the drawing, from the blocks of an analysis.
 
         All members of a dimension are exchanged together, as one number of the drawing limits them all. None where
         every dimension has one member, or as many as are correlated with it.
         """
-        groups, effort = self._with_joint.dimension_of_column, SobolEffort(start=blocks, limit=blocks)
+        groups = self._with_joint.dimension_of_column
         if len(set(groups)) == len(self._with_joint.blocks):
             return None
-        return sobol_indices(self._sobol_experiment("dimensions", (self.leading,)), effort, factor_groups=groups).of(0)
+        return regrouped(self._sobol_experiment("sobol", (self.leading,)), analysis, groups, cheap)
 
     @property
     def _with_joint(self) -> ErrorModel:
@@ -228,11 +237,11 @@ def rank(asked: Measures, record: RunRecord) -> RankingResult:
         with record.stage("random units", effort.units):
             sample = measures.sample()
         with record.stage("Sobol indices"):
-            effect = measures.uncertain(sample)
-            sobol = measures.sobol(tuple(name for names in spectra.values() for name in names))
-            dimensions = measures.dimensions(sobol.convergence.history[-1].blocks)
+            effect, cheap = measures.uncertain(sample), measures.cheap(sample)
+            sobol = measures.sobol(tuple(name for names in spectra.values() for name in names), cheap)
+            dimensions = measures.dimensions(sobol, cheap)
         with record.stage("Sobol, second seed"):
-            again = measures.second_seed(sobol.convergence.history[-1].blocks)
+            again = measures.second_seed(sobol.convergence.history[-1].blocks, cheap)
         with record.stage("other measures"):
             derived = measures.derived(sample)
             shapley = measures.shapley()

@@ -1,4 +1,4 @@
-"""How far a ranking can be trusted, from draws from the errors of its indices, and a design grown until it is stable."""
+"""How far a ranking can be trusted, from draws of the errors of its indices; a design grown until it is stable."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """First-order, total and second-order indices of many outputs by SALib, and how far they are off, from replicates.
 
-The points are those of SALib, which estimates the indices. What it has not is done here: blocks in chunks, because it
-holds a design whole and exchanges columns number by number; failed samples, because one NaN makes all its indices 0 or
-NaN; and the error, because it resamples blocks as if they were independent, which those of one Sobol' sequence are not.
+SALib draws the points and estimates the indices. What it has not is done here: blocks in chunks, because it holds a
+design whole and exchanges columns number by number; failed samples, because one NaN makes all its indices 0 or NaN; and
+the error, because it resamples blocks as if they were independent, which those of one Sobol' sequence are not.
 
 A design consists of replicates, each a Sobol' sequence with a scrambling of its own. They are independent, and the
 indices without one of them at a time, the jackknife, say how far the index of all of them is off. Sums without a
@@ -27,12 +27,13 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Evaluation
 from tolalloc.running.blas import one_blas_thread
+from tolalloc.sensitivity.surrogate.control_variate import Control, optimal_weights
 
 SAMPLES_AT_ONCE = 8192
 """Samples of a chunk at most, unless one block has more [-]."""
 REPLICATES = 8
-"""Scramblings of a design [-]. Fewer leave the error itself uncertain: 90 % of Student's t with 7 degrees of freedom are
-15 % wider than of a normal law, with 3 of them 43 %. More leave each sequence fewer points, and smooth functions a
+"""Scramblings of a design [-]. Fewer leave the error itself uncertain: 90 % of Student's t with 7 degrees of freedom
+are 15 % wider than of a normal law, with 3 of them 43 %. More leave each sequence fewer points, and smooth functions a
 larger error."""
 
 
@@ -111,16 +112,19 @@ class SaltelliDesign:
         return np.moveaxis(own, 1, 0)
 
     def _sequence(self, replicate: int, first: int, last: int) -> Float[np.ndarray, "point number"]:
-        """Return some points of a replicate, A beside B, as SALib draws them."""
-        from scipy.stats import qmc
+        """Return some points of a replicate, A beside B, as SALib draws them.
+
+        Two groups, of which SALib exchanges neither many times, give four samples of a block whatever the sources.
+        """
+        from SALib.sample import sobol
 
         seed = SeedTree(self.seed).child("replicate", str(replicate)).integer() if replicate else self.seed
-        sequence = qmc.Sobol(2 * len(self.factor_groups), seed=seed)
-        if first:
-            sequence.fast_forward(first)
+        names = _numbered(len(self.factor_groups))
+        problem = _problem(names, ("first", *["others"] * (len(names) - 1)))
         with warnings.catch_warnings():  # a replicate has a power of two of points in the end, not with every call
             warnings.simplefilter("ignore", UserWarning)
-            return np.asarray(sequence.random(last - first))
+            drawn = sobol.sample(problem, last - first, calc_second_order=False, skip_values=first, seed=seed)
+        return np.asarray(drawn.reshape(last - first, -1, len(names))[:, [0, -1]].reshape(last - first, -1))
 
     @cached_property
     def _own(self) -> Bool[np.ndarray, "group column"]:
@@ -174,6 +178,8 @@ class SaltelliIndices:
     second_resamples: Float[np.ndarray, "output resample pair"]
     # Variance of A and B together, of which the indices are shares [output²]
     variance: Float[np.ndarray, " output"]
+    # Interval of each total index over that which these blocks alone would have given, 1 without a control [-]
+    narrowed: Float[np.ndarray, "output source"]
     # Indices and variance without one replicate at a time, and by how much each draw counts what that changes [-]
     first_left_out: Float[np.ndarray, "output replicate source"]
     total_left_out: Float[np.ndarray, "output replicate source"]
@@ -208,6 +214,7 @@ def saltelli_indices(
     second_order: bool = False,
     resamples: int = 400,
     largest_failed_share: float = 0.01,
+    control: Control | None = None,
 ) -> SaltelliIndices:
     """Return the indices of all outputs of a Saltelli design.
 
@@ -227,6 +234,8 @@ def saltelli_indices(
         Draws from the errors of the indices [-].
     largest_failed_share
         Share of blocks that may hold a failed sample [-].
+    control
+        Answers of a cheap model, with which first-order and total indices are corrected.
 
     Raises
     ------
@@ -270,7 +279,14 @@ def saltelli_indices(
             _of_output(values[:, :, at][whole], counts, sources, second_order=second_order)
             for at in range(values.shape[2])  # one copy in memory at a time
         ]
-    varies, variance, first, total, second = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        varies, variance, first, total, second = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        plain = total
+        if control is not None:
+            own, many = (answers.reshape(-1, size, values.shape[2]) for answers in (control.own, control.many))
+            first, total = first.copy(), total.copy()
+            for at in np.flatnonzero(varies):
+                both = values[:, :, at][whole], own[:, :, at][whole]
+                first[at], total[at] = _controlled(*both, many[:, :, at], (first[at], total[at]), counts, sources)
     return SaltelliIndices(
         first=first[:, 0],
         total=total[:, 0],
@@ -279,6 +295,7 @@ def saltelli_indices(
         total_resamples=drawn(total, weights, positive=True),
         second_resamples=drawn(second, weights),
         variance=variance[:, 0],
+        narrowed=np.divide(_spread(total), _spread(plain), out=np.ones_like(plain[:, 0]), where=_spread(plain) > 0),
         first_left_out=first[:, 1:],
         total_left_out=total[:, 1:],
         variance_left_out=variance[:, 1:],
@@ -313,6 +330,59 @@ def _of_output(
         for own, estimate in zip(indices, salib_estimates(answers.ravel(), sources, second_order), strict=True):
             own[0, 0] = estimate
     return found
+
+
+def _controlled(
+    answers: Float[np.ndarray, "block sample"],
+    cheap: Float[np.ndarray, "block sample"],
+    many: Float[np.ndarray, "cheap_block sample"],
+    plain: tuple[Float[np.ndarray, "row source"], Float[np.ndarray, "row source"]],
+    counts: Float[np.ndarray, "row block"],
+    sources: int,
+) -> tuple[Float[np.ndarray, "row source"], Float[np.ndarray, "row source"]]:
+    """Return first-order and total indices of one output, less what a cheap model tells of their error.
+
+    That is the difference between its indices from the same blocks and from many others. Each row leaves out a
+    replicate of both, so that the error of the cheap indices counts too.
+    """
+    rows = without_each(np.arange(len(many)) % (len(counts) - 1), len(counts) - 1)
+    same, other = (one_pass(y.T[np.newaxis], own, sources) for y, own in ((cheap, counts), (many, rows)))
+    if not (same[0][0] and other[0][0]):
+        return plain
+    indices, cheap_indices, known = (
+        np.concatenate(both, axis=1) for both in (plain, *((own[2][0], own[3][0]) for own in (same, other)))
+    )
+    weights = optimal_weights(
+        _influences(answers, indices[0], sources), _influences(cheap, cheap_indices[0], sources), counts
+    )
+    found = indices - weights.T * (cheap_indices - known)
+    return found[:, :sources], np.maximum(found[:, sources:], 0.0)
+
+
+def _contributions(
+    y: Float[np.ndarray, "output sample block"], sources: int
+) -> Float[np.ndarray, "output contribution block"]:
+    """Return what every block adds to mean, mean square, first-order and total part of every source."""
+    a, ab, b = y[:, :1], y[:, 1 : sources + 1], y[:, -1:]
+    return np.concatenate([(a + b) / 2, (a**2 + b**2) / 2, b * (ab - a), (a - ab) ** 2 / 2], axis=1)
+
+
+def _influences(
+    answers: Float[np.ndarray, "block sample"], indices: Float[np.ndarray, " index"], sources: int
+) -> Float[np.ndarray, "index block"]:
+    """Return what each block adds to the error of every index, to first order and but for a constant [-].
+
+    Of the quotient P/V: (p_b − P/V·v_b)/V, of the variance V: the square about the mean (Efron & Tibshirani 1993, ch.
+    22, the influence function).
+    """
+    mean, square, *parts = _contributions(_standardised(answers.T[np.newaxis])[0], sources)[0]
+    about = square - 2.0 * mean.mean() * mean
+    return np.asarray((np.array(parts) - indices[:, np.newaxis] * about) / (square.mean() - mean.mean() ** 2))
+
+
+def _spread(rows: Float[np.ndarray, "output row source"]) -> Float[np.ndarray, "output source"]:
+    """Return the standard deviation of estimates that each leave out one replicate."""
+    return np.asarray(rows[:, 1:].std(axis=1))
 
 
 def without_each(replicate: Int[np.ndarray, " block"], replicates: int) -> Float[np.ndarray, "row block"]:
@@ -478,21 +548,18 @@ def one_pass(
     ([[0.417]], [0.2, 0.8])
     """
     y, deviation, varies = _standardised(answers)
-    a, ab, b = y[:, :1], y[:, 1 : sources + 1], y[:, -1:]
-    ba = y[:, sources + 1 : -1]
-    own = np.concatenate([a + b, a**2 + b**2, a * b, b * (ab - a), (a - ab) ** 2], axis=1)
+    ab, ba = y[:, 1 : sources + 1], y[:, sources + 1 : -1]
+    own = np.concatenate([_contributions(y, sources), y[:, :1] * y[:, -1:]], axis=1)
     # The product of one output has the same shape whatever else is in memory, so its bits are the same too.
     blocks = counts.sum(axis=1)[:, np.newaxis]
     means = (own @ counts.T).transpose(0, 2, 1) / blocks
-    mean, square = means[:, :, :1] / 2, means[:, :, 1:2] / 2
+    mean, square, closed = means[:, :, :1], means[:, :, 1:2], means[:, :, -1:]
     # A resample of equal answers has no variance; what the difference of its moments leaves is rounding.
     variance = np.where(square - mean**2 > _ROUNDING * square, square - mean**2, 0.0)
-    first = _over_variance(means[:, :, 3 : sources + 3], variance)
-    total = _over_variance(0.5 * means[:, :, sources + 3 :], variance)
+    first = _over_variance(means[:, :, 2 : sources + 2], variance)
+    total = _over_variance(means[:, :, sources + 2 : -1], variance)
     second = [
-        _over_variance(
-            (ba[:, j : j + 1] * ab[:, j + 1 :] @ counts.T).transpose(0, 2, 1) / blocks - means[:, :, 2:3], variance
-        )
+        _over_variance((ba[:, j : j + 1] * ab[:, j + 1 :] @ counts.T).transpose(0, 2, 1) / blocks - closed, variance)
         - first[:, :, j : j + 1]
         - first[:, :, j + 1 :]
         for j in range(ba.shape[1])

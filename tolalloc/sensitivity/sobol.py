@@ -29,6 +29,7 @@ from tolalloc.sensitivity.ranking import (
     until_converged,
 )
 from tolalloc.sensitivity.saltelli import REPLICATES, SaltelliDesign, SaltelliIndices, drawn, saltelli_indices
+from tolalloc.sensitivity.surrogate.control_variate import CheapModel, Control
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -308,6 +309,7 @@ def sobol_indices(
     ranked: tuple[str, ...] = (),
     factor_groups: tuple[str, ...] = (),
     further: Response | None = None,
+    cheap: CheapModel | None = None,
 ) -> SobolAnalysis:
     """Return the indices of all outputs, with as many blocks as the order of the first places needs.
 
@@ -325,6 +327,8 @@ def sobol_indices(
     further
         Response of the outputs that count, which is asked alone after the first number of blocks: no other output needs
         a stable order. All outputs are asked for in all blocks unless it is given.
+    cheap
+        Model of some of the outputs, learnt from units of other random numbers, as a control variate.
 
     Raises
     ------
@@ -339,7 +343,7 @@ def sobol_indices(
     References
     ----------
     Saltelli et al. 2010 (first order), Jansen 1999 (total), Saltelli 2002 (second order), as SALib implements them;
-    groups of dependent inputs: Jacques, Lavergne & Devictor 2006.
+    groups of dependent inputs: Jacques, Lavergne & Devictor 2006; control variates: Lavenberg & Welch 1981.
 
     Examples
     --------
@@ -359,7 +363,7 @@ def sobol_indices(
         columns=errors.columns,
         replicates=min(REPLICATES, effort.start),
     )
-    blocks = _Blocks(experiment, design, effort, counted, further or experiment.response)
+    blocks = _Blocks(experiment, design, effort, counted, further or experiment.response, cheap)
     convergence = until_converged(
         blocks.resampled,
         _groups(errors, design.names),
@@ -380,6 +384,12 @@ def sobol_indices(
     )
 
 
+_CHEAP_TIMES = 16
+"""Blocks of a cheap model over those that it corrects, at least [-]."""
+_CHEAP_SAMPLES = 2**16
+"""Samples of a cheap model at least; a block more or less of them changes no index by what can be seen [-]."""
+
+
 class _Blocks:
     """Blocks that are solved when they are first asked for."""
 
@@ -390,9 +400,10 @@ class _Blocks:
         effort: SobolEffort,
         counted: tuple[str, ...],
         further: Response,
+        cheap: CheapModel | None,
     ) -> None:
         self.experiment, self.design, self.effort, self.counted = experiment, design, effort, counted
-        self.further = further
+        self.further, self.cheap = further, cheap
         self.kept = [experiment.response.outputs.index(name) for name in further.outputs]
         self.answers: Evaluation
         self.steps = list[SaltelliIndices]()
@@ -403,12 +414,13 @@ class _Blocks:
             start = self.steps[-1].blocks + self.steps[-1].dropped
             more = solved(self.experiment, self.further, self.design.chunks(start, blocks))
             self.answers = joined([self.answers, more])
-            self.steps.append(self._indices(self.answers))
+            outputs = self.further.outputs
+            self.steps.append(self._indices(self.answers, outputs))
         else:
             first = solved(self.experiment, self.experiment.response, self.design.chunks(0, blocks))
             self.answers = replace(first, values=first.values[:, self.kept])
-            self.steps.append(self._indices(first))
-        outputs = self.experiment.response.outputs if len(self.steps) == 1 else self.further.outputs
+            outputs = self.experiment.response.outputs
+            self.steps.append(self._indices(first, outputs))
         ranking = _overall_ranking(self.design.names, outputs, self.counted, self.steps[-1])
         return ranking.total, ranking.total_resamples
 
@@ -417,7 +429,8 @@ class _Blocks:
         """Indices of all outputs, each from all blocks in which it was asked for."""
         return self.steps[0] if len(self.steps) == 1 else self.steps[-1].instead_of(self.steps[0], self.kept)
 
-    def _indices(self, answers: Evaluation) -> SaltelliIndices:
+    def _indices(self, answers: Evaluation, outputs: tuple[str, ...]) -> SaltelliIndices:
+        blocks = answers.status.size // self.design.samples_per_block
         return saltelli_indices(
             answers,
             len(self.design.names),
@@ -426,7 +439,28 @@ class _Blocks:
             second_order=self.effort.second_order,
             resamples=self.effort.resamples,
             largest_failed_share=self.experiment.largest_failed_share,
+            control=_control(self.experiment, self.cheap, self.design, blocks, outputs),
         )
+
+
+def _control(
+    experiment: Experiment[Response],
+    cheap: CheapModel | None,
+    design: SaltelliDesign,
+    blocks: int,
+    outputs: tuple[str, ...],
+) -> Control | None:
+    """Return what a cheap model says of so many blocks and of many others; a constant of outputs that it has not."""
+    if cheap is None:
+        return None
+    needed = max(_CHEAP_TIMES * blocks, _CHEAP_SAMPLES // design.samples_per_block)
+    other = replace(design, seed=experiment.seeds.child("cheap").integer())
+    answers = []
+    for own, count in ((design, blocks), (other, 1 << (needed - 1).bit_length())):
+        known = solved(experiment, cheap, own.chunks(0, count)).values
+        places = [cheap.outputs.index(name) if name in cheap.outputs else known.shape[1] for name in outputs]
+        answers.append(np.column_stack([known, np.zeros(len(known))])[:, places])
+    return Control(own=answers[0], many=answers[1])
 
 
 def solved(
@@ -452,7 +486,10 @@ def _groups(errors: ErrorModel, factor_groups: tuple[str, ...]) -> tuple[str, ..
 
 
 def regrouped(
-    experiment: Experiment[Response], analysis: SobolAnalysis, factor_groups: tuple[str, ...]
+    experiment: Experiment[Response],
+    analysis: SobolAnalysis,
+    factor_groups: tuple[str, ...],
+    cheap: CheapModel | None = None,
 ) -> SobolIndices:
     """Return the indices of the first output of an analysis by other groups of the columns, from the same blocks.
 
@@ -467,6 +504,8 @@ def regrouped(
         Indices by independent groups of the columns, with their samples.
     factor_groups
         Name of what every column belongs to, independent of each other.
+    cheap
+        That of the analysis, if it had one.
 
     Raises
     ------
@@ -510,5 +549,6 @@ def regrouped(
         replicates=before.replicates,
         largest_failed_share=experiment.largest_failed_share,
         resamples=analysis.indices.total_resamples.shape[1],
+        control=_control(experiment, cheap, design, blocks, analysis.outputs[:1]),
     )
     return _indices_of(found, 0, analysis.outputs[0], design.names, found.blocks, together.status.size)

@@ -232,23 +232,51 @@ class StiffnessResponse:
         return replace(self.kernel, model=replace(model, reducer=reducer))
 
 
+_LEAST_AXIS = 1e-9
+"""Variance along an axis over the largest one below which it is rounding [-]."""
+
+
+def principal_axes(
+    covariance: Float[np.ndarray, "stiffness stiffness"],
+) -> Float[np.ndarray, "axis stiffness"]:
+    """Return one standard deviation along every principal axis of a covariance, upwards on the whole [-].
+
+    Axes √λ·q of C·q = λ·q with λ > 0 (own derivation): C is the sum of their squares.
+
+    Examples
+    --------
+    Two stiffnesses that are uncertain together, by 30 % each, have one axis.
+
+    >>> principal_axes(np.full((2, 2), 0.09)).round(3).tolist()
+    [[0.3, 0.3]]
+    """
+    variance, axes = np.linalg.eigh(covariance)
+    kept = variance > _LEAST_AXIS * max(variance[-1], 0.0)
+    found = np.sqrt(variance[kept])[:, np.newaxis] * axes.T[kept]
+    return np.asarray(found * np.where(found.sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0))
+
+
 @dataclass(frozen=True, kw_only=True)
 class OutputsWithStiffness:
     """Several outputs with stiffnesses as further columns, to first order in ln K.
 
     Notes
     -----
-    The peak-to-peak takes its exact derivative. Every other output takes the one-sided difference between the kernel at
-    a stiffness raised by its standard uncertainty and the kernel as it is, unit by unit, so that the effect of one
-    standard uncertainty is that of the kernel. A unit without an answer at one of them has none. What is counted of a
-    unit is how its peak-to-peak ended, or its other outputs where that is not asked for.
+    The peak-to-peak takes its exact derivative. Every other output takes one-sided differences between the kernel with
+    its stiffnesses changed by one standard uncertainty, along every principal axis of their covariance, and the kernel
+    as it is, unit by unit, so that the effect of one standard uncertainty is that of the kernel. Stiffnesses that are
+    uncertain together, such as bearings identified by one measured rigidity, have one axis. A unit without an answer at
+    one of them has none. What is counted of a unit is how its peak-to-peak ended, or its other outputs where that is
+    not asked for.
     """
 
     peak: StiffnessResponse  # The peak-to-peak with its exact derivative
     outputs: tuple[str, ...]  # Names of the outputs with their units
     # From a kernel, the response of some outputs
     reading: Callable[[KernelResponse, tuple[str, ...]], Response]
-    steps: tuple[float, ...]  # Standard uncertainty of ln K of every stiffness: what a difference is taken over [-]
+    axes: Float[
+        np.ndarray, "axis stiffness"
+    ]  # Changes of ln K that differences are taken over, from `principal_axes` [-]
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -260,16 +288,14 @@ class OutputsWithStiffness:
         """The outputs without the peak-to-peak, which no difference is taken of."""
         return tuple(name for name in self.outputs if name != PEAK_TO_PEAK)
 
-    def _raised(self) -> Iterator[tuple[int, Response]]:
-        """Yield the position of every stiffness that is not known, and the others with it raised.
+    def _changed(self) -> Iterator[Response]:
+        """Yield the others with the stiffnesses changed along every axis.
 
         One at a time, as the tables of each take tens of megabytes and are made in less time than a chunk is solved in.
         """
-        for at, step in enumerate(self.steps):
-            if step > 0.0:
-                kernel = self.peak.changed(step * np.eye(len(self.steps))[at])
-                # These solves belong to a unit that is counted already.
-                yield at, self.reading(replace(kernel, observe=unobserved), self._others)
+        for axis in self.axes:
+            # These solves belong to a unit that is counted already.
+            yield self.reading(replace(self.peak.changed(axis), observe=unobserved), self._others)
 
     def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
         """Return the outputs of every sample."""
@@ -283,11 +309,11 @@ class OutputsWithStiffness:
     def _differences(self, x: Float[np.ndarray, "sample column"], kernel: KernelResponse) -> Evaluation:
         """Return the others of every sample."""
         own = len(kernel.columns)
-        sample, change = np.ascontiguousarray(x[:, :own]), x[:, own:]
+        sample, along = np.ascontiguousarray(x[:, :own]), x[:, own:] @ np.linalg.pinv(self.axes)
         base = self.reading(kernel, self._others)(sample)
         values, status = base.values.copy(), base.status.copy()
-        for at, response in self._raised():
+        for steps, response in zip(along.T, self._changed(), strict=True):
             found = response(sample)
-            values += (found.values - base.values) * (change[:, [at]] / self.steps[at])
+            values += (found.values - base.values) * steps[:, np.newaxis]
             status = np.maximum(status, found.status)
         return Evaluation(values=values, status=status)

@@ -28,9 +28,8 @@ from tolalloc.reducers.scene import PER_CRANK_TURN, Scene, is_placed, scene_of
 from tolalloc.reducers.settings import FLANK, RADIAL
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
-from tolalloc.reports.portrait import Examination, Portrait, sections_of
+from tolalloc.reports.portrait import Examination, Portrait, SignSketch, sections_of
 from tolalloc.reports.scene_record import scene_record
-from tolalloc.reports.sign_sketch import SignSketch
 from tolalloc.reports.wording import number
 
 if TYPE_CHECKING:
