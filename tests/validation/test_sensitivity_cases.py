@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import norm
+from scipy.stats import binom, norm
 
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models.model import Evaluation
@@ -101,8 +101,10 @@ def inside(name: str, confidence: float) -> dict[str, np.ndarray]:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_the_reference_lies_in_the_99_percent_interval(name):
+    """All of 41 indices in the stated share of 100 repetitions, but for one such look in a thousand."""
+    fewest = binom.ppf(1e-3 / 41, 100, 0.99)
     for kind, held in inside(name, 0.99).items():
-        assert held[:100].sum(axis=0).min() >= 97, f"{kind}: {held[:100].sum(axis=0)}"
+        assert held[:100].sum(axis=0).min() >= fewest, f"{kind}: {held[:100].sum(axis=0)}"
         assert held.mean(axis=0).min() >= 0.97, f"{kind}: {held.mean(axis=0)}"
 
 

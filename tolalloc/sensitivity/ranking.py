@@ -80,7 +80,7 @@ class SourceRanking:
 
         References
         ----------
-        Percentiles of the ranks of bootstrap resamples: Hall & Miller 2009, Annals of Statistics 37.
+        Percentiles of the ranks of draws, as of bootstrap resamples: Hall & Miller 2009, Annals of Statistics 37.
 
         Examples
         --------
@@ -173,7 +173,7 @@ def ranks(resamples: Float[np.ndarray, "resample source"]) -> Int[np.ndarray, "r
 def rank_interval(resamples: Float[np.ndarray, "resample source"]) -> Int[np.ndarray, "2 source"]:
     """Return the two-sided 90 % interval of every rank, of whole ranks that some resample has [-].
 
-    Quantiles 5 % and 95 % of the ranks of bootstrap resamples, inverse of their distribution: Hall & Miller 2009,
+    Quantiles 5 % and 95 % of the ranks of draws from the errors, inverse of their distribution: Hall & Miller 2009,
     Annals of Statistics 37, 3929–3959.
 
     Examples
@@ -189,7 +189,7 @@ def rank_interval(resamples: Float[np.ndarray, "resample source"]) -> Int[np.nda
 def before(resamples: Float[np.ndarray, "resample source"]) -> Float[np.ndarray, "source source"]:
     """Return the share of resamples in which the row's source is larger than the column's; equals count half [-].
 
-    P(i > j) + P(i = j)/2 over paired bootstrap resamples (own derivation); for 100 resamples or more.
+    P(i > j) + P(i = j)/2 over paired draws from their errors (own derivation); for 100 resamples or more.
 
     Examples
     --------
@@ -203,7 +203,7 @@ def before(resamples: Float[np.ndarray, "resample source"]) -> Float[np.ndarray,
 def indistinguishable_from_zero(resamples: Float[np.ndarray, "resample source"]) -> Bool[np.ndarray, " source"]:
     """Return which indices are, with one-sided 95 % confidence, indistinguishable from 0: no negative share is read.
 
-    Quantile of 5 % of the bootstrap resamples ≤ 0: Efron & Tibshirani 1993, ch. 13; for 100 resamples or more.
+    Quantile of 5 % of the draws ≤ 0: Efron & Tibshirani 1993, ch. 13; for 100 resamples or more.
 
     Notes
     -----

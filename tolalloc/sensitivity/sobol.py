@@ -147,6 +147,10 @@ class SobolAnalysis:
             raise InputError.at("Sobol indices", "output", output, f"0 to {len(self.outputs) - 1}")
         return output
 
+    def narrowed(self, output: str | int) -> float:
+        """Return the median over all sources of how wide an interval is over that without a control variate [-]."""
+        return float(np.median(self.indices.narrowed[self.position(output)]))
+
     def of(self, output: str | int) -> SobolIndices:
         """Return the indices of one output.
 

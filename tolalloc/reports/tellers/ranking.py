@@ -37,6 +37,8 @@ _MOSTLY = 0.5
 """Share of a wave's variance from single sources above which they are named for it [-]."""
 _SURE = 0.995
 """Confidence that would be rounded to certainty [-]."""
+_CARRIED = 0.99
+"""Width of intervals over that without a control variate below which it is worth a sentence [-]."""
 _NAMED = 3
 """Sources that the answer names [-]."""
 _AS_STRONG = 0.9
@@ -337,10 +339,10 @@ class RankingTeller(Teller[RankingResult]):
     def _driver_sections(self) -> Iterator[Section]:
         """Yield which error drives what: the leading output, all requirements, each order."""
         result = self.result
-        pairs = tables.pairs_table(result.indices)
+        pairs, narrowed = tables.pairs_table(result.indices), result.sobol.narrowed(0)
         yield Section(
             heading=_say("drivers_heading", output=self._output),
-            paragraphs=(_say("drivers"),),
+            paragraphs=(_say("drivers", carried=_say("carried", narrowed=narrowed) if narrowed < _CARRIED else ""),),
             figures=(self._ranking_figure(),),
             tables=(
                 ("ranking", tables.ranking_table(result)),
