@@ -129,36 +129,6 @@ NEW = "new @mine --like rv40e --cranks 3 --with all"
 MINE = "--reducer @mine/reducer.toml"
 
 SMALL = (
-    Case(
-        name="own",
-        files={"own.py": OWN, "broken.py": BROKEN},
-        commands=(
-            "check @own.py",
-            "run @own.py --out @run",
-            "allocate @own.py --grades --out @graded",
-            "compare @run @graded",
-            "rank @own.py --json --out @rank",
-            "whatif @own.py shaft=0.02",
-            "check @broken.py",
-        ),
-    ),
-    Case(
-        name="reducer_questions",
-        commands=(
-            NEW,
-            "check @mine/study.py",
-            "te --reducer rv20e --unit table4 --attribute --out @te",
-            f"te {MINE}",
-            f"contact {MINE} --out @contact",
-            f"modify li2018 {MINE} --radial 15 --out @modify",
-            "assemble @mine/chain.toml --measured @mine/angles.csv --out @assemble",
-            "assemble bx40e",
-            "costs @mine/shop.csv --out @costs",
-            "schema reducer",
-            "schema bench",
-            "te --reducer rv21e",
-        ),
-    ),
     Case(name="help", commands=("--help", *(f"{word} --help" for word in COMMANDS))),
     Case(
         name="start",
@@ -202,6 +172,36 @@ SMALL = (
 """Cases of the default tests."""
 
 LONGER = (
+    Case(
+        name="own",
+        files={"own.py": OWN, "broken.py": BROKEN},
+        commands=(
+            "check @own.py",
+            "run @own.py --out @run",
+            "allocate @own.py --grades --out @graded",
+            "compare @run @graded",
+            "rank @own.py --json --out @rank",
+            "whatif @own.py shaft=0.02",
+            "check @broken.py",
+        ),
+    ),
+    Case(
+        name="reducer_questions",
+        commands=(
+            NEW,
+            "check @mine/study.py",
+            "te --reducer rv20e --unit table4 --attribute --out @te",
+            f"te {MINE}",
+            f"contact {MINE} --out @contact",
+            f"modify li2018 {MINE} --radial 15 --out @modify",
+            "assemble @mine/chain.toml --measured @mine/angles.csv --out @assemble",
+            "assemble bx40e",
+            "costs @mine/shop.csv --out @costs",
+            "schema reducer",
+            "schema bench",
+            "te --reducer rv21e",
+        ),
+    ),
     Case(
         name="preset",
         files={"preset.py": PRESET},

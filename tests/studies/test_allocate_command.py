@@ -174,7 +174,8 @@ def test_the_drawing_is_read_back_and_carries_grades(allocated):
     assert sources["disc1.pitch"].zone == sources["disc2.pitch"].zone
 
 
-@pytest.mark.parametrize("change", [pytest.param(0.0, marks=pytest.mark.slow), 0.5])
+@pytest.mark.slow
+@pytest.mark.parametrize("change", [0.0, 0.5])
 def test_the_cost_is_one_number_in_summary_drawing_and_table(tmp_path, change):
     """All are read back from the files, with what is paid once, to leave today's process."""
     script = script_with(
@@ -237,6 +238,7 @@ def test_an_interrupted_run_goes_on_to_the_same_bits_with_other_threads(tmp_path
     assert kept.read_bytes() == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("texts", "blocking", "unit"),
     [
@@ -252,7 +254,6 @@ def test_an_interrupted_run_goes_on_to_the_same_bits_with_other_threads(tmp_path
             },
             "lost motion [arcmin]",
             "arcmin",
-            marks=pytest.mark.slow,
         ),
     ],
 )
@@ -338,6 +339,7 @@ def test_an_effort_that_makes_no_sense_is_refused(tmp_path, effort, words):
     )
 
 
+@pytest.mark.slow
 def test_an_effort_that_is_no_whole_number_is_refused(tmp_path):
     """In a process of its own: here the check of annotations would refuse it first."""
     script = script_with(tmp_path, effort="ta.Effort(allocation=AllocationEffort(exact_points=2.5))")

@@ -408,6 +408,7 @@ def test_a_server_started_again_stands_where_it_was(script):
         assert Address.of(script).port == 0
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_the_command_with_a_sentence(script):
     def heeds_ctrl_c():  # which what is started in the background of a script does not
         signal.signal(signal.SIGINT, signal.SIG_DFL)

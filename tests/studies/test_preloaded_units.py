@@ -41,6 +41,7 @@ def test_no_pin_may_press_harder_without_torque_than_the_rated_torque_makes_it()
     assert [own.output for own in prepared("rv20e_liu2020").requirements] == [ta.PEAK_TO_PEAK]
 
 
+@pytest.mark.slow
 def test_every_design_is_held_to_the_pin_force_at_its_own_modification():
     """And its model says how the distance from the limit changes with the clearances."""
     reducer = ta.reducer("rv20e", flank_clearance=(1.0, 8.0), radial_clearance=(3.0, 30.0))

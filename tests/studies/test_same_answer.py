@@ -110,6 +110,7 @@ def test_diagnose(mine):
     assert answer.result.diagnosis.named == ("housing.pitch",)
 
 
+@pytest.mark.slow
 def test_assemble(mine):
     answer = same("assemble", str(mine / "chain.toml"), measured=mine / "angles.csv", precision=5)
     assert answer.result.measured.name == "angles"

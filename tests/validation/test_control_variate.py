@@ -102,6 +102,7 @@ def test_indices_of_a_polynomial_are_exact_from_few_blocks(name):
     assert (found[False].narrowed == 1.0).all()
 
 
+@pytest.mark.slow
 def test_a_cheap_model_that_knows_nothing_does_no_harm():
     """Over 60 seeds the error is that without it, within what 60 seeds tell of a ratio of variances (F₉₅ = 1.5)."""
     known = FUNCTIONS["g"][1]

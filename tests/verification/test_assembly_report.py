@@ -30,6 +30,8 @@ from tolalloc.reports.tellers.assembly_tables import characteristic_table, large
 from tolalloc.running.progress import RunRecord, Silent
 from tolalloc.study.answer import Answer
 
+pytestmark = pytest.mark.slow  # an assembly with all of its efforts is made first, and read by all
+
 CHAIN = """
 name = "pump"
 source = "own"

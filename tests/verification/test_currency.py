@@ -111,6 +111,7 @@ def test_rows_of_python_have_a_currency_too():
         ta.Drawing.of_rows(ROWS, currency="euros")
 
 
+@pytest.mark.slow
 def test_an_answer_tells_costs_in_its_currency():
     answer = study(ta.Drawing.of_rows(ROWS, currency="CHF")).allocate()
     assert "CHF" in str(answer)

@@ -15,6 +15,7 @@ from tolalloc.allocation.search.process_choice import allocate, front
 from tolalloc.allocation.space.problem import LeastInfeasible, Solution
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stacks", [1, 2])
 def test_it_is_that_of_single_searches(stacks):
     problem = random_problem(11, features=5, processes=3, stacks=stacks, worst_case=0.3 * (stacks - 1), tightness=0.5)

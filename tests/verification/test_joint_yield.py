@@ -77,6 +77,7 @@ def answers() -> dict[str, ta.Answer]:
     return {name: made().allocate() for name, (made, _) in STUDIES.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STUDIES)
 def test_two_limits_are_kept_at_once_at_hardly_more_than_the_least_cost(answers, name):
     """Without a word of it: both ask for 99.73 %, so 99.73 % of the units keep both."""
@@ -157,6 +158,7 @@ def test_failures_that_coincide_count_once():
     assert checked(same_study()).shares == pytest.approx([twice * (1 - TARGET)] * 2, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_limit_that_costs_nothing_leaves_its_failures_to_the_other():
     wide = {GAP: ta.Limit(upper=NARROW), PLAY: ta.Limit(upper=5.0)}
     found = replace(apart_study(), limits=wide).allocate().result

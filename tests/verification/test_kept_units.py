@@ -172,6 +172,7 @@ for solve in (alone._extremes, alone._derivatives, model.reading((LOST_MOTION,))
 """
 
 
+@pytest.mark.slow
 def test_every_process_looks_for_the_same_files():
     """Sets of names come in another order in each process."""
     said = [

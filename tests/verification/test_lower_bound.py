@@ -104,6 +104,7 @@ def test_uniform_sizes_are_allocated_by_their_own_law():
     assert found.fun <= answer.cost * (1 + 1e-6) < found.fun * 1.003
 
 
+@pytest.mark.slow
 def test_a_one_sided_distribution_or_two_sided_uniform_limit_is_not_certified():
     rows = {"a": (0.0, 0.1, 1.0), "b": (0.0, 0.1, 3.0)}
     two = ta.Limit(lower=-0.12, upper=0.13, show=ta.AtYield(0.9973))
@@ -137,6 +138,7 @@ def test_a_bent_function_is_bounded_by_its_local_model():
     assert 0.991 * optimum < found.cost < 1.019 * optimum
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("guarantee", [AtYield(0.98), AtCpk(1.1)])
 def test_the_least_level_is_too_high_in_no_more_samples_than_the_stated_error(guarantee):
     """600 samples of 1,000 normal numbers: a share of 5 % has a standard error of 0.9 %."""

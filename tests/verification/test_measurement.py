@@ -233,6 +233,7 @@ def test_angles_in_gaps_are_left_out(generator):
     assert np.abs(whole.values - curve(whole.along)).max() < 1e-3 * 5 * ARCSECOND
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "jitter"), [(2000, 0.0), (2000, 0.4), (5000, 0.0)])
 def test_noise_of_resampled_readings_is_the_stated_one(count, jitter, generator):
     angle = TURN * np.sort(np.arange(count) + jitter * generator.uniform(-1, 1, count)) / count

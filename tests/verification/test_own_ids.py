@@ -43,6 +43,7 @@ def test_they_are_read_and_written_back(tmp_path):
     assert frame["source"].tolist() == ["a", "b", ""]
 
 
+@pytest.mark.slow
 def test_they_stand_beside_the_source_in_every_answer_and_in_the_next_table(tmp_path):
     asked = study(ta.drawing(written(tmp_path)))
     ranking = asked.rank().to_frame().set_index("source")

@@ -66,6 +66,7 @@ def test_a_number_of_a_drawing_stays_a_text(tmp_path):
     assert [source.drawing for source in load_tolerance_table(tmp_path / "zones.csv")] == ["0815", "0815", ""]
 
 
+@pytest.mark.slow
 def test_a_table_without_them_has_no_empty_columns():
     bare = [{name: value for name, value in row.items() if name not in ("label", "drawing")} for row in ROWS]
     assert not {"label", "drawing"} & {*study(bare).rank(effort="quick").to_frame().columns}

@@ -72,6 +72,7 @@ def alone(name: str) -> Row:
     return {"id": name, "plus": 0.01, "minus": 0.0, "unit": "µm", "min": 0.0025, "max": 0.04, "cost": 0.01}
 
 
+@pytest.mark.slow
 @every_table
 @example(rows=[alone("=1+1"), alone("-1"), alone("@"), alone('"'), alone(",;")])
 @given(rows=tables())

@@ -166,7 +166,7 @@ def test_what_is_not_known_of_the_model_is_a_source_of_every_ranked_output():
     assert own.total[at] == pytest.approx(0.01**2 / variance, abs=3 * own.total_resamples[:, at].std())
     effect = found.summary["not known of the model"]
     assert effect["sigma of a unit [mm]"] == pytest.approx(0.01, rel=0.01)
-    assert effect["total index ST [-]"] == pytest.approx(share)
+    assert effect["total index ST [-]"] == pytest.approx(own.total[at])
     assert found.result.effect.first_order.root_mean_square < 1e-12
     assert found.result.local.sources == ("a", "b")
     assert says(found.sentences, "ranking.uncertain", names="scale")

@@ -49,6 +49,7 @@ def test_salibs_plot_of_the_arrays_has_a_bar_per_source():
     plt.close(axes.figure)
 
 
+@pytest.mark.slow
 def test_the_samples_feed_salibs_measures_of_given_data():
     given = analysed().solved.to_salib()
     for measure in (pawn, delta):

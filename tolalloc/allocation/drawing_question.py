@@ -52,6 +52,7 @@ from tolalloc.running.blas import one_blas_thread
 from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.sobol import SobolIndices, regrouped, sobol_indices
+from tolalloc.sensitivity.surrogate.control_variate import learnt
 
 _EXAMINED = 1000
 """Random units of the drawing that tell whether it can be built [-]."""
@@ -318,8 +319,9 @@ class DrawingQuestion:
         errors, blocks, leading = space.errors, self.effort.share_blocks, self.requirements[0].output
         response = self.model.at(space.settings_of(design)).reading((leading,))
         experiment = Experiment(response, errors, space.zones(design), self.seeds("shares"), self.largest_failed_share)
-        found = sobol_indices(experiment, SobolEffort(start=blocks, limit=blocks))
-        return found.of(leading), regrouped(experiment, found, errors.dimension_of_column)
+        cheap = learnt(experiment, blocks)
+        found = sobol_indices(experiment, SobolEffort(start=blocks, limit=blocks), cheap=cheap)
+        return found.of(leading), regrouped(experiment, found, errors.dimension_of_column, cheap)
 
     def examined(self, design: VerifiedDesign) -> Mapping[str, float]:
         """Return what the model says of random units of a design."""

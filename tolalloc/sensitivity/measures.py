@@ -24,7 +24,7 @@ from tolalloc.sensitivity.result import RankingResult
 from tolalloc.sensitivity.screening import MomentIndependent, elementary_effects, moment_independent
 from tolalloc.sensitivity.shapley import ShapleyEffects, shapley_effects
 from tolalloc.sensitivity.sobol import SobolAnalysis, SobolIndices, order_contribution, regrouped, sobol_indices
-from tolalloc.sensitivity.surrogate.control_variate import CheapModel, cheap_model
+from tolalloc.sensitivity.surrogate.control_variate import MOST_CONTROLLED, CheapModel, cheap_model
 from tolalloc.sensitivity.surrogate.regression import (
     RegressionCandidate,
     quadratic_regression,
@@ -36,8 +36,6 @@ from tolalloc.sensitivity.uncertain import UncertainEffect, uncertain_effect
 
 _MOST_COLUMNS = 100
 """Columns beyond which all products of two are more than the samples can tell apart [-]."""
-_MOST_CONTROLLED = 2048
-"""First blocks beyond which a model needs no cheap one: it answers as many samples itself [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +82,7 @@ class Measures:
 
     def cheap(self, sample: MonteCarlo) -> CheapModel | None:
         """Return what carries most of a Sobol analysis, learnt from random units; none where the model is as cheap."""
-        if self.effort.sobol.start > _MOST_CONTROLLED:
+        if self.effort.sobol.start > MOST_CONTROLLED:
             return None
         return cheap_model(sample, self.model.columns, self.outputs)
 

@@ -13,6 +13,7 @@ from tolalloc.allocation.verify.verification import SLOPE_UNITS
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.sensitivity.inverse import fewest_units
+from tolalloc.sensitivity.surrogate.control_variate import units_to_learn
 from tolalloc.study.questions import Allocation, Ranking
 
 if TYPE_CHECKING:
@@ -119,6 +120,7 @@ def _of_allocation(question: Allocation, prepared: Prepared) -> tuple[_Part, ...
         + 2 * effort.stiffness_units
     )
     shares = effort.share_blocks * (len(errors.blocks) + len({*errors.dimension_of_column}) + 4)
+    shares += units_to_learn(errors, effort.share_blocks)
     confirmed = tuple(round(share * effort.confirmation_units) for share in _CONFIRMATIONS)
     least = effort.verification_units + confirmed[0]
     most = steps * around + confirmed[1] + fronts + what_if + shares

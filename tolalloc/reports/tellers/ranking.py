@@ -39,6 +39,8 @@ _SURE = 0.995
 """Confidence that would be rounded to certainty [-]."""
 _CARRIED = 0.99
 """Width of intervals over that without a control variate below which it is worth a sentence [-]."""
+_LEAST_CARRIED = 0.01
+"""The same below which it has no digit to print [-]."""
 _NAMED = 3
 """Sources that the answer names [-]."""
 _AS_STRONG = 0.9
@@ -339,10 +341,10 @@ class RankingTeller(Teller[RankingResult]):
     def _driver_sections(self) -> Iterator[Section]:
         """Yield which error drives what: the leading output, all requirements, each order."""
         result = self.result
-        pairs, narrowed = tables.pairs_table(result.indices), result.sobol.narrowed(0)
+        pairs = tables.pairs_table(result.indices)
         yield Section(
             heading=_say("drivers_heading", output=self._output),
-            paragraphs=(_say("drivers", carried=_say("carried", narrowed=narrowed) if narrowed < _CARRIED else ""),),
+            paragraphs=(_say("drivers", carried=_carried(result.sobol.narrowed(0))),),
             figures=(self._ranking_figure(),),
             tables=(
                 ("ranking", tables.ranking_table(result)),
@@ -615,6 +617,13 @@ class RankingTeller(Teller[RankingResult]):
                 ),
             ),
         )
+
+
+def _carried(narrowed: float) -> str:
+    """Return how much narrower a control variate makes intervals, nothing where it does not."""
+    if narrowed >= _CARRIED:
+        return ""
+    return " " + _say("carried", narrowed=f"{narrowed:.2f}" if narrowed >= _LEAST_CARRIED else "less than 0.01")
 
 
 def _drivers(sobol: SobolIndices) -> Iterator[str]:

@@ -1,1 +1,1 @@
-"""Fast surrogates of a response, each with its error measured on answers it has not seen."""
+"""Fast surrogates of a response, their errors measured on unseen answers, and the cheap model under Sobol indices."""

@@ -13,10 +13,14 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.capability.monte_carlo import MonteCarlo
-from tolalloc.models.model import Evaluation
+from tolalloc.capability.experiment import Experiment
+from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.models.model import Evaluation, Response
 from tolalloc.sensitivity.surrogate.regression import fitted
 
+MOST_CONTROLLED = 2048
+"""Blocks beyond which a model needs no cheap one: it answers hardly fewer samples itself [-]."""
 _MOST_TERMS = 500
 """Products of columns at most, all products of two of 30 columns [-]: more of them need more units than a study has."""
 _UNITS = 4096
@@ -84,6 +88,45 @@ def cheap_model(sample: MonteCarlo, columns: tuple[str, ...], outputs: tuple[str
     estimator = make_pipeline(StandardScaler(), terms, StandardScaler(), ridge)
     found = fitted(estimator, sample.x[good], sample.evaluation.values[good])
     return CheapModel(columns=columns, outputs=outputs, estimator=found)
+
+
+def learnt(experiment: Experiment[Response], blocks: int) -> CheapModel | None:
+    """Return the cheap model of an experiment, learnt from as many units of its own as so many blocks of it have.
+
+    None where it has too many columns, or where so many blocks need no help: the cheap model has hardly more samples.
+
+    References
+    ----------
+    Hoerl & Kennard 1970, as `cheap_model`.
+
+    Examples
+    --------
+    >>> from tolalloc.capability.experiment import sum_of_sizes
+    >>> found = learnt(sum_of_sizes(6.0, 12.0), 16)
+    >>> (found(np.array([[2.0, 1.0]])).values - found(np.zeros((1, 2))).values).round(2).tolist()
+    [[3.0]]
+    >>> learnt(sum_of_sizes(*range(1, 61)), 16) is None
+    True
+    """
+    columns, units = experiment.errors.columns, units_to_learn(experiment.errors, blocks)
+    if not units:
+        return None
+    return cheap_model(monte_carlo(experiment.child("learnt"), units), columns, experiment.response.outputs)
+
+
+def units_to_learn(errors: ErrorModel, blocks: int) -> int:
+    """Return how many units `learnt` draws, 0 where it has no model [-].
+
+    n = blocks·(D + 2) of D blocks of dependent sources, as many as the Sobol' blocks have (own derivation).
+
+    Examples
+    --------
+    >>> from tolalloc.capability.experiment import sum_of_sizes
+    >>> units_to_learn(sum_of_sizes(6.0, 12.0).errors, 16), units_to_learn(sum_of_sizes(6.0, 12.0).errors, 4096)
+    (64, 0)
+    """
+    units = blocks * (len(errors.blocks) + 2)
+    return units if blocks <= MOST_CONTROLLED and _degree(len(errors.columns), units) else 0
 
 
 def _degree(columns: int, units: int) -> int:
