@@ -141,7 +141,7 @@ class Control:
 
     own: Float[np.ndarray, "sample output"]  # To the samples of the blocks whose indices it corrects [output]
     # To the samples of the blocks from which its own indices follow, of another seed and as many replicates [output]
-    many: Float[np.ndarray, "sample output"]
+    many: Float[np.ndarray, "cheap_sample output"]
 
 
 def optimal_weights(
