@@ -1,9 +1,10 @@
 """Speed of many Sobol indices at once against SALib's own analysis of the same answers.
 
-Both give first-order and total indices of 9 outputs for 30 sources with 100 bootstrap resamples, in interleaved rounds:
+Both give first-order and total indices of 9 outputs for 30 sources with intervals, in interleaved rounds:
 
-* (a) the package, `tolalloc.sensitivity.saltelli`, whose estimates are SALib's and resamples sums by a matrix product;
-* (b) SALib, output by output, which gathers the answers of every resample.
+* (a) the package, `tolalloc.sensitivity.saltelli`, whose estimates are SALib's, and the errors those of eight
+  scramblings by one matrix product;
+* (b) SALib, output by output, which gathers the answers of each of 100 bootstrap resamples.
 
 The answers are those of a smooth function with interactions. Estimates, and the indices of SALib's own resamples, are
 compared. Memory is the peak of what NumPy and Python allocate, traced in a run of its own, with the answers themselves

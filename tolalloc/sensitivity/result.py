@@ -89,7 +89,10 @@ class RankingResult:
         return OneSided(response=self.model.reading((self.leading,)), limits=self.limits[self.leading])
 
     def to_salib(self) -> SalibArrays:
-        """Return problem, samples and leading output of the Sobol indices for SALib's own analysis and plots."""
+        """Return problem, samples and leading output of the Sobol indices for SALib's own analysis and plots.
+
+        That analysis gives the indices before a control variate corrects them.
+        """
         assert self.sobol.solved is not None
         return self.sobol.solved.to_salib()
 
