@@ -105,7 +105,7 @@ def learnt(experiment: Experiment[Response], blocks: int) -> CheapModel | None:
     >>> found = learnt(sum_of_sizes(6.0, 12.0), 16)
     >>> (found(np.array([[2.0, 1.0]])).values - found(np.zeros((1, 2))).values).round(2).tolist()
     [[3.0]]
-    >>> learnt(sum_of_sizes(*range(1, 61)), 16) is None
+    >>> learnt(sum_of_sizes(*60 * [6.0]), 16) is None
     True
     """
     columns, units = experiment.errors.columns, units_to_learn(experiment.errors, blocks)
