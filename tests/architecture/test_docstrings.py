@@ -67,7 +67,7 @@ COMPUTES_NOTHING = {
     "allocation.search.discrete.choice_beside": "picks",
     "allocation.space.design_space.cheapest": "picks",
     "allocation.verify.verification.cheapest_met": "picks",
-    "sensitivity.surrogate.regression.on_products_of_two": "picks",
+    "sensitivity.surrogate.regression.on_products": "picks",
     # puts things in order or together
     "reducers.dynamics.solvers.pin_forces.fill_forces": "orders",
     "reducers.choice.bind": "orders",

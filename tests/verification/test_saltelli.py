@@ -136,6 +136,14 @@ def test_blocks_without_the_only_different_one_have_no_index(blocks):
     assert (found.total_resamples >= 0).all()
 
 
+def test_blocks_of_one_scrambling_alone_have_no_error():
+    status = np.ones((16, SOURCES + 2), np.uint8)
+    status[[3, 11]] = 0  # both of the fourth of eight scramblings
+    broken = Evaluation(values=np.zeros((status.size, 1)), status=status.ravel())
+    with pytest.raises(SolveError, match="the 2 blocks that are left are all of one scrambling; 2 are needed"):
+        saltelli_indices(broken, SOURCES, SeedTree(1), largest_failed_share=0.9)
+
+
 def test_a_single_source_has_no_pairs():
     values = SeedTree(2).generator().normal(size=(64 * 4, 2))
     found = saltelli_indices(evaluation(values), 1, SeedTree(4), second_order=True)

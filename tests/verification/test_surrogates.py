@@ -21,7 +21,7 @@ from tolalloc.reports.tellers.ranking_tables import quantile_name, shortfalls, s
 from tolalloc.sensitivity.surrogate.regression import (
     RegressionCandidate,
     fit_quadratic_form,
-    on_products_of_two,
+    on_products,
     quadratic_regression,
     sparse_quadratic_regression,
 )
@@ -350,6 +350,6 @@ def test_a_quadratic_form_is_the_ridge_on_all_products_of_two(generator):
     x = generator.standard_normal((500, 4)) * [1.0, 1e-6, 3.0, 0.0]
     y = np.stack([x[:, 0] - x[:, 1] * x[:, 2] * 1e6 + x[:, 0] ** 2, x[:, 2]], axis=1)
     form = fit_quadratic_form(x, y, 50.0)
-    library = on_products_of_two(Ridge(50.0)).fit(x, y)
+    library = on_products(Ridge(50.0)).fit(x, y)
     np.testing.assert_allclose(form(x), library.predict(x), rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(fit_quadratic_form(x, y, 1e-9)(x), y, atol=1e-6)

@@ -145,7 +145,7 @@ class CurveCandidate:
         from sklearn.decomposition import PCA
         from sklearn.multioutput import MultiOutputRegressor
 
-        from tolalloc.sensitivity.surrogate.regression import fitted, lasso, on_products_of_two
+        from tolalloc.sensitivity.surrogate.regression import fitted, lasso, on_products
 
         curves = np.concatenate([part for _, part in map_chunks(self._curves, x)])
         modes = PCA(self.modes, svd_solver="covariance_eigh")
@@ -154,7 +154,7 @@ class CurveCandidate:
             columns=self.kernel.columns,
             outputs=self.kernel.outputs,
             modes=modes,
-            estimator=fitted(on_products_of_two(MultiOutputRegressor(lasso())), x, amounts),
+            estimator=fitted(on_products(MultiOutputRegressor(lasso())), x, amounts),
         )
         return corrected(regression, regression(x), y)
 

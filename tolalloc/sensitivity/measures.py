@@ -24,8 +24,9 @@ from tolalloc.sensitivity.result import RankingResult
 from tolalloc.sensitivity.screening import MomentIndependent, elementary_effects, moment_independent
 from tolalloc.sensitivity.shapley import ShapleyEffects, shapley_effects
 from tolalloc.sensitivity.sobol import SobolAnalysis, SobolIndices, order_contribution, regrouped, sobol_indices
-from tolalloc.sensitivity.surrogate.control_variate import MOST_CONTROLLED, CheapModel, cheap_model
+from tolalloc.sensitivity.surrogate.control_variate import MOST_CONTROLLED, cheap_model
 from tolalloc.sensitivity.surrogate.regression import (
+    Regression,
     RegressionCandidate,
     quadratic_regression,
     sparse_quadratic_regression,
@@ -80,13 +81,13 @@ class Measures:
         units = self.experiment("units", self.model.reading(self.outputs))
         return monte_carlo(units, self.effort.units, self.effort.design)
 
-    def cheap(self, sample: MonteCarlo) -> CheapModel | None:
+    def cheap(self, sample: MonteCarlo) -> Regression | None:
         """Return what carries most of a Sobol analysis, learnt from random units; none where the model is as cheap."""
         if self.effort.sobol.start > MOST_CONTROLLED:
             return None
         return cheap_model(sample, self.model.columns, self.outputs)
 
-    def sobol(self, waves: tuple[str, ...], cheap: CheapModel | None = None) -> SobolAnalysis:
+    def sobol(self, waves: tuple[str, ...], cheap: Regression | None = None) -> SobolAnalysis:
         """Return the indices of all outputs and of waves of the model's spectra, with as many blocks as are needed.
 
         What is uncertain of the model is among the sources. Blocks are added for the order of the sources of what is
@@ -96,12 +97,12 @@ class Measures:
         experiment, further = self._sobol_experiment("sobol", (*self.outputs, *waves)), self._with_uncertain(limited)
         return sobol_indices(experiment, self.effort.sobol, ranked=limited, further=further, cheap=cheap)
 
-    def second_seed(self, blocks: int, cheap: CheapModel | None = None) -> SobolIndices:
+    def second_seed(self, blocks: int, cheap: Regression | None = None) -> SobolIndices:
         """Return the indices of the leading output from other random numbers, with so many blocks and no pairs."""
         effort = replace(self.effort.sobol, start=blocks, limit=blocks, second_order=False)
         return sobol_indices(self._sobol_experiment("second seed", (self.leading,)), effort, cheap=cheap).of(0)
 
-    def dimensions(self, analysis: SobolAnalysis, cheap: CheapModel | None = None) -> SobolIndices | None:
+    def dimensions(self, analysis: SobolAnalysis, cheap: Regression | None = None) -> SobolIndices | None:
         """Return the indices of the leading output by the dimensions of the drawing, from the blocks of an analysis.
 
         All members of a dimension are exchanged together, as one number of the drawing limits them all. None where

@@ -271,9 +271,10 @@ def saltelli_indices(
     blocks = int(np.count_nonzero(whole))
     _require_blocks(whole.size, blocks, largest_failed_share)
     values = evaluation.values.reshape(whole.size, size, -1)
-    replicates = min(replicates, whole.size)
-    counts = without_each(np.flatnonzero(whole) % replicates, replicates)
-    weights = t_weights(replicates, resamples, seeds)
+    present, replicate = np.unique(np.flatnonzero(whole) % min(replicates, whole.size), return_inverse=True)
+    _require_replicates(present.size, blocks)
+    counts = without_each(replicate, present.size)
+    weights = t_weights(present.size, resamples, seeds)
     with one_blas_thread():
         found = [
             _of_output(values[:, :, at][whole], counts, sources, second_order=second_order)
@@ -598,3 +599,9 @@ def _require_blocks(drawn: int, whole: int, largest_failed_share: float) -> None
         )
     if whole < 2:
         raise SolveError(f"Sobol indices: {whole} of {drawn} blocks are left; at least 2 are needed.")
+
+
+def _require_replicates(present: int, blocks: int) -> None:
+    """Raise unless the blocks that are left belong to two scramblings, without which they have no error."""
+    if present < 2:
+        raise SolveError(f"Sobol indices: the {blocks} blocks that are left are all of one scrambling; 2 are needed.")

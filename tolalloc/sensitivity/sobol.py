@@ -29,7 +29,8 @@ from tolalloc.sensitivity.ranking import (
     until_converged,
 )
 from tolalloc.sensitivity.saltelli import REPLICATES, SaltelliDesign, SaltelliIndices, drawn, saltelli_indices
-from tolalloc.sensitivity.surrogate.control_variate import CheapModel, Control
+from tolalloc.sensitivity.surrogate.control_variate import Control
+from tolalloc.sensitivity.surrogate.regression import Regression
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -313,7 +314,7 @@ def sobol_indices(
     ranked: tuple[str, ...] = (),
     factor_groups: tuple[str, ...] = (),
     further: Response | None = None,
-    cheap: CheapModel | None = None,
+    cheap: Regression | None = None,
 ) -> SobolAnalysis:
     """Return the indices of all outputs, with as many blocks as the order of the first places needs.
 
@@ -391,7 +392,7 @@ def sobol_indices(
 _CHEAP_TIMES = 16
 """Blocks of a cheap model over those that it corrects, at least [-]."""
 _CHEAP_SAMPLES = 2**16
-"""Samples of a cheap model at least; a block more or less of them changes no index by what can be seen [-]."""
+"""Samples of a cheap model at least, with which its own indices err by some 1e-4 where it is smooth [-]."""
 
 
 class _Blocks:
@@ -404,7 +405,7 @@ class _Blocks:
         effort: SobolEffort,
         counted: tuple[str, ...],
         further: Response,
-        cheap: CheapModel | None,
+        cheap: Regression | None,
     ) -> None:
         self.experiment, self.design, self.effort, self.counted = experiment, design, effort, counted
         self.further, self.cheap = further, cheap
@@ -449,7 +450,7 @@ class _Blocks:
 
 def _control(
     experiment: Experiment[Response],
-    cheap: CheapModel | None,
+    cheap: Regression | None,
     design: SaltelliDesign,
     blocks: int,
     outputs: tuple[str, ...],
@@ -493,12 +494,13 @@ def regrouped(
     experiment: Experiment[Response],
     analysis: SobolAnalysis,
     factor_groups: tuple[str, ...],
-    cheap: CheapModel | None = None,
+    cheap: Regression | None = None,
 ) -> SobolIndices:
     """Return the indices of the first output of an analysis by other groups of the columns, from the same blocks.
 
     The samples A and B are the same for any groups, and so are those in which columns are exchanged that are a group
-    here and there: only those of new groups are solved, and a group that is in both has the same indices in both.
+    here and there: only those of new groups are solved, and a group that is in both has the same indices in both, but
+    for what the cheap model's own indices err by.
 
     Parameters
     ----------

@@ -274,9 +274,8 @@ class OutputsWithStiffness:
     outputs: tuple[str, ...]  # Names of the outputs with their units
     # From a kernel, the response of some outputs
     reading: Callable[[KernelResponse, tuple[str, ...]], Response]
-    axes: Float[
-        np.ndarray, "axis stiffness"
-    ]  # Changes of ln K that differences are taken over, from `principal_axes` [-]
+    # Changes of ln K that differences are taken over, those of `principal_axes` [-]
+    axes: Float[np.ndarray, "axis stiffness"]
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import comb
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -16,8 +15,8 @@ from jaxtyping import Float
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.models.model import Evaluation, Response
-from tolalloc.sensitivity.surrogate.regression import fitted
+from tolalloc.models.model import Response
+from tolalloc.sensitivity.surrogate.regression import Regression, fitted, on_products
 
 MOST_CONTROLLED = 2048
 """Blocks beyond which a model needs no cheap one: it answers hardly fewer samples itself [-]."""
@@ -28,27 +27,12 @@ _UNITS = 4096
 _UNITS_PER_TERM = 2
 """Units per term below which there are no products of so many columns [-]."""
 _LEAST_PART = 1e-10
-"""Part of the largest variance of controls below which a combination of them is rounding [-]."""
+"""Variance of a cheap number over that of the own one below which it is rounding [-]."""
 _STRENGTHS = np.logspace(-3, 5, 9)
 """Strengths of the ridge among which leave-one-out errors choose, for each output its own [-]."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class CheapModel:
-    """Outputs as a regression on products of columns."""
-
-    # Names of the columns that it reads, the first ones of every sample, and of its outputs with their units
-    columns: tuple[str, ...]
-    outputs: tuple[str, ...]
-    estimator: Any  # The fitted scikit-learn estimator of all outputs
-
-    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
-        """Return the outputs of every sample."""
-        values = np.reshape(self.estimator.predict(x[:, : len(self.columns)]), (-1, len(self.outputs)))
-        return Evaluation(values=values, status=np.zeros(x.shape[0], np.uint8))
-
-
-def cheap_model(sample: MonteCarlo, columns: tuple[str, ...], outputs: tuple[str, ...]) -> CheapModel | None:
+def cheap_model(sample: MonteCarlo, columns: tuple[str, ...], outputs: tuple[str, ...]) -> Regression | None:
     """Return a regression of all outputs on products of the columns; none where the units are too few.
 
     Parameters
@@ -70,6 +54,7 @@ def cheap_model(sample: MonteCarlo, columns: tuple[str, ...], outputs: tuple[str
     --------
     y = x₁ + x₁·x₂ is found again.
 
+    >>> from tolalloc.models.model import Evaluation
     >>> x = np.random.default_rng(1).normal(size=(200, 2))
     >>> y = Evaluation(values=(x[:, :1] + x[:, :1] * x[:, 1:]), status=np.zeros(200, np.uint8))
     >>> cheap = cheap_model(MonteCarlo(x=x, evaluation=y), ("x1", "x2"), ("y",))
@@ -77,20 +62,17 @@ def cheap_model(sample: MonteCarlo, columns: tuple[str, ...], outputs: tuple[str
     [[3.0]]
     """
     from sklearn.linear_model import RidgeCV
-    from sklearn.pipeline import make_pipeline
-    from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
     good = np.flatnonzero(sample.evaluation.good)[:_UNITS]
     degree = _degree(len(columns), good.size)
     if not degree:
         return None
-    terms, ridge = PolynomialFeatures(degree, include_bias=False), RidgeCV(_STRENGTHS, alpha_per_target=True)
-    estimator = make_pipeline(StandardScaler(), terms, StandardScaler(), ridge)
+    estimator = on_products(RidgeCV(_STRENGTHS, alpha_per_target=True), degree)
     found = fitted(estimator, sample.x[good], sample.evaluation.values[good])
-    return CheapModel(columns=columns, outputs=outputs, estimator=found)
+    return Regression(columns=columns, outputs=outputs, estimator=found)
 
 
-def learnt(experiment: Experiment[Response], blocks: int) -> CheapModel | None:
+def learnt(experiment: Experiment[Response], blocks: int) -> Regression | None:
     """Return the cheap model of an experiment, learnt from as many units of its own as so many blocks of it have.
 
     None where it has too many columns, or where so many blocks need no help: the cheap model has hardly more samples.

@@ -324,18 +324,19 @@ def _no_baseline(x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, " s
 
 @dataclass(frozen=True, kw_only=True)
 class Regression:
-    """A fitted regression in place of a response with one output."""
+    """A fitted regression in place of a response."""
 
-    # As in `tolalloc.models.model.Response`
+    # As in `tolalloc.models.model.Response`; the columns are the first ones of every sample
     columns: tuple[str, ...]
     outputs: tuple[str, ...]
-    estimator: Any  # The fitted scikit-learn estimator of the output over the baseline
+    estimator: Any  # The fitted scikit-learn estimator of the outputs over the baseline
     baseline: Baseline = _no_baseline  # A rough answer that the estimator corrects
 
     def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
         """Return the predictions."""
-        values = np.asarray(self.estimator.predict(x) * self.baseline(x), dtype=float)
-        return Evaluation(values=values.reshape(-1, 1), status=np.zeros(x.shape[0], np.uint8))
+        own = x[:, : len(self.columns)]
+        values = np.reshape(self.estimator.predict(own), (-1, len(self.outputs))) * self.baseline(own)[:, np.newaxis]
+        return Evaluation(values=np.asarray(values, dtype=float), status=np.zeros(x.shape[0], np.uint8))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -375,12 +376,12 @@ def fitted(estimator: Any, x: Float[np.ndarray, "sample column"], y: Float[np.nd
         return estimator.fit(x, y)
 
 
-def on_products_of_two(regressor: Any) -> Any:
-    """Return a linear regressor on the columns and all products of two of them."""
+def on_products(regressor: Any, most: int = 2) -> Any:
+    """Return a linear regressor on the columns and all products of up to so many of them, two unless told."""
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
-    return make_pipeline(StandardScaler(), PolynomialFeatures(2, include_bias=False), StandardScaler(), regressor)
+    return make_pipeline(StandardScaler(), PolynomialFeatures(most, include_bias=False), StandardScaler(), regressor)
 
 
 def quadratic_regression() -> Any:
@@ -397,7 +398,7 @@ def quadratic_regression() -> Any:
     """
     from sklearn.linear_model import RidgeCV
 
-    return on_products_of_two(RidgeCV(np.logspace(0, 5, 11)))
+    return on_products(RidgeCV(np.logspace(0, 5, 11)))
 
 
 def sparse_quadratic_regression() -> Any:
@@ -413,7 +414,7 @@ def sparse_quadratic_regression() -> Any:
     >>> round(float(found.predict([[1.0, 2.0]])[0]), 1)
     2.0
     """
-    return on_products_of_two(lasso())
+    return on_products(lasso())
 
 
 def lasso() -> Any:
