@@ -161,6 +161,10 @@ SMALL = (
             "contact --reducer rv20e --support 20 --profile @teeth.stl",
         ),
     ),
+)
+"""Cases of the default tests."""
+
+LONGER = (
     Case(
         name="catalogue",
         commands=(
@@ -168,10 +172,6 @@ SMALL = (
             "te --reducer rv40e --stiffness @stiffness.toml",
         ),
     ),
-)
-"""Cases of the default tests."""
-
-LONGER = (
     Case(
         name="own",
         files={"own.py": OWN, "broken.py": BROKEN},

@@ -407,6 +407,7 @@ def test_a_script_without_a_study_is_refused(tmp_path):
     refused(tolalloc("check", tmp_path / "none.py"), "none.py", "no such study")
 
 
+@pytest.mark.slow
 def test_the_script_runs_by_itself(tmp_path):
     copy = tmp_path / "liu2020_allocation.py"
     shutil.copy(STUDY, copy)

@@ -163,6 +163,7 @@ def ranked():
     return own.rank(ta.Effort(ranking=replace(QUICK_RANKING, sobol=sobol, level_units=100, **fields)))
 
 
+@pytest.mark.slow
 def test_a_dimension_says_what_a_micrometre_and_the_zones_of_all_its_places_do(ranked):
     table = ranked.tables["dimensions"].set_index("dimension")
     sens = table["Sens [mm/µm]"]

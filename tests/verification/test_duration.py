@@ -24,6 +24,7 @@ def require_foretold(study: ta.Study) -> None:
         assert least <= solved <= most, f"{kind}: {solved} of {least} to {most}"
 
 
+@pytest.mark.slow
 def test_the_units_of_an_own_function_are_foretold():
     require_foretold(
         ta.Study(

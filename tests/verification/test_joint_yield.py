@@ -23,6 +23,8 @@ TARGET, DEVIATION = 0.9973, 0.1 / 3
 EFFORT = ta.Effort(allocation=AllocationEffort(verification_units=2**14, confirmation_units=2**18))
 NARROW, WIDE = 0.12, 0.2
 
+pytestmark = pytest.mark.slow  # whole allocations, read by all
+
 
 def study(function, costs: dict[str, float], limits: dict[str, ta.Limit], **changed) -> ta.Study:
     """Return a study of two outputs of normal sizes ± 0.1 mm that cost so much at that zone."""
@@ -77,7 +79,6 @@ def answers() -> dict[str, ta.Answer]:
     return {name: made().allocate() for name, (made, _) in STUDIES.items()}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", STUDIES)
 def test_two_limits_are_kept_at_once_at_hardly_more_than_the_least_cost(answers, name):
     """Without a word of it: both ask for 99.73 %, so 99.73 % of the units keep both."""
@@ -88,7 +89,6 @@ def test_two_limits_are_kept_at_once_at_hardly_more_than_the_least_cost(answers,
     assert found.bound <= optimum
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2, 8))
 @pytest.mark.parametrize("name", STUDIES)
 def test_other_random_numbers_find_hardly_another_cost(name, seed):
@@ -99,7 +99,6 @@ def test_other_random_numbers_find_hardly_another_cost(name, seed):
     assert optimum * 0.998 < found.cost < optimum * 1.02
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", STUDIES)
 def test_a_quick_answer_and_an_explicit_joint_yield_go_the_same_way(name):
     made, optimum = STUDIES[name]
@@ -158,7 +157,6 @@ def test_failures_that_coincide_count_once():
     assert checked(same_study()).shares == pytest.approx([twice * (1 - TARGET)] * 2, rel=0.05)
 
 
-@pytest.mark.slow
 def test_a_limit_that_costs_nothing_leaves_its_failures_to_the_other():
     wide = {GAP: ta.Limit(upper=NARROW), PLAY: ta.Limit(upper=5.0)}
     found = replace(apart_study(), limits=wide).allocate().result

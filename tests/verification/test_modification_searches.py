@@ -60,6 +60,7 @@ def test_nothing_beats_the_reference(problem, generator):
     assert merit[: len(grid)].min() < best.objective * 1.5  # the grid knows the place
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("problem", PROBLEMS.values(), ids=PROBLEMS)
 def test_polishing_ends_at_the_reference_wherever_it_begins(problem, generator):
     best = reference(problem)
@@ -141,6 +142,7 @@ def test_seeds_and_only_seeds_decide(algorithm):
     assert (one.seed, other.seed) == (0, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("algorithm", [*ALGORITHMS, "binary", "reference", "polish"])
 def test_impossible_problem_gives_the_least_violating_point(algorithm):
     """No amounts of the box have 2 mm of radial clearance; 1 mm and 0 have 1 mm of it."""
