@@ -131,6 +131,7 @@ def test_the_stiffness_file_is_read_back_and_taken_by_te(run):
     assert perfect > 2530  # 2519 with the preset's own bearing
 
 
+@pytest.mark.slow
 def test_the_report_folder_is_complete(run):
     names = {"report.html", "results.xlsx", "summary.json", "manifest.json", "identified.stiffness.toml"}
     of_curves = ("measured_curve", "curve_left", "curve_residuals")
@@ -149,6 +150,7 @@ def test_the_report_folder_is_complete(run):
     assert len(sheets["units"]) == 6
 
 
+@pytest.mark.slow
 def test_the_page_works_offline_and_has_no_holes(run):
     page = (run.report / "report.html").read_text(encoding="utf-8")
     assert page.count("class Chart") == 1

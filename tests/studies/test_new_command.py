@@ -23,6 +23,7 @@ from tolalloc.reducers.family import RV
 from tolalloc.reducers.reducer.files import load_reducer
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("preset", "cranks", "discs"), [("rv20e", 2, 1), ("rv40e", 3, 2), ("rv160e", 4, 3)])
 def test_a_new_folder_is_in_order_and_has_every_source(tmp_path, preset, cranks, discs):
     place = tmp_path / "mine"
@@ -70,6 +71,7 @@ def test_three_cells_may_be_changed_in_excel(tmp_path):
     assert known["housing.runout"].locked
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cranks", "discs"), [(2, 1), (3, 2), (4, 3)])
 def test_samples_fit_every_reducer(tmp_path, cranks, discs):
     place = tmp_path / "mine"
