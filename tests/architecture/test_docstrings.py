@@ -137,6 +137,7 @@ COMPUTES_NOTHING = {
     "reducers.equivalent.model.cached_model": "passes on",
     "reducers.equivalent.solvers.adjoint.solve_peak_to_peak_derivatives": "passes on",
     "reducers.equivalent.solvers.adjoint.solve_rotation_derivatives": "passes on",
+    "reducers.equivalent.solvers.adjoint.solve_pin_force_derivatives": "passes on",
     "reducers.equivalent.solvers.batch.solve_batch_at": "passes on",
     "reducers.equivalent.solvers.contact_solver.problem_at_node": "passes on",
     "reducers.equivalent.solvers.contact_solver.solve_at_node": "passes on",

@@ -271,19 +271,6 @@ def test_the_blocks_asked_for_tell_neighbours_apart():
     assert (equal[0].more_blocks, equal[0].separated) == (None, False)
 
 
-def test_promised_orders_are_counted_that_another_ranking_reproduces():
-    """Promised at 0.9 are a before b and a before c; b before c, at 0.75, is not."""
-    first = ranking([0.5, 0.3, 0.2], RESAMPLED)
-    found = first.replicated_by(ranking([0.3, 0.2, 0.4], RESAMPLED))
-    assert (found.promised, found.reproduced, found.share) == (2, 1, 0.5)
-    assert first.replicated_by(ranking([0.3, 0.1, 0.2], RESAMPLED)).share == 1.0
-    equal = ranking([0.3, 0.3, 0.3], np.full((4, 3), 0.3))
-    assert first.replicated_by(equal).reproduced == 0
-    assert np.isnan(equal.replicated_by(first).share)
-    with pytest.raises(InputError, match="not of the same sources"):
-        first.replicated_by(ranking([0.3, 0.1, 0.2], RESAMPLED, "abd"))
-
-
 def test_blocks_double_until_the_order_is_stable_or_the_limit_is_reached():
     found = until_converged(gaps, "abcd", 3, start=64, limit=1 << 14)
     assert found.stable

@@ -47,7 +47,7 @@ from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.models.checkpoint import CachedResponse, Checkpoint
-from tolalloc.models.model import Model
+from tolalloc.models.model import Model, is_fast
 from tolalloc.running.blas import one_blas_thread
 from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.effort import SobolEffort
@@ -89,7 +89,7 @@ class DrawingQuestion:
     def search_confidence(self) -> float:
         """Confidence with which a search reads its units: as far inside the limits as an acceptance test takes [-]."""
         shown, units = 1 - FIRST.error(self.effort.error), self.effort.verification_units
-        good_as = 1 if self.model.is_fast else AS_GOOD_AS
+        good_as = 1 if is_fast(self.model) else AS_GOOD_AS
         return confidence_of_fewer(shown, units, good_as * self.effort.confirmation_units)
 
     def seeds(self, name: str) -> SeedTree:

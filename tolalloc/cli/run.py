@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 
 Script = Annotated[Path, typer.Argument(help="Python script that defines study = Study(...).")]
 Quick = Annotated[bool, typer.Option("--quick", help="Small samples, wide intervals; every stage is real.")]
+Seconds = Annotated[
+    float | None,
+    typer.Option(help="About how long ranking and allocation may take together, by a stated rate [s]."),
+]
 Seed = Annotated[int | None, typer.Option(help="Seed of every random number, instead of the study's.")]
 Out = Annotated[
     Path | None, typer.Option(help="Run folder, new or empty; the next one of runs/NAME, runs/NAME-2, … unless given.")
@@ -43,6 +47,7 @@ def run(
     script: Script,
     only: Annotated[str, typer.Option(help="Some of the questions, as ranking,allocation; all unless given.")] = "",
     quick: Quick = False,
+    seconds: Seconds = None,
     seed: Seed = None,
     checkpoint: Kept = None,
     out: Out = None,
@@ -53,7 +58,7 @@ def run(
     as_json: AsJson = False,
 ) -> None:
     """Run a study: every question once, one folder, one report."""
-    study = _asked(script, quick, seed)
+    study = _asked(script, quick, seconds, seed)
     kinds = tuple(kind.strip() for kind in only.split(",") if kind.strip())
     _run(study, kinds, _Place.of(out, study.name), checkpoint, _Way(fresh, scheduler, paper if pdf else "", as_json))
 
@@ -61,6 +66,7 @@ def run(
 def rank(
     script: Script,
     quick: Quick = False,
+    seconds: Seconds = None,
     seed: Seed = None,
     out: Out = None,
     fresh: Fresh = False,
@@ -70,7 +76,7 @@ def rank(
     as_json: AsJson = False,
 ) -> None:
     """Tell which error drives which output, which order and the rejects: short for run --only ranking."""
-    study = _asked(script, quick, seed)
+    study = _asked(script, quick, seconds, seed)
     place = _Place.of(out, f"{study.name}-rank")
     _run(study, ("ranking",), place, None, _Way(fresh, scheduler, paper if pdf else "", as_json))
 
@@ -87,6 +93,7 @@ def allocate(
         bool, typer.Option("--grades", help="Zones of ISO 286 grades and preferred numbers alone.")
     ] = False,
     quick: Quick = False,
+    seconds: Seconds = None,
     seed: Seed = None,
     checkpoint: Kept = None,
     out: Out = None,
@@ -99,7 +106,7 @@ def allocate(
     """Find the cheapest drawing that keeps every limit, verified: short for run --only allocation."""
     from tolalloc.study.questions import Allocation, questions_of
 
-    study = _with_first_limit(_asked(script, quick, seed), limit, yield_target)
+    study = _with_first_limit(_asked(script, quick, seconds, seed), limit, yield_target)
     if grades:
         own = questions_of(("allocation",), tuple(study.questions), "tolalloc allocate")[0]
         graded = replace(own, grades=True) if isinstance(own, Allocation) else own
@@ -108,12 +115,14 @@ def allocate(
     _run(study, ("allocation",), place, checkpoint, _Way(fresh, scheduler, paper if pdf else "", as_json))
 
 
-def _asked(script: Path, quick: bool, seed: int | None) -> Study:
+def _asked(script: Path, quick: bool, seconds: float | None, seed: int | None) -> Study:
     """Return the study of a script with what the command line changes."""
     study = load_study(script)
     if seed is not None:
         study = replace(study, seed=seed)
-    return study.with_effort("quick") if quick else study
+    if quick:
+        study = study.with_effort("quick")
+    return study if seconds is None else study.with_effort(replace(study.effort, seconds=seconds))
 
 
 def _with_first_limit(study: Study, limit: float | None, yield_target: float | None) -> Study:

@@ -129,6 +129,10 @@ class SettingDerivatives:
     by_setting: Float[np.ndarray, "sample setting"]
 
 
+ARRAY_RATE = 500_000.0
+"""Units a second that a model which takes whole arrays is taken to answer, assumed: no clock is read [1/s]."""
+
+
 class Model(ABC):
     """A model at the sources of one drawing: what every question asks.
 
@@ -172,9 +176,9 @@ class Model(ABC):
         return ()
 
     @property
-    def is_fast(self) -> bool:
-        """Whether a million units take seconds, as of a function that takes whole arrays."""
-        return False
+    def stated_rate(self) -> float:
+        """Units a second that its effort is counted at, assumed: no clock is read [1/s]."""
+        return 20_000.0
 
     @property
     def differentiable(self) -> tuple[str, ...]:
@@ -266,6 +270,11 @@ class Model(ABC):
 
     def release(self) -> None:  # noqa: B027
         """Let go of what is made again when it is needed, such as tables; a model may have no such thing."""
+
+
+def is_fast(model: Model) -> bool:
+    """Return whether a million units take seconds, as of a function that takes whole arrays."""
+    return model.stated_rate >= ARRAY_RATE
 
 
 @runtime_checkable

@@ -34,7 +34,7 @@ from tolalloc.reducers.response.outputs import (
     WITH_FRICTION,
     OutputsResponse,
     limited_outputs,
-    loop_derivatives,
+    output_derivatives,
     readings_of,
     wave_outputs,
     with_orders,
@@ -191,17 +191,22 @@ class ReducerModel(Model):
         return self._everywhere((PEAK_TO_PEAK,))
 
     @property
+    def stated_rate(self) -> float:
+        """Of the limited outputs of a reducer whose bearings yield, on two cores [1/s]."""
+        return 500.0
+
+    @property
     def differentiable(self) -> tuple[str, ...]:
-        """What is read off torque against twist."""
+        """What is read off torque against twist, what presses without torque, and the gap at tip and root."""
         return self._everywhere(DIFFERENTIABLE)
 
     def derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
-        """Return the peak-to-peak, or what is read off torque against twist, of every sample with its derivatives."""
+        """Return the peak-to-peak, or an output of `differentiable`, of every sample with its derivatives."""
         model, name = self._under(output)
         if model is not self:
             return model.derivatives(name, x)
         if output in self.differentiable:
-            return self._loop_derivatives(output, x)
+            return self._output_derivatives(output, x)
         if output not in self.exact:
             known = (*self.exact, *self.differentiable)
             raise UnknownNameError.among(f"derivatives of {self.name}", "output", output, known)
@@ -212,8 +217,8 @@ class ReducerModel(Model):
             by_setting=found.by_modification @ self._modification_by_clearance * MICROMETRE,
         )
 
-    def _loop_derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
-        evaluation, slopes = loop_derivatives(self.kernel, output, x)
+    def _output_derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+        evaluation, slopes = output_derivatives(self.kernel, output, x)
         columns = self.kernel.model.columns
         varied, amounts = (
             [columns.index(name) for name in names] for names in (self.columns, self.reducer.modification.deviations)

@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar
 
 from tolalloc.capability.experiment import FEWEST_RUNS
 from tolalloc.drawings.seeds import SamplingDesign
+from tolalloc.models.model import ARRAY_RATE
 from tolalloc.reading.named_fields import NamedFields, Rule, a, number, whole
 from tolalloc.sensitivity.surrogate import validation
 
@@ -23,8 +24,6 @@ CLASSES = 10
 """Classes of equal size that PAWN divides each measure into, SALib's number [-]."""
 
 
-FAST_RATE = 500_000
-"""Units a second that a model which takes whole arrays is taken to answer, assumed: no clock is read [1/s]."""
 FAST_SECONDS = {True: 0.25, False: 1.0}
 """Whether a run is quick → what the Sobol analysis of such a model may take at that rate [s]."""
 
@@ -42,6 +41,8 @@ def fewest_units() -> int:
     return ceil(FEWEST_OUTSIDE / WORST_SHARE)
 
 
+_FEWEST_BLOCKS = 16
+"""Blocks of a Sobol analysis that is given too little time for more [-]."""
 _CHAIN = 10
 """Units of a level or width come in chains of so many [-]."""
 
@@ -148,6 +149,63 @@ class RankingEffort(NamedFields):
         ):
             rule.check("study", f"effort.ranking.sobol.{name}", getattr(self.sobol, name))
 
+    def counted(self, sources: int) -> int:
+        """Return about how many units a ranking of so many sources solves, the methods for rare failures left out [-].
+
+        Random units, Saltelli blocks of sources + 2 units, trajectories, derivatives and surrogates with their trials,
+        own count.
+
+        Examples
+        --------
+        >>> QUICK_RANKING.counted(48)
+        11272
+        """
+        blocks = self.sobol.limit * (sources + 2)
+        return (
+            self.units
+            + blocks
+            + self.trajectories * (sources + 1)
+            + 4 * self.derivative_units
+            + 9 * self.surrogate_units
+            + self.moment_units
+        )
+
+    def within(self, units: float, sources: int) -> RankingEffort:
+        """Return this effort scaled to about so many units in all, each number at least what its measure needs.
+
+        Every number times units/`counted` (own derivation), blocks down to a power of two.
+
+        Examples
+        --------
+        >>> effort = QUICK_RANKING.within(2 * QUICK_RANKING.counted(48), 48)
+        >>> effort.units, effort.sobol.limit, effort.sobol.start
+        (4096, 128, 128)
+        """
+        share = units / self.counted(sources)
+        blocks = max(1 << max(int(share * self.sobol.limit).bit_length() - 1, 0), _FEWEST_BLOCKS)
+
+        def scaled(number: int, fewest: int) -> int:
+            return max(round(share * number), fewest)
+
+        return replace(
+            self,
+            units=scaled(self.units, fewest_units()),
+            sobol=replace(self.sobol, start=blocks, limit=blocks),
+            trajectories=scaled(self.trajectories, FEWEST_TRAJECTORIES),
+            moment_units=scaled(self.moment_units, FEWEST_UNITS_OF_CLASS * CLASSES),
+            derivative_units=scaled(self.derivative_units, 10),
+            inverse_units=scaled(self.inverse_units, 100),
+            surrogate_units=scaled(self.surrogate_units, validation.FEWEST_OF_FOLD * validation.FOLDS),
+            level_units=_CHAIN * scaled(self.level_units // _CHAIN, _CHAIN),
+            widened_units=_CHAIN * scaled(self.widened_units // _CHAIN, _CHAIN),
+            permutations=scaled(self.permutations, 100),
+        )
+
+    def until_order(self, places: int) -> RankingEffort:
+        """Return the effort whose blocks grow until the order of so many first places is stable [-]."""
+        most = max(self.sobol.limit, SobolEffort().limit)
+        return replace(self, sobol=replace(self.sobol, places=places, limit=most))
+
     def of_fast_model(self, sources: int) -> RankingEffort:
         """Return the effort for a model that answers for whole arrays, unless its numbers are the user's own.
 
@@ -166,7 +224,7 @@ class RankingEffort(NamedFields):
         """
         if self not in (RankingEffort(), QUICK_RANKING):
             return self
-        allowed = int(FAST_RATE * FAST_SECONDS[self == QUICK_RANKING]) // (sources + 2)
+        allowed = int(ARRAY_RATE * FAST_SECONDS[self == QUICK_RANKING]) // (sources + 2)
         blocks = max(self.sobol.limit, 1 << max(allowed.bit_length() - 1, 0))
         return replace(self, sobol=replace(self.sobol, start=blocks, limit=blocks))
 

@@ -97,11 +97,6 @@ class Measures:
         experiment, further = self._sobol_experiment("sobol", (*self.outputs, *waves)), self._with_uncertain(limited)
         return sobol_indices(experiment, self.effort.sobol, ranked=limited, further=further, cheap=cheap)
 
-    def second_seed(self, blocks: int, cheap: Regression | None = None) -> SobolIndices:
-        """Return the indices of the leading output from other random numbers, with so many blocks and no pairs."""
-        effort = replace(self.effort.sobol, start=blocks, limit=blocks, second_order=False)
-        return sobol_indices(self._sobol_experiment("second seed", (self.leading,)), effort, cheap=cheap).of(0)
-
     def dimensions(self, analysis: SobolAnalysis, cheap: Regression | None = None) -> SobolIndices | None:
         """Return the indices of the leading output by the dimensions of the drawing, from the blocks of an analysis.
 
@@ -231,7 +226,7 @@ def rank(asked: Measures, record: RunRecord) -> RankingResult:
         Too many units failed.
     """
     measures, model, effort = replace(asked, model=asked.model.observed(record.observe)), asked.model, asked.effort
-    leading, spectra, own = measures.leading, model.spectra, measures.experiment
+    spectra, own = model.spectra, measures.experiment
     with one_blas_thread():
         with record.stage("random units", effort.units):
             sample = measures.sample()
@@ -239,8 +234,6 @@ def rank(asked: Measures, record: RunRecord) -> RankingResult:
             effect, cheap = measures.uncertain(sample), measures.cheap(sample)
             sobol = measures.sobol(tuple(name for names in spectra.values() for name in names), cheap)
             dimensions = measures.dimensions(sobol, cheap)
-        with record.stage("Sobol, second seed"):
-            again = measures.second_seed(sobol.convergence.history[-1].blocks, cheap)
         with record.stage("other measures"):
             derived = measures.derived(sample)
             shapley = measures.shapley()
@@ -267,7 +260,6 @@ def rank(asked: Measures, record: RunRecord) -> RankingResult:
         design=effort.design,
         sobol=sobol,
         dimensions=dimensions,
-        replication=sobol.of(leading).replicated_by(again),
         orders=order_contribution(sobol, spectra) if spectra else None,
         effect=effect,
         shapley=shapley,

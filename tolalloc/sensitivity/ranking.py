@@ -33,27 +33,6 @@ class Neighbours:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Replication:
-    """How much of what a ranking promised another one has shown, which had other samples.
-
-    Notes
-    -----
-    Most promised pairs lie far above the confidence, so a share just at it is a weak result. Pairs share sources and
-    depend on each other: the share has no binomial error.
-    """
-
-    confidence: float  # Share of resamples from which an order counts as promised [-]
-    # Pairs of sources whose order was promised, and those among them that the other ranking has in that order [-]
-    promised: int
-    reproduced: int
-
-    @property
-    def share(self) -> float:
-        """Share of the promised pairs that was reproduced, NaN if none was promised [-]."""
-        return self.reproduced / self.promised if self.promised else float("nan")
-
-
-@dataclass(frozen=True, kw_only=True)
 class SourceRanking:
     """Sources by their total index."""
 
@@ -126,18 +105,6 @@ class SourceRanking:
         """Return the share of resamples in which each source is among the first ``count`` [-]."""
         _require_places(count, len(self.sources))
         return np.asarray((ranks(self.total_resamples) <= count).mean(axis=0))
-
-    def replicated_by(self, other: SourceRanking) -> Replication:
-        """Return how many of the orders promised here the same analysis with another seed has."""
-        if other.sources != self.sources:
-            raise InputError("Reproduction: the two rankings are not of the same sources.")
-        promised = before(self.total_resamples) >= _CONFIDENCE
-        found = promised & (other.total[:, np.newaxis] > other.total)
-        return Replication(
-            confidence=_CONFIDENCE,
-            promised=int(np.count_nonzero(promised)),
-            reproduced=int(np.count_nonzero(found)),
-        )
 
 
 def percentile_interval(

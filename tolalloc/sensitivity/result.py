@@ -16,7 +16,6 @@ from tolalloc.drawings.seeds import SamplingDesign
 from tolalloc.models.model import Model
 from tolalloc.sensitivity.derivatives import ClassicalEstimate, DerivativeMeasures, LocalDerivatives
 from tolalloc.sensitivity.inverse import InverseSensitivity
-from tolalloc.sensitivity.ranking import Replication
 from tolalloc.sensitivity.screening import ElementaryEffects, MomentIndependent
 from tolalloc.sensitivity.shapley import ShapleyEffects
 from tolalloc.sensitivity.sobol import OrderContribution, SalibArrays, SobolAnalysis, SobolIndices
@@ -56,7 +55,6 @@ class RankingResult:
     sobol: SobolAnalysis  # Indices of these outputs and of the waves of the model's spectra
     # Indices of the leading output by the dimensions of the drawing; none where each dimension is one source
     dimensions: SobolIndices | None
-    replication: Replication  # How much of the ranking a second seed has shown
     orders: OrderContribution | None  # What each source adds to each order; none for a model without spectra
     # What not knowing the model itself does to the leading output; none where all of it is known
     effect: UncertainEffect | None

@@ -84,9 +84,7 @@ def _of_ranking(prepared: Prepared) -> tuple[_Part, ...]:
     waves = tuple(name for names in model.spectra.values() for name in names)
     limited = tuple(dict.fromkeys(own.output for own in prepared.requirements))
     whole, alone = _seconds(prepared, outputs), _seconds(prepared, (leading,))
-    of_all, of_limited, again = (
-        _seconds(prepared, asked, uncertain=True) for asked in ((*outputs, *waves), limited, (leading,))
-    )
+    of_all, of_limited = (_seconds(prepared, asked, uncertain=True) for asked in ((*outputs, *waves), limited))
     sources, dimensions = len(errors.blocks) + len(model.uncertain), len({*errors.dimension_of_column})
     inverse = max(effort.inverse_units, fewest_units(prepared.target))
     trials = effort.trajectories * (sources + 1) + 4 * effort.derivative_units + (sources + 2) * inverse
@@ -96,7 +94,6 @@ def _of_ranking(prepared: Prepared) -> tuple[_Part, ...]:
         _Part(units=(effort.units, effort.units), seconds=whole),
         _Part(units=(start * block, start * block), seconds=of_all),
         _Part(units=(0, (limit - start) * block), seconds=of_limited),
-        _Part(units=(start * block, limit * block), seconds=again),
         _Part(units=(0, limit * (dimensions + 3) + most), seconds=alone),
     )
 

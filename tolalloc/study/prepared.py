@@ -178,14 +178,18 @@ class Prepared:
     @property
     def ranking_effort(self) -> RankingEffort:
         """How much a ranking may compute, more blocks for a model that answers for whole arrays."""
-        effort = self.study.effort.ranking
-        return effort.of_fast_model(len(self.errors.blocks)) if self.model.is_fast else effort
+        return self.study.effort.of_ranking(self.model, len(self.errors.blocks), self._sharing)
 
     @property
     def allocation_effort(self) -> AllocationEffort:
         """How much an allocation may compute, more units for a model that answers for whole arrays."""
-        effort = self.study.effort.allocation
-        return effort.of_fast_model if self.model.is_fast else effort
+        return self.study.effort.of_allocation(self.model, self._sharing)
+
+    @property
+    def _sharing(self) -> int:
+        """Questions that share a time: the rankings and allocations of the study [-]."""
+        kinds = [getattr(question, "kind", "") for question in self.study.asked]
+        return max(sum(kind in ("ranking", "allocation") for kind in kinds), 1)
 
     @cached_property
     def currency(self) -> str:
@@ -243,6 +247,7 @@ class Prepared:
             assumptions=(
                 *portrait_of(self.model).assumptions,
                 *self.notes,
+                *self.study.effort.notes(self.model),
             ),
         )
 

@@ -12,12 +12,13 @@ from tolalloc.allocation.space.effort import QUICK_ALLOCATION, AllocationEffort
 from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, Guarantee
 from tolalloc.capability.indices import Limits
 from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.models.model import is_fast
 from tolalloc.reading.named_fields import NamedFields, Rule, a, mapped, number, or_none, whole
 from tolalloc.sensitivity.effort import QUICK_RANKING, RankingEffort
 
 if TYPE_CHECKING:
     from tolalloc.drawings.drawing import Drawing
-    from tolalloc.models.model import ModelSource
+    from tolalloc.models.model import Model, ModelSource
 
 COMMON: Literal["common"] = "common"
 """What is asked of all limits at once is what each of them asks for, where that is one yield."""
@@ -77,6 +78,20 @@ class Limit(NamedFields):
         return Limits(upper=self.upper, lower=self.lower)
 
 
+_NUMBERS = ("one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
+_ORDER = re.compile(rf"order of the first ({'|'.join(_NUMBERS)}|[1-9]\d?)")
+_UNTIL = Rule(
+    "'order of the first three', any number from one to ten in words or up to 99 in digits, or None",
+    lambda given: given is None or (isinstance(given, str) and bool(_ORDER.fullmatch(given))),
+)
+
+
+def _places(until: str) -> int:
+    """Return how many places a text speaks of."""
+    said = until.split()[-1]
+    return int(said) if said.isdigit() else _NUMBERS.index(said) + 1
+
+
 @dataclass(frozen=True, kw_only=True)
 class Effort(NamedFields):
     """How much a study may compute.
@@ -89,11 +104,22 @@ class Effort(NamedFields):
         Effort of an allocation.
     is_quick
         Whether reports shall say that the run is a quick one.
+    seconds
+        About how long the ranking and the allocation may take together, by a stated number of units a second for each
+        kind of model: their units are scaled to it, and no clock is read, so that the same study has the same bits [s].
+    until
+        ``"order of the first three"``, any number of places: the blocks of a ranking grow until that order is stable,
+        within a limit.
 
     Raises
     ------
     InputError
         A field of another kind.
+
+    Examples
+    --------
+    >>> Effort(until="order of the first five").places
+    5
     """
 
     called: ClassVar[str] = "effort"
@@ -101,6 +127,34 @@ class Effort(NamedFields):
     ranking: Annotated[RankingEffort, a(RankingEffort)] = field(default_factory=RankingEffort)
     allocation: Annotated[AllocationEffort, a(AllocationEffort)] = field(default_factory=AllocationEffort)
     is_quick: Annotated[bool, a(bool)] = False
+    seconds: Annotated[float | None, or_none(number("a number above 0, or None", above=0))] = None
+    until: Annotated[str | None, _UNTIL] = None
+
+    @property
+    def places(self) -> int | None:
+        """First places whose order a ranking must settle; None where nothing is asked of it [-]."""
+        return None if self.until is None else _places(self.until)
+
+    def notes(self, model: Model) -> tuple[str, ...]:
+        """Return what a reader must know of the time that was asked for."""
+        if self.seconds is None:
+            return ()
+        return (
+            f"units for about {self.seconds:,g} s at {model.stated_rate:,.0f} units a second, an assumed rate that no "
+            "clock corrects; four times as long halves the intervals of the indices",
+        )
+
+    def of_ranking(self, model: Model, sources: int, kinds: int) -> RankingEffort:
+        """Return how much a ranking may compute, one of so many questions that share the time [-]."""
+        effort = self.ranking.of_fast_model(sources) if is_fast(model) else self.ranking
+        if self.seconds is not None:
+            effort = effort.within(self.seconds / kinds * model.stated_rate, sources)
+        return effort if self.places is None else effort.until_order(self.places)
+
+    def of_allocation(self, model: Model, kinds: int) -> AllocationEffort:
+        """Return how much an allocation may compute, one of so many questions that share the time [-]."""
+        effort = self.allocation.of_fast_model if is_fast(model) else self.allocation
+        return effort if self.seconds is None else effort.within(self.seconds / kinds * model.stated_rate)
 
 
 QUICK = Effort(ranking=QUICK_RANKING, allocation=QUICK_ALLOCATION, is_quick=True)

@@ -8,6 +8,9 @@ from typing import Annotated, ClassVar
 from tolalloc.reading.named_fields import NamedFields, Rule, a, each, number, whole
 from tolalloc.sensitivity.surrogate import validation
 
+FEWEST_FOR_YIELD = 1152
+"""Units with which the usual yield, 99.73 %, can just be shown [-]."""
+
 
 def _least(fewest: int) -> Rule:
     """Return the rule of a number with which an allocation has an answer in every stage."""
@@ -126,6 +129,35 @@ class AllocationEffort(NamedFields):
     ] = (0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.9973, 0.999)
     gain: Annotated[float, number("a share above 0 up to below 1", above=0, below=1)] = 0.005
     error: Annotated[float, number("a share above 0 up to 0.5", above=0, most=0.5)] = 0.05
+
+    @property
+    def counted(self) -> int:
+        """About how many units an allocation solves: steps of two searches, and its confirmation; own count [-]."""
+        return 2 * (self.search.steps + 2) * self.verification_units + 2 * self.confirmation_units
+
+    def within(self, units: float) -> AllocationEffort:
+        """Return this effort scaled to about so many units in all, each number at least what its stage needs.
+
+        Every number of units times units/`counted` (own derivation); steps and points stay.
+
+        Examples
+        --------
+        >>> AllocationEffort().within(AllocationEffort().counted / 2).confirmation_units
+        16384
+        """
+        share = units / self.counted
+
+        def scaled(number: int, fewest: int) -> int:
+            return max(round(share * number), fewest)
+
+        return replace(
+            self,
+            verification_units=scaled(self.verification_units, FEWEST_FOR_YIELD),
+            confirmation_units=scaled(self.confirmation_units, 2 * FEWEST_FOR_YIELD),
+            shared_units=scaled(self.shared_units, 48),
+            stiffness_units=scaled(self.stiffness_units, FEWEST_FOR_YIELD),
+            share_blocks=max(1 << max(int(share * self.share_blocks).bit_length() - 1, 0), 16),
+        )
 
     @property
     def of_fast_model(self) -> AllocationEffort:

@@ -20,7 +20,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError
 from tolalloc.models.differences import derived
-from tolalloc.models.model import Evaluation, Model, ResponseWithDerivatives, SettingDerivatives
+from tolalloc.models.model import Evaluation, Model, ResponseWithDerivatives, SettingDerivatives, is_fast
 
 _EVEN_ODDS, _TENTH = 0.5, 0.1
 _FURTHER, _SURELY = 4, 200
@@ -327,7 +327,7 @@ class DesignSample:
         What no plane is near to is judged by the units alone.
         """
         found = {output: NearPlane(law=law) for output, law in self.laws.items()}
-        if self.model.is_fast:
+        if is_fast(self.model):
             zones = self.space.zones(self.design)
             rest = [output for output in self.outputs if output not in found]
             near = {output: NearPlane.of(self.x, self.values(output), self.space.errors, zones) for output in rest}

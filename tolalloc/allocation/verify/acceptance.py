@@ -19,7 +19,7 @@ from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.capability.monte_carlo import AnsweredUnits, RedrawnUnits, require_few_failures
 from tolalloc.capability.near_limit import Drawn
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.models.model import Model
+from tolalloc.models.model import Model, is_fast
 from tolalloc.running.blas import one_blas_thread
 
 _SPENT = 0.75
@@ -285,7 +285,7 @@ class AcceptanceTest:
     def _screen(self, design: VerifiedDesign) -> Screen | None:
         """Return what tells units near a limit from far ones; none where solving all of them costs little."""
         alone = [check for check in design.checks if not isinstance(check.requirement, JointRequirement)]
-        if self.model.is_fast or len(design.laws) == len(alone):
+        if is_fast(self.model) or len(design.laws) == len(alone):
             return None
         with one_blas_thread():  # the same units are near for any number of threads
             # A unit fails one limit at least if it fails all limits at once.

@@ -24,7 +24,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
 from tolalloc.models.function_model import FunctionModel
-from tolalloc.models.model import Model
+from tolalloc.models.model import Model, is_fast
 from tolalloc.reading.units import MILLIMETRE
 
 SLOPE_UNITS = 1024
@@ -222,7 +222,7 @@ class Verifier:
             standard=errors.standard_values(np.concatenate([*seeds.uniform_chunks(self.units, len(errors.columns))])),
             outputs=outputs,
             slope_units=self.slope_units,
-            derivative_units=min(self.units, DERIVATIVE_UNITS) if self.model.is_fast else self.units,
+            derivative_units=min(self.units, DERIVATIVE_UNITS) if is_fast(self.model) else self.units,
             seeds=seeds,
         )
         for own in sample.samples:

@@ -350,6 +350,28 @@ class EquivalentModel:
         derivative.rotation[derivative.status != CONVERGED] = np.nan
         return derivative.rotation.reshape(samples, position.size), self._derivatives(derivative)
 
+    def pin_force_derivatives(
+        self,
+        errors: Float[np.ndarray, "sample column"],
+        torque: float,
+        carrier_angle: Float[np.ndarray, " angle"],
+        at: Int[np.ndarray, " sample"],
+        weights: Float[np.ndarray, "sample disc pin"],
+    ) -> Derivatives:
+        """Return the exact derivatives of Σ weight·force over the pins, of every sample at one of the carrier angles.
+
+        They hold while the same pins touch, as those of the rotation. A sample without an equilibrium there has zeros
+        and its status.
+        """
+        from tolalloc.reducers.equivalent.solvers.adjoint import solve_pin_force_derivatives
+
+        derivative = self._derivative(errors.shape[0])
+        of_pins = np.ascontiguousarray(weights.reshape(errors.shape[0], -1))
+        solve_pin_force_derivatives(
+            self._padded(carrier_angle), *self._given(errors, torque), 1.0 + at, of_pins, derivative
+        )
+        return self._derivatives(derivative)
+
     @property
     def largest_rotation(self) -> float:
         """Output error up to which displacements count as small, a tenth of the pin pitch; an assumption [rad].

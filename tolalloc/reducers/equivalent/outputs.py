@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Complex, Float, Int
+from jaxtyping import Complex, Float, Int, Integer
 
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import ARCSECOND
@@ -237,10 +237,61 @@ def radial_clearance(
     >>> round(1e6 * float(radial_clearance(model, errors)[0]), 6)  # Δr_rp − Δr_p [µm]
     8.0
     """
+    discs = _standing_out(model, errors)
+    return np.asarray(-np.max([own.pin.max(axis=1) + own.tooth.max(axis=1) for own in discs], axis=0))
+
+
+def radial_clearance_derivatives(
+    model: EquivalentModel, errors: Float[np.ndarray, "sample column"]
+) -> Float[np.ndarray, "sample column"]:
+    """Return the derivatives of `radial_clearance` by every error column [m/m, m/rad].
+
+    Those of the gap between the pin and the tooth that stand out most, which is linear in the errors: own derivation.
+    They hold while these stand out most.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
+    >>> found = radial_clearance_derivatives(model, np.zeros((1, len(model.columns))))
+    >>> amounts = [model.columns.index(f"modification.{name}") for name in ("equidistant", "shift")]
+    >>> found[0, amounts].round(9).tolist()  # Δr_rp − Δr_p
+    [1.0, -1.0]
+    """
+    discs, layout = _standing_out(model, errors), model.error_columns.layout
+    disc = np.argmax([own.pin.max(axis=1) + own.tooth.max(axis=1) for own in discs], axis=0)
+    by_value = np.zeros((len(errors), layout.end))
+    for at, own in enumerate(discs):
+        rows = np.flatnonzero(disc == at)
+        pin, place = own.pin[rows].argmax(axis=1), own.tooth[rows].argmax(axis=1)
+        for kind, factor in enumerate((*own.by_pin[:, pin], np.ones(rows.size))):
+            by_value[rows, layout.pin + kind * layout.pins + pin] = -factor
+        waves = own.by_tooth[:, place, np.newaxis] * own.waves[place]
+        first, single = layout.wave + at * layout.waves, layout.tooth + at * 2 * layout.teeth
+        by_value[rows, first : first + layout.waves] = -waves.transpose(1, 0, 2).reshape(rows.size, layout.waves)
+        for kind in range(2):
+            by_value[rows, single + kind * layout.teeth + own.number[place]] = -own.by_tooth[kind, place]
+    return np.asarray((model.error_columns.matrix.T @ by_value.T).T)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _StandingOut:
+    """How far pins and teeth of a disc stand out where normals are radial, and by which values."""
+
+    pin: Float[np.ndarray, "sample pin"]  # Every pin [m]
+    tooth: Float[np.ndarray, "sample place"]  # Tip and root of every tooth [m]
+    by_pin: Float[np.ndarray, "2 pin"]  # By the two coordinates of a pin [-]
+    by_tooth: Float[np.ndarray, "2 place"]  # By the two deviations of a tooth [-]
+    waves: Float[np.ndarray, "place wave"]  # Waves along the ring of teeth [-]
+    number: Integer[np.ndarray, " place"]  # Position of the tooth [-]
+
+
+def _standing_out(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) -> list[_StandingOut]:
+    """Return the same of every disc."""
     mapped, layout, orders = model.error_columns, model.error_columns.layout, model.orders
     values = np.asarray((mapped.matrix @ errors.T).T) + mapped.map.nominal
     pins = values[:, layout.pin : layout.wave].reshape(-1, 3, layout.pins)
-    largest = []
+    found = []
     for disc in range(model.reducer.disc_count):
         contact = _at_tips_and_roots(model, disc)
         waves = harmonic_waves(contact.tooth_angle[:, disc, 0], orders)
@@ -249,9 +300,17 @@ def radial_clearance(
         own = values[:, single : single + 2 * layout.teeth].reshape(-1, 2, layout.teeth)
         tooth = np.einsum("skw,pw->skp", along_ring, waves) + own[:, :, contact.tooth[:, disc, 0]]
         by_tooth, by_pin = contact.by_tooth[:, disc, :, 0].T, contact.by_pin[0, disc, :, 0]
-        pin = by_pin[0] * pins[:, 0] + by_pin[1] * pins[:, 1] + pins[:, 2]
-        largest.append(pin.max(axis=1) + (by_tooth * tooth).sum(axis=1).max(axis=1))
-    return np.asarray(-np.max(largest, axis=0))
+        found.append(
+            _StandingOut(
+                pin=by_pin[0] * pins[:, 0] + by_pin[1] * pins[:, 1] + pins[:, 2],
+                tooth=(by_tooth * tooth).sum(axis=1),
+                by_pin=np.repeat(by_pin[:, np.newaxis], layout.pins, axis=1),
+                by_tooth=by_tooth,
+                waves=waves,
+                number=contact.tooth[:, disc, 0],
+            )
+        )
+    return found
 
 
 def _at_tips_and_roots(model: EquivalentModel, disc: int) -> PinContact:

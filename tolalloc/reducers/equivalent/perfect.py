@@ -1,6 +1,6 @@
 """The reducer without part errors, its bearings yielding: the one answer on forces that every command gives.
 
-Units whose parts press each other before any torque acts: forces of the pins, and what turning them takes.
+Units whose parts press each other before any torque acts: forces of the pins, what turning them takes, derivatives.
 
 How stiff a reducer is: against its catalogue, and which part yields how much of the twist.
 """
@@ -10,14 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from math import pi
+from math import inf, pi
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Integer, UInt8
 
 from tolalloc.reducers.equivalent.hysteresis import BACKLASH, TURN_ANGLES, HysteresisLoop, hysteresis_loop, sliding_ways
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import Solved, forces
+from tolalloc.reducers.equivalent.outputs import Solved
 from tolalloc.reducers.equivalent.springs import Positions
 from tolalloc.reducers.family import RV
 from tolalloc.reducers.reducer.design import Reducer, at_torque, compliances
@@ -102,16 +102,97 @@ def preload(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) 
     >>> f"{float(preload(model, exact_unit(model)).pin_force[0]):.2g}"  # 0.01 % of the rated torque alone [N]
     '0.23'
     """
-    reducer = model.reducer
-    torque = -BACKLASH * reducer.load.rated_torque
-    solved = model.at_torque(torque).equilibria(errors, torque, TURN_ANGLES)
-    found = forces(solved).pins
-    ways = sliding_ways(reducer, TURN_ANGLES)
+    return _preload_of(model.reducer, _without_torque(model, errors))
+
+
+def _preload_of(reducer: Reducer, solved: Solved) -> Preload:
+    """Return what presses, from equilibria and forces without torque."""
+    found, ways = solved.forces.pins, sliding_ways(reducer, TURN_ANGLES)
     return Preload(
         pin_force=np.asarray(found.max(axis=(1, 2, 3))),
         friction_torque=reducer.friction.pins * np.einsum("sadp,adp->sa", found, ways).max(axis=1),
-        status=np.asarray(solved.status.max(axis=1)),
+        status=np.asarray(solved.equilibria.status.max(axis=1)),
     )
+
+
+def _without_torque(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) -> Solved:
+    """Return equilibria and forces over an output turn under the torque at which backlash is read."""
+    torque = _least_torque(model.reducer)
+    return Solved.of(model.at_torque(torque).equilibria(errors, torque, TURN_ANGLES))
+
+
+def _least_torque(reducer: Reducer) -> float:
+    return -BACKLASH * reducer.load.rated_torque
+
+
+Derived = tuple[Preload, Float[np.ndarray, "sample column"]]
+"""What presses in every unit, and the derivatives of one of its two outputs by every error column."""
+
+
+def pin_force_derivatives(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) -> Derived:
+    """Return what presses in every unit without torque, and the derivatives of the largest pin force [N/m].
+
+    Those of that pin's force at that angle, own derivation, theory page (23): the adjoint of the equilibrium with the
+    force in place of the rotation. They hold while the same pins touch and the same one is pressed most.
+
+    Examples
+    --------
+    Teeth 1 µm tighter than their pins press them harder:
+
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> model = EquivalentModel(load_reducer("rv20e"))
+    >>> tight = np.zeros((1, len(model.columns)))
+    >>> tight[0, model.columns.index("modification.equidistant")] = -1e-6
+    >>> _, slopes = pin_force_derivatives(model, tight)
+    >>> round(1e-6 * float(slopes[0, model.columns.index("modification.equidistant")]))  # [N/µm]
+    -841
+    """
+    solved = _without_torque(model, errors)
+    pins = solved.forces.pins
+    at, largest = _largest(pins.max(axis=(2, 3))), pins.reshape(*pins.shape[:2], -1).argmax(axis=2)
+    weights = np.zeros((len(errors), pins[0, 0].size))
+    weights[np.arange(len(errors)), largest[np.arange(len(errors)), at]] = 1.0
+    return _derived(model, solved, at, weights.reshape(-1, *pins.shape[2:]))
+
+
+def friction_torque_derivatives(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) -> Derived:
+    """Return what presses in every unit without torque, and the derivatives of the friction torque [N·m/m].
+
+    As `pin_force_derivatives`, own derivation, of the sum of forces times sliding ways at the angle where it is
+    largest.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> model = EquivalentModel(load_reducer("rv20e"))
+    >>> tight = np.zeros((1, len(model.columns)))
+    >>> tight[0, model.columns.index("modification.equidistant")] = -1e-6
+    >>> _, slopes = friction_torque_derivatives(model, tight)
+    >>> round(1e-6 * float(slopes[0, model.columns.index("modification.equidistant")]), 1)  # [N·m/µm]
+    -50.7
+    """
+    solved = _without_torque(model, errors)
+    by_force = model.reducer.friction.pins * sliding_ways(model.reducer, TURN_ANGLES)
+    at = _largest(np.einsum("sadp,adp->sa", solved.forces.pins, by_force))
+    return _derived(model, solved, at, by_force[at])
+
+
+def _largest(over_turn: Float[np.ndarray, "sample angle"]) -> Integer[np.ndarray, " sample"]:
+    """Return where each is largest, anywhere where nothing converged."""
+    return np.asarray(np.nan_to_num(over_turn, nan=-inf).argmax(axis=1))
+
+
+def _derived(
+    model: EquivalentModel,
+    solved: Solved,
+    at: Integer[np.ndarray, " sample"],
+    weights: Float[np.ndarray, "sample disc pin"],
+) -> Derived:
+    """Return what presses, and the derivatives of the weighted sum of the forces at one angle of every sample."""
+    torque = _least_torque(model.reducer)
+    errors = solved.equilibria.errors
+    found = model.at_torque(torque).pin_force_derivatives(errors, torque, TURN_ANGLES, at, weights)
+    return _preload_of(model.reducer, solved), found.by_error
 
 
 @lru_cache(maxsize=256)

@@ -1,6 +1,6 @@
 """The equivalent model as a response with several outputs: all that requirements limit, and the waves of its orders.
 
-Exact derivatives of what is read off torque against twist: lost motion, backlash, torsional stiffness.
+Exact derivatives of all but the peak-to-peak that have them: off torque against twist, without torque, tip and root.
 """
 
 from __future__ import annotations
@@ -29,8 +29,16 @@ from tolalloc.reducers import (
 from tolalloc.reducers.equivalent import hysteresis
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, friction_loop, hysteresis_loop
 from tolalloc.reducers.equivalent.model import EquivalentModel, Status
-from tolalloc.reducers.equivalent.outputs import OUTPUTS, Solved, peak_line_load, radial_clearance, unit_pressure, waves
-from tolalloc.reducers.equivalent.perfect import preload
+from tolalloc.reducers.equivalent.outputs import (
+    OUTPUTS,
+    Solved,
+    peak_line_load,
+    radial_clearance,
+    radial_clearance_derivatives,
+    unit_pressure,
+    waves,
+)
+from tolalloc.reducers.equivalent.perfect import friction_torque_derivatives, pin_force_derivatives, preload
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.reducers.settings import at
@@ -258,56 +266,25 @@ class OutputsResponse:
         )
 
 
-DIFFERENTIABLE = (LOST_MOTION, BACKLASH, TORSIONAL_STIFFNESS)
-"""Outputs that `loop_derivatives` takes."""
-
-Width = tuple[Float[np.ndarray, " chunk"], Float[np.ndarray, "chunk all_columns"]]
-"""Twist between both directions of a torque, mean over the turn, and its derivatives [rad, rad/m]."""
+Derived = tuple[Float[np.ndarray, " chunk"], Float[np.ndarray, "chunk all_columns"], UInt8[np.ndarray, " chunk"]]
+"""An output of a chunk, its derivatives by all error columns of the model, and the worst status of every sample."""
 
 
-def loop_derivatives(
-    kernel: KernelResponse, output: str, x: Float[np.ndarray, "sample column"]
-) -> tuple[Evaluation, Float[np.ndarray, "sample all_columns"]]:
-    """Return one of `DIFFERENTIABLE` of every sample, and its derivatives by all error columns of the model.
-
-    They take two to four times as long as the output alone: the adjoint of the equilibrium at every angle and torque.
-
-    Own derivation, theory page (23): the width is θ(T) − θ(−T), its derivative the difference of the adjoints'; of
-    K = 2·0.97·T/(w₁ − w₃) [N·m/arcmin] it is −K/(w₁ − w₃)·∂(w₁ − w₃). They hold while the same pins carry.
-
-    Examples
-    --------
-    The larger the pins, the less backlash teeth have that are ground 20 µm deeper [arcmin/µm]:
-
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
-    >>> rest = {name: 0.0 for name in model.columns} | {"modification.equidistant": 20e-6}
-    >>> del rest["pin.diameter"]
-    >>> kernel = KernelResponse(model=model, torque=-1.0, columns=("pin.diameter",), fixed=rest)
-    >>> _, slopes = loop_derivatives(kernel, BACKLASH, np.zeros((1, 1)))
-    >>> round(1e-6 * float(slopes[0, model.columns.index("pin.diameter")]), 4)
-    -0.1894
-    """
-    values, slopes, status = np.empty((len(x), 1)), np.empty((len(x), len(kernel.model.columns))), np.empty(len(x))
-    for rows, ((value, slope), worst) in map_chunks(partial(_derived, kernel.alone, output), x, kernel.mapper):
-        values[rows, 0], slopes[rows], status[rows] = value, slope, worst
-        kernel.observe(worst)
-    return Evaluation(values=values, status=status.astype(np.uint8)), slopes
-
-
-def _derived(
-    kernel: KernelResponse, output: str, x: Float[np.ndarray, "chunk column"]
-) -> tuple[Width, UInt8[np.ndarray, " chunk"]]:
-    model, errors = kernel.model, kernel.errors(x)
+def _loop_derivatives(output: str, model: EquivalentModel, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
     if output != TORSIONAL_STIFFNESS:
         share = hysteresis.LOST_MOTION if output == LOST_MOTION else hysteresis.BACKLASH
         (width, slope), status = _width(model, errors, share)
-        return (width / ARCMINUTE, slope / ARCMINUTE), status
+        return width / ARCMINUTE, slope / ARCMINUTE, status
     (low, by_low), first = _width(model, errors, hysteresis.LOST_MOTION)
     (high, by_high), second = _width(model, errors, 1.0)
     rated = model.reducer.load.rated_torque
     stiffness = 2.0 * (1.0 - hysteresis.LOST_MOTION) * rated / (high - low) * ARCMINUTE
-    return (stiffness, -(stiffness / (high - low))[:, np.newaxis] * (by_high - by_low)), np.maximum(first, second)
+    by_error = -(stiffness / (high - low))[:, np.newaxis] * (by_high - by_low)
+    return stiffness, by_error, np.maximum(first, second)
+
+
+Width = tuple[Float[np.ndarray, " chunk"], Float[np.ndarray, "chunk all_columns"]]
+"""Twist between both directions of a torque, mean over the turn, and its derivatives [rad, rad/m]."""
 
 
 def _width(
@@ -325,3 +302,65 @@ def _width(
         slope += side * found.by_error.reshape(*twist.shape, -1).mean(axis=1)
         np.maximum(status, found.status.reshape(twist.shape).max(axis=1), out=status)
     return (width, slope), status
+
+
+def _pin_force_derivatives(model: EquivalentModel, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
+    found, slopes = pin_force_derivatives(model, errors)
+    return found.pin_force, slopes, found.status
+
+
+def _friction_derivatives(model: EquivalentModel, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
+    found, slopes = friction_torque_derivatives(model, errors)
+    return found.friction_torque, slopes, found.status
+
+
+def _clearance_derivatives(model: EquivalentModel, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
+    clearance, status = _radial_clearance(model, errors, 0.0)
+    return clearance[:, 0], radial_clearance_derivatives(model, errors) / MICROMETRE, status
+
+
+_DERIVED: dict[str, Callable[[EquivalentModel, Float[np.ndarray, "chunk all_columns"]], Derived]] = {
+    **{name: partial(_loop_derivatives, name) for name in (LOST_MOTION, BACKLASH, TORSIONAL_STIFFNESS)},
+    PRELOAD: _pin_force_derivatives,
+    FRICTION_TORQUE: _friction_derivatives,
+    RADIAL_CLEARANCE: _clearance_derivatives,
+}
+
+DIFFERENTIABLE = tuple(_DERIVED)
+"""Outputs that `output_derivatives` takes."""
+
+
+def output_derivatives(
+    kernel: KernelResponse, output: str, x: Float[np.ndarray, "sample column"]
+) -> tuple[Evaluation, Float[np.ndarray, "sample all_columns"]]:
+    """Return one of `DIFFERENTIABLE` of every sample, and its derivatives by all error columns of the model.
+
+    What is read off torque against twist takes two to four times as long as the output alone, the adjoint of the
+    equilibrium at every angle and torque; what presses without torque hardly longer, one adjoint.
+
+    Own derivation, theory page (23): the width of a loop is θ(T) − θ(−T), its derivative the difference of the
+    adjoints'; of K = 2·0.97·T/(w₁ − w₃) [N·m/arcmin] it is −K/(w₁ − w₃)·∂(w₁ − w₃). They hold while the same pins
+    carry.
+
+    Examples
+    --------
+    The larger the pins, the less backlash teeth have that are ground 20 µm deeper [arcmin/µm]:
+
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
+    >>> rest = {name: 0.0 for name in model.columns} | {"modification.equidistant": 20e-6}
+    >>> del rest["pin.diameter"]
+    >>> kernel = KernelResponse(model=model, torque=-1.0, columns=("pin.diameter",), fixed=rest)
+    >>> _, slopes = output_derivatives(kernel, BACKLASH, np.zeros((1, 1)))
+    >>> round(1e-6 * float(slopes[0, model.columns.index("pin.diameter")]), 4)
+    -0.1894
+    """
+    values, slopes, status = np.empty((len(x), 1)), np.empty((len(x), len(kernel.model.columns))), np.empty(len(x))
+    for rows, (value, slope, worst) in map_chunks(partial(_derived, kernel.alone, output), x, kernel.mapper):
+        values[rows, 0], slopes[rows], status[rows] = value, slope, worst
+        kernel.observe(worst)
+    return Evaluation(values=values, status=status.astype(np.uint8)), slopes
+
+
+def _derived(kernel: KernelResponse, output: str, x: Float[np.ndarray, "chunk column"]) -> Derived:
+    return _DERIVED[output](kernel.model, kernel.errors(x))

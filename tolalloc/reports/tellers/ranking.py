@@ -79,7 +79,6 @@ class RankingTeller(Teller[RankingResult]):
             *_drivers(found.dimensions or found.indices),
             *self._per_micrometre(),
             converged(found.sobol.convergence),
-            *self._replicated(),
             *self._orders(),
             *self._uncertain(),
             self._rejects(),
@@ -140,18 +139,6 @@ class RankingTeller(Teller[RankingResult]):
         if self.result.limits[self.result.leading].width is None:
             return f"{number(read, digits)}{self._sign}"
         return _say("value_beyond" if read > 0 else "value_inside", value=number(abs(read), digits), sign=self._sign)
-
-    def _replicated(self) -> Iterator[str]:
-        """Yield what a second seed made of the promised orders, if any was promised."""
-        found = self.result.replication
-        if found.promised:
-            yield _say(
-                "replication",
-                reproduced=found.reproduced,
-                promised=found.promised,
-                confidence=found.confidence,
-                share=found.share,
-            )
 
     def _per_micrometre(self) -> Iterator[str]:
         """Yield the order per micrometre, and why it is not that of the ranking, if a zone weighs in it."""
@@ -291,15 +278,13 @@ class RankingTeller(Teller[RankingResult]):
         return tuple(self._warnings())
 
     def _warnings(self) -> Iterator[str]:
-        result, replication = self.result, self.result.replication
+        result = self.result
         if self.header.quick:
             yield QUICK_RUN
         if not result.sobol.convergence.stable:
             yield _say("unsettled")
         if result.errors.is_correlated:
             yield _say("correlated")
-        if replication.promised and replication.share < replication.confidence:
-            yield _say("not_replicated")
         if result.design is not SamplingDesign.MONTE_CARLO:
             yield _say("spread", design=result.design.value)
         if not result.reject.is_limit:
@@ -463,8 +448,6 @@ class RankingTeller(Teller[RankingResult]):
             "Sobol blocks dropped [-]": sobol.dropped,
             "samples of the Sobol analysis [-]": sobol.samples,
             "order of the first places is stable": sobol.convergence.stable,
-            "pairs promised [-]": result.replication.promised,
-            "pairs a second seed shows [-]": result.replication.reproduced,
             "requirements": self._requirements.replace({np.nan: None}).to_dict("records"),
             "probability beyond the limit [-]": beyond.estimate.probability,
             "yield [-]": beyond.interval.estimate,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -21,10 +21,6 @@ from tolalloc.models.model import Evaluation
 
 _UNITS_AT_ONCE = 512
 """Units whose terms are in memory at a time [-]."""
-_TERMS_AT_ONCE = 512
-"""Terms of all units that are in memory at a time [-]."""
-_LEAST_VARIANCE = 10 * np.finfo(float).eps
-"""Variance of a term of standardised columns below which it is rounding [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +50,7 @@ def fit_quadratic_form(
     x, y
         Columns and outputs of the units to learn from.
     strength
-        Of the ridge: the square of a standardised weight costs as much as so many squared errors [-].
+        Of the ridge: the square of a weight costs as much as so many squared errors [-].
 
     Notes
     -----
@@ -62,7 +58,8 @@ def fit_quadratic_form(
 
     References
     ----------
-    Hoerl & Kennard 1970, Technometrics 12, 55–67: w = (TᵀT + strength·I)⁻¹·Tᵀ·y of standardised terms T.
+    Hoerl & Kennard 1970, Technometrics 12, 55–67: w = (TᵀT + strength·I)⁻¹·Tᵀ·y of centred terms T, or
+    from the products of units w = Tᵀ·(T·Tᵀ + strength·I)⁻¹·y (Saunders, Gammerman & Vovk 1998).
 
     Examples
     --------
@@ -74,79 +71,51 @@ def fit_quadratic_form(
     """
     middle, deviation = x.mean(axis=0), x.std(axis=0)
     spread = np.where(deviation > 0, deviation, 1.0)
-    first, second = np.triu_indices(x.shape[1])
-    terms = _Terms((x - middle) / spread, first, second)
-    centred = y - y.mean(axis=0)
-    weights = (_by_terms if terms.count <= x.shape[0] else _by_units)(terms, centred, strength)
-    curvature = np.zeros((y.shape[1], x.shape[1], x.shape[1]))
-    curvature[:, first, second] = weights[x.shape[1] :].T
-    return QuadraticForm(
-        middle=middle,
-        spread=spread,
-        offset=y.mean(axis=0) - terms.means @ weights,
-        slopes=weights[: x.shape[1]],
-        curvature=curvature,
-    )
+    u, mean = (x - middle) / spread, y.mean(axis=0)
+    first, second = np.triu_indices(u.shape[1])
+    fewer_terms = u.shape[1] + first.size <= u.shape[0]
+    slopes, products = (_by_terms if fewer_terms else _by_units)(u, y - mean, strength)
+    curvature = np.zeros((y.shape[1], u.shape[1], u.shape[1]))
+    curvature[:, first, second] = products[:, first, second]
+    # The mean of a product is a moment of the columns.
+    offset = mean - u.mean(axis=0) @ slopes - np.einsum("oij,ij->o", curvature, u.T @ u / u.shape[0])
+    return QuadraticForm(middle=middle, spread=spread, offset=offset, slopes=slopes, curvature=curvature)
 
 
-class _Terms:
-    """Columns and all products of two, some at a time: those of 5,000 units and 60 columns together are 70 MiB."""
-
-    def __init__(
-        self,
-        u: Float[np.ndarray, "unit column"],
-        first: Int[np.ndarray, " product"],
-        second: Int[np.ndarray, " product"],
-    ) -> None:
-        self.u, self.first, self.second = u, first, second
-        self.count = u.shape[1] + first.size
-        # The mean of a product is a moment of the columns.
-        self.means = np.concatenate([u.mean(axis=0), (u.T @ u / u.shape[0])[first, second]])
-
-    def of_units(self) -> Iterator[tuple[slice, Float[np.ndarray, "unit term"]]]:
-        """Yield all terms of some units, less their means."""
-        for start in range(0, self.u.shape[0], _UNITS_AT_ONCE):
-            units = slice(start, start + _UNITS_AT_ONCE)
-            u = self.u[units]
-            yield units, np.concatenate([u, u[:, self.first] * u[:, self.second]], axis=1) - self.means
-
-    def of_all_units(self) -> Iterator[tuple[slice, Float[np.ndarray, "unit term"]]]:
-        """Yield some terms of all units, less their means."""
-        for start in range(0, self.count, _TERMS_AT_ONCE):
-            terms = np.arange(start, min(start + _TERMS_AT_ONCE, self.count))
-            alone, products = terms[terms < self.u.shape[1]], terms[terms >= self.u.shape[1]] - self.u.shape[1]
-            u = [self.u[:, alone], self.u[:, self.first[products]] * self.u[:, self.second[products]]]
-            own = slice(start, start + terms.size)
-            yield own, np.concatenate(u, axis=1) - self.means[own]
+Weights = tuple[Float[np.ndarray, "column output"], Float[np.ndarray, "output column column"]]
+"""Weights of the columns and of their products of two, of which the upper triangle counts [output]."""
 
 
-def _by_terms(terms: _Terms, y: Float[np.ndarray, "unit output"], strength: float) -> Float[np.ndarray, "term output"]:
-    """Return the ridge's weights from the products of all terms with each other."""
-    gram = np.zeros((terms.count, terms.count), order="F")  # what stands below its diagonal is not looked at
-    right = np.zeros((terms.count, y.shape[1]))
-    for units, own in terms.of_units():
-        gram = dsyrk(1.0, own.T, beta=1.0, c=gram, overwrite_c=True)
-        right += own.T @ y[units]
-    scale = _scale(np.diag(gram) / y.shape[0])[:, np.newaxis]
-    gram /= scale.T
-    gram /= scale
-    gram[np.diag_indices(terms.count)] += strength
-    return np.asarray(cho_solve(cho_factor(gram, overwrite_a=True), right / scale) / scale)
+def _by_terms(u: Float[np.ndarray, "unit column"], y: Float[np.ndarray, "unit output"], strength: float) -> Weights:
+    """Return the ridge's weights from the products of all terms with each other, some units at a time."""
+    first, second = np.triu_indices(u.shape[1])
+    count, columns = u.shape[1] + first.size, u.shape[1]
+    means = np.concatenate([u.mean(axis=0), (u.T @ u / u.shape[0])[first, second]])
+    gram = np.zeros((count, count), order="F")  # what stands below its diagonal is not looked at
+    right = np.zeros((count, y.shape[1]))
+    for start in range(0, u.shape[0], _UNITS_AT_ONCE):
+        own = u[start : start + _UNITS_AT_ONCE]
+        terms = np.concatenate([own, own[:, first] * own[:, second]], axis=1) - means
+        gram = dsyrk(1.0, terms.T, beta=1.0, c=gram, overwrite_c=True)
+        right += terms.T @ y[start : start + _UNITS_AT_ONCE]
+    gram[np.diag_indices(count)] += strength
+    weights = cho_solve(cho_factor(gram, overwrite_a=True), right)
+    products = np.zeros((y.shape[1], columns, columns))
+    products[:, first, second] = weights[columns:].T
+    return weights[:columns], products
 
 
-def _by_units(terms: _Terms, y: Float[np.ndarray, "unit output"], strength: float) -> Float[np.ndarray, "term output"]:
-    """Return the same from the products of all units with each other, where there are fewer units than terms."""
-    gram = np.asfortranarray(strength * np.eye(y.shape[0]))
-    for _, own in terms.of_all_units():
-        gram = dsyrk(1.0, own / _scale((own**2).mean(axis=0)), beta=1.0, c=gram, overwrite_c=True)
+def _by_units(u: Float[np.ndarray, "unit column"], y: Float[np.ndarray, "unit output"], strength: float) -> Weights:
+    """Return the same from the products of all units with each other, where there are fewer units than terms.
+
+    The products of two of a unit times those of another one are ½·((uᵀv)² + Σ uᵢ²·vᵢ²): no term is ever formed.
+    """
+    alike = u @ u.T
+    gram = alike + (alike**2 + u**2 @ (u**2).T) / 2
+    gram += gram.mean() - gram.mean(axis=0) - gram.mean(axis=0)[:, np.newaxis]
+    gram[np.diag_indices(len(gram))] += strength
     by_unit = cho_solve(cho_factor(gram, overwrite_a=True), y)
-    weights = ((own.T @ by_unit).T / (_scale((own**2).mean(axis=0)) ** 2) for _, own in terms.of_all_units())
-    return np.concatenate([own.T for own in weights])
-
-
-def _scale(variance: Float[np.ndarray, " term"]) -> Float[np.ndarray, " term"]:
-    """Return the standard deviation of terms, 1 where they do not vary."""
-    return np.sqrt(np.where(variance > _LEAST_VARIANCE, variance, 1.0))
+    return u.T @ by_unit, np.stack([(u * own[:, np.newaxis]).T @ u for own in by_unit.T])
 
 
 HELD_OUT = 0.2

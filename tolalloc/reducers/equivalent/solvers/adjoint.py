@@ -1,7 +1,7 @@
 """Exact derivatives of the transmission error by every value and every stiffness, at the converged contact set.
 
 At equilibrium the carrier rotation is w·q + t·v with the energy's gradient zero: one solve of its tangent for the
-adjoint λ gives the derivative by everything that moves the gradient.
+adjoint λ gives the derivative by everything that moves the gradient. A weighted sum of pin forces goes the same way.
 
 An extreme of the curve is a kink, where a branch A that rises with the angle meets a branch B that falls. Its value
 follows from A(θ, ε) = B(θ, ε), so its derivative is the mean of both branches' derivatives, each weighted by the
@@ -24,16 +24,32 @@ _AT_ONCE = 32  # samples that a thread takes together
 
 
 @jit
-def _adjoint(problem, work, carrier_by_retained, q, adjoint):
-    """Solve tangent·λ = carrier row at the equilibrium q; the compressions stay in the work space."""
+def _adjoint(problem, work, carrier_by_retained, carrier, of_pins, q, adjoint):
+    """Solve tangent·λ = ∂(carrier·rotation + Σ of_pin·force)/∂q at the equilibrium q.
+
+    The compressions stay in the work space.
+    """
     compress(problem, q, work.compression, work.play)
     assemble(problem, work.compression, work.play, q, work.gradient, work.tangent)
-    solve_tangent(work.tangent, -carrier_by_retained, adjoint)
+    aim, pins = -carrier * carrier_by_retained, problem.by_disc.shape[2]
+    for c in range(of_pins.size):
+        if of_pins[c] == 0.0:
+            continue
+        d, k = c // pins, c % pins
+        _, slope = pin_force(
+            problem.law, problem.contact[c], problem.log_length[c], problem.half_tilt[c], work.compression[c]
+        )
+        for i in range(3):
+            aim[3 * d + i] -= of_pins[c] * slope * problem.by_disc[d, i, k]
+    solve_tangent(work.tangent, aim, adjoint)
 
 
 @jit_in_place
-def _pin_adjoints(problem, work, adjoint, tilt_by_pin, weight_of_pin):
-    """Set −λ·∂gradient/∂compression of every pin and its derivative by half the tilt; return the derivative by ln C."""
+def _pin_adjoints(problem, work, of_pins, adjoint, tilt_by_pin, weight_of_pin):
+    """Set the derivative by every pin's compression and by half its tilt; return that by ln C.
+
+    It is that of the sum of forces itself, less λ·∂gradient/∂compression.
+    """
     by_stiffness = 0.0
     pins = problem.by_disc.shape[2]
     for c in range(weight_of_pin.size):
@@ -41,7 +57,7 @@ def _pin_adjoints(problem, work, adjoint, tilt_by_pin, weight_of_pin):
         force, slope = pin_force(
             problem.law, problem.contact[c], problem.log_length[c], problem.half_tilt[c], work.compression[c]
         )
-        lever = 0.0
+        lever = -of_pins[c]
         for i in range(3):
             lever += problem.by_disc[d, i, k] * adjoint[3 * d + i]
         weight_of_pin[c] = -slope * lever
@@ -88,11 +104,11 @@ def _add_tilt(problem, turn, face_width, layout, values, tilt_by_pin, factor, ou
 
 
 @jit_in_place
-def _add_rows(at, weight, tables, layout, values, q, adjoint, play_pull, own_play, out, by_row):
+def _add_rows(at, weight, carrier, tables, layout, values, q, adjoint, play_pull, own_play, out, by_row):
     """Add the derivative by the spring rows' values and by all their stiffnesses at one node."""
     rows, elements = tables.row_stiffness.shape[1], tables.play_stiffness.shape[1]
     for m in range(layout.torque + 1):
-        value = tables.carrier_by_load[at, m]
+        value = carrier * tables.carrier_by_load[at, m]
         for i in range(q.size):
             value += tables.load[at, m, i] * adjoint[i]
         for e in range(elements):
@@ -101,7 +117,7 @@ def _add_rows(at, weight, tables, layout, values, q, adjoint, play_pull, own_pla
         out[m] += weight * value
     for r in range(rows):
         # A row's adjoint compression: through the retained coordinates and, at the torque's place, through the others.
-        compression, lever = 0.0, tables.row_by_load[at, r, layout.torque]
+        compression, lever = 0.0, carrier * tables.row_by_load[at, r, layout.torque]
         for m in range(layout.torque + 1):
             compression += tables.row_by_load[at, r, m] * values[m]
         for i in range(q.size):
@@ -113,17 +129,17 @@ def _add_rows(at, weight, tables, layout, values, q, adjoint, play_pull, own_pla
 
 
 @jit
-def _add_derivative(position, factor, tables, layout, design, values, memory, derivative, s):
-    """Add factor times the derivatives of the carrier rotation at one position; return the equilibrium's status."""
+def _add_derivative(position, factor, carrier, of_pins, tables, layout, design, values, memory, derivative, s):
+    """Add factor times the derivatives of carrier·rotation + Σ of_pin·force at one position; return the status."""
     problem, work, _, carrier_by_retained = memory
     q, adjoint = np.zeros(work.step.size), np.empty(work.step.size)
     rotation, status, _, _ = solve_between(position, tables, layout, design.face_width, values, q, memory)
     if status != CONVERGED:
         return status
     derivative.rotation[s] += factor * rotation
-    _adjoint(problem, work, carrier_by_retained, q, adjoint)
+    _adjoint(problem, work, carrier_by_retained, carrier, of_pins, q, adjoint)
     weight_of_pin, tilt_by_pin = np.empty(problem.contact.size), np.empty(problem.contact.size)
-    derivative.by_pin[s] += factor * _pin_adjoints(problem, work, adjoint, tilt_by_pin, weight_of_pin)
+    derivative.by_pin[s] += factor * _pin_adjoints(problem, work, of_pins, adjoint, tilt_by_pin, weight_of_pin)
     elements = problem.clearance.size
     play_pull, own_play = np.zeros((elements, 2)), np.zeros(elements)
     for e in range(elements):
@@ -145,7 +161,7 @@ def _add_derivative(position, factor, tables, layout, design, values, memory, de
         turn += weights[node] * tables.turn[at]
         _add_pins(at, weight, tables, layout, weight_of_pin, derivative.by_value[s])
         _add_rows(
-            at, weight, tables, layout, values, q, adjoint, play_pull, own_play,
+            at, weight, carrier, tables, layout, values, q, adjoint, play_pull, own_play,
             derivative.by_value[s], derivative.by_row[s],
         )  # fmt: skip
     _add_tilt(problem, turn, design.face_width, layout, values, tilt_by_pin, factor, derivative.by_value[s])
@@ -173,7 +189,7 @@ def _clear(derivative, s, value):
 @jit
 def _peak_to_peaks(first, last, tables, layout, mapped, design, errors, torque, position, step, derivative):
     memory = make_memory(design.law, tables)
-    values, q = np.empty((1, layout.end)), np.empty(tables.load.shape[2])
+    values, q, no_pins = np.empty((1, layout.end)), np.empty(tables.load.shape[2]), np.zeros(memory[0].contact.size)
     for s in range(first, last):
         if not np.isfinite(position[s]).all():
             _clear(derivative, s, np.nan)
@@ -188,21 +204,35 @@ def _peak_to_peaks(first, last, tables, layout, mapped, design, errors, torque, 
             fall = max(-sign * _slope(behind, step, tables, layout, design, values[0], memory, q), 0.0)
             share = rise / (rise + fall) if rise + fall > 0.0 else 0.5
             for at, factor in ((before, sign * (1.0 - share)), (behind, sign * share)):
-                outcome = _add_derivative(at, factor, tables, layout, design, values[0], memory, derivative, s)
+                given = (tables, layout, design, values[0], memory, derivative, s)
+                outcome = _add_derivative(at, factor, 1.0, no_pins, *given)
                 derivative.status[s] = max(derivative.status[s], outcome)
 
 
 @jit
 def _rotations(first, last, tables, layout, mapped, design, errors, torque, position, derivative):
     memory, values = make_memory(design.law, tables), np.empty((1, layout.end))
+    no_pins = np.zeros(memory[0].contact.size)
     for s in range(first, last):
         sample, angle = s // position.size, s % position.size
         _clear(derivative, s, 0.0)
         derivative.status[s] = NOT_FINITE
         if values_of(errors[sample : sample + 1], torque[sample], layout, mapped, values)[0]:
             memory[2].first[:] = -1
-            at = position[angle]
-            derivative.status[s] = _add_derivative(at, 1.0, tables, layout, design, values[0], memory, derivative, s)
+            given = (tables, layout, design, values[0], memory, derivative, s)
+            derivative.status[s] = _add_derivative(position[angle], 1.0, 1.0, no_pins, *given)
+
+
+@jit
+def _pin_forces(first, last, tables, layout, mapped, design, errors, torque, position, of_pins, derivative):
+    memory, values = make_memory(design.law, tables), np.empty((1, layout.end))
+    for s in range(first, last):
+        _clear(derivative, s, 0.0)
+        derivative.status[s] = NOT_FINITE
+        if values_of(errors[s : s + 1], torque, layout, mapped, values)[0]:
+            memory[2].first[:] = -1
+            given = (tables, layout, design, values[0], memory, derivative, s)
+            derivative.status[s] = _add_derivative(position[s], 1.0, 0.0, of_pins[s], *given)
 
 
 def solve_peak_to_peak_derivatives(
@@ -241,3 +271,23 @@ def solve_rotation_derivatives(
         _rotations(part.start, part.stop, *given, position, derivative)
 
     in_threads(solve, errors.shape[0] * position.size, _AT_ONCE)
+
+
+def solve_pin_force_derivatives(
+    tables: Any,
+    layout: Any,
+    mapped: Any,
+    design: Any,
+    errors: Any,
+    torque: Any,
+    position: Any,
+    of_pins: Any,
+    derivative: Any,
+) -> None:
+    """Fill the derivatives of a weighted sum of every sample's pin forces at one position, disc by disc."""
+
+    def solve(part: slice) -> None:
+        given = (tables, layout, mapped, design, errors, torque)
+        _pin_forces(part.start, part.stop, *given, position, of_pins, derivative)
+
+    in_threads(solve, errors.shape[0], _AT_ONCE)

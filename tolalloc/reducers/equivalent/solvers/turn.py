@@ -45,6 +45,9 @@ def make_turn(samples: Any, angles: Any, retained: Any) -> SolvedTurn:
     )
 
 
+_AT_ONCE = 8  # samples whose forces a thread takes together
+
+
 @jit
 def _give_up(turn, s):
     turn.rotation[s], turn.residual[s], turn.status[s], turn.touching[s] = np.nan, np.inf, NOT_FINITE, 0
@@ -191,12 +194,18 @@ def solve_curves(
 
 
 @jit
-def _forces_of_sample(tables, layout, mapped, design, errors, torque, status, retained, pins, rows, elements):
-    own = np.empty((1, layout.end))
-    values_of(errors, torque, layout, mapped, own)
-    values = own[0]
-    memory = make_memory(design.law, tables)
-    problem_memory, work = memory[0], memory[1]
+def _forces(first, last, tables, layout, mapped, design, errors, torque, status, retained, pins, rows, elements):
+    memory, own = make_memory(design.law, tables), np.empty((1, layout.end))
+    for s in range(first, last):
+        values_of(errors[s : s + 1], torque, layout, mapped, own)
+        given = (tables, layout, design, own[0], memory[0], memory[1])
+        _forces_of_sample(*given, status[s], retained[s], pins[s], rows[s], elements[s])
+
+
+@jit
+def _forces_of_sample(
+    tables, layout, design, values, problem_memory, work, status, retained, pins, rows, elements
+):  # fmt: skip
     discs, count = pins.shape[1:]
     for at in range(status.size):
         if status[at] != CONVERGED:
@@ -239,8 +248,7 @@ def solve_forces(
     """Fill the `Forces` of all samples at all nodes of the tables."""
 
     def fill(part: slice) -> None:
-        s = part.start
-        own = (status[s], retained[s], pins[s], rows[s], elements[s])
-        _forces_of_sample(tables, layout, mapped, design, errors[part], torque, *own)
+        given = (tables, layout, mapped, design, errors, torque)
+        _forces(part.start, part.stop, *given, status, retained, pins, rows, elements)
 
-    in_threads(fill, errors.shape[0], 1)
+    in_threads(fill, errors.shape[0], _AT_ONCE)

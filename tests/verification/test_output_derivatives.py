@@ -1,4 +1,4 @@
-"""Exact derivatives of lost motion, backlash and torsional stiffness, against central differences of these outputs."""
+"""Exact derivatives of all outputs that have them, against central differences of these outputs."""
 
 from __future__ import annotations
 
@@ -58,4 +58,5 @@ def test_they_are_the_differences_of_the_output(case, output):
     for at, step in enumerate(np.diag([1e-3, 1e-3])):
         ahead, behind = (model.at(settings + side * step).reading((output,))(x).values[:, 0] for side in (1, -1))
         slope = found.by_setting[:, at]
-        assert np.median(np.abs((ahead - behind) / 2e-3 - slope)) < 1e-4 * np.abs(slope).mean()
+        # The gap at tip and root does not feel the flank clearance.
+        assert np.median(np.abs((ahead - behind) / 2e-3 - slope)) < 1e-4 * np.abs(slope).mean() + 1e-12
