@@ -218,3 +218,28 @@ def test_a_function_that_is_linear_but_for_a_rare_jump_is_judged_by_its_units():
     a, b = np.random.default_rng(4).standard_normal((2, 2_000_000)) * np.array([[zones["a"]], [zones["b"]]])
     kept = np.mean(jumps(a, b) <= 0.1)
     assert not found.met or kept > 0.9973 - 3 * np.sqrt(0.0027 / a.size)
+
+
+def test_the_bound_of_two_limits_at_once_lies_just_below_their_optimum():
+    """y = a, z = b, each below 0.1 with 1/zone its cost: by symmetry each fails (1 − √0.9973) of the units.
+
+    Failures of independent outputs hardly coincide. The bound of each limit alone lies at z(0.0027)/z(0.00135) of that.
+    """
+
+    def apart(a, b):
+        return a, b
+
+    names, limit = ("y [mm]", "z [mm]"), ta.Limit(upper=0.1, show=ta.AtYield(0.9973))
+    study = ta.Study(
+        ta.model(apart, inputs=("a", "b"), outputs=names),
+        drawing({"a": (0.0, 0.1, 1.0), "b": (0.0, 0.1, 1.0)}),
+        limits=dict.fromkeys(names, limit),
+        questions=[ta.Allocation(front=False, what_if=False)],
+        seed=3,
+    )
+    found = study.allocate(effort="quick").result
+    alone, both = (2 * norm.isf(own) / 3 for own in (0.0027, 1 - np.sqrt(0.9973)))
+    assert found.met
+    assert not found.bound_is_certified
+    assert alone < found.bound < both < found.cost
+    assert found.bound > 0.99 * both

@@ -88,7 +88,7 @@ def test_derivatives_by_the_settings_are_those_by_the_amounts_that_they_mean(mod
         expected = own.by_modification @ (np.subtract(*amounts) / 2)
         np.testing.assert_allclose(found.by_setting[:, at], expected, rtol=1e-9, atol=1e-12)
     with pytest.raises(UnknownNameError):
-        model.derivatives(RADIAL, x)
+        model.derivatives("peak pressure, rated torque [MPa]", x)
 
 
 @pytest.mark.slow

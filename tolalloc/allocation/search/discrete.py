@@ -515,7 +515,11 @@ def _least_cost(grid: _Grid, chosen: VerifiedDesign) -> float:
         found = grid.problem(stacks).solve()
         return (found.bound, grid.design(found)) if found else None
 
-    return least_cost(chosen, cheapest)
+    def near_by(stacks: tuple[Stack, ...]) -> float:
+        found = cheapest(stacks)
+        return found[0] if found else np.inf
+
+    return least_cost(chosen, cheapest, near_by)
 
 
 def _proof(grid: _Grid, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...]) -> DiscreteSolution:

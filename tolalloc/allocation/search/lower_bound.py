@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -9,15 +10,30 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.search import process_choice
-from tolalloc.allocation.space.joint_yield import JointRequirement
+from tolalloc.allocation.search.lagrange_dual import cost_bound
+from tolalloc.allocation.space.joint_yield import JointCheck, JointRequirement
 from tolalloc.allocation.space.output_sample import LimitedSample
 from tolalloc.allocation.space.problem import OneSidedConstraint, Solution, Stack, root_sum_square_stack
-from tolalloc.allocation.space.requirement import Check, QuantileBound, RootSumSquare, Sampled
+from tolalloc.allocation.space.requirement import AtYield, Check, QuantileBound, RootSumSquare, Sampled
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.capability.monte_carlo import CONFIDENCE
 
 _ROUNDING = 1e-9
 """Part of a budget by which a load that is its own budget may lie beyond it [-]."""
+_COUNTS = 0.05
+"""Part of the failures below which a limit hardly counts [-]."""
+_CUTS = 10
+"""Cuts of boxes of divisions [-]."""
+_COUNTED = 100.0
+"""Failing units that tell how many failures coincide [-]."""
+_WIDEST = 0.25
+"""The same of all units, at most [-]."""
+
+_LEAST_WORTH = 0.1
+"""Worth of a budget, over the largest one, from which its price is looked for [-]."""
+
+Rises = Float[np.ndarray, " limit"]
+"""By how much every limit is further in [unit of its output]."""
 
 Cheapest = Callable[[tuple[Stack, ...]], tuple[float, Float[np.ndarray, " variable"]] | None]
 """Returns a lower bound on the cost of what keeps some stacks [cost units] and the design, none if nothing does."""
@@ -58,25 +74,41 @@ def lower_bound(design: VerifiedDesign) -> LowerBound:
     >>> round(lower_bound(verifier.verify(verifier.space.uniform(1.0), "as drawn")).cost, 4)
     1.9731
     """
-    space = design.space
+    space, solved = design.space, list[Solution]()
 
     def cheapest(stacks: tuple[Stack, ...]) -> tuple[float, Float[np.ndarray, " variable"]] | None:
         found = process_choice.allocate(space.problem(stacks))
         if not isinstance(found, Solution):
             return None
+        solved.append(found)
         return found.bound, np.concatenate([found.zones, found.shared])
 
+    def near_by(stacks: tuple[Stack, ...]) -> float:
+        problem, worth = space.problem(stacks), solved[-1].prices
+        # A limit that costs nothing where it is may cost something further in.
+        least = _LEAST_WORTH * float((worth * problem.scales).max(initial=0.0)) / problem.scales
+        return cost_bound(problem, np.maximum(worth, least), solved[-1].zones)
+
     return LowerBound(
-        cost=least_cost(design, cheapest) + space.locked_cost,
+        cost=least_cost(design, cheapest, near_by) + space.locked_cost,
         confidence=CONFIDENCE,
         certified=_is_certified(design),
     )
 
 
-def least_cost(design: VerifiedDesign, cheapest: Cheapest) -> float:
+def least_cost(design: VerifiedDesign, cheapest: Cheapest, near_by: Callable[[tuple[Stack, ...]], float]) -> float:
     """Return the least cost of what keeps the weaker requirements, whatever chooses it [cost units].
 
     At most that of the design itself, which may keep them by more than its own cost tells.
+
+    Parameters
+    ----------
+    design
+        A verified design.
+    cheapest
+        What chooses the design.
+    near_by
+        Lower bound on the cost of what keeps stacks that are tighter than those chosen for last [cost units].
 
     Notes
     -----
@@ -85,6 +117,9 @@ def least_cost(design: VerifiedDesign, cheapest: Cheapest) -> float:
 
     min(own cost, cost of what keeps Σ load ≤ budget) (own derivation).
 
+    Of limits that are kept at once, every design divides the failures in some way: the least of all ways is taken, by
+    branch and bound (`_least_of_divisions`).
+
     Examples
     --------
     What chooses nothing cheaper leaves the cost of the design itself.
@@ -92,25 +127,104 @@ def least_cost(design: VerifiedDesign, cheapest: Cheapest) -> float:
     >>> from tolalloc.allocation.verify.verification import verifier_of_sum
     >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
     >>> design = verifier.verify(verifier.space.uniform(1.0), "as drawn")
-    >>> least_cost(design, lambda stacks: (1.9, design.design)), least_cost(design, lambda stacks: None)
+    >>> none = lambda stacks: 0.0
+    >>> least_cost(design, lambda stacks: (1.9, design.design), none), least_cost(design, lambda stacks: None, none)
     (1.9, 2.0)
     """
-    stacks = tuple(stack for _, stack in _weaker(design))
     free = design.cost - design.space.locked_cost
-    found = cheapest(stacks)
+    weaker, last = _weaker(design), design.checks[-1]
+    found = cheapest(tuple(stack for _, _, stack in weaker))
     if found is None:
         return free
-    moved = tuple(
-        replace(stack, budget=stack.budget + _derivative_error(constraint, stack, design, found[1]))
-        for constraint, stack in _weaker(design)
-    )
-    again = cheapest(moved)
-    return min(free, again[0] if again else free)
+    moved = [
+        (at, replace(stack, budget=stack.budget + _derivative_error(constraint, stack, design, found[1])))
+        for at, constraint, stack in weaker
+    ]
+
+    again = cheapest(tuple(stack for _, stack in moved))
+    least = min(free, again[0] if again else free)
+    if not isinstance(last, JointCheck):
+        return least
+
+    def divided(rises: Rises) -> float:
+        """Return the least cost where every limit is further in by so much [cost units]."""
+        return near_by(tuple(replace(stack, budget=stack.budget - rises[at]) for at, stack in moved))
+
+    return float(np.clip(_least_of_divisions(design, last, divided), least, free))
+
+
+def _least_of_divisions(design: VerifiedDesign, joint: JointCheck, least: Callable[[Rises], float]) -> float:
+    """Return the least cost over all ways to divide the failures among the limits [cost units].
+
+    Notes
+    -----
+    Shares fᵢ of the units fail the limits, Σ fᵢ ≤ κ·F where F may fail in all and κ counts those that fail several. A
+    box of parts lᵢ ≤ fᵢ/(κF) ≤ uᵢ costs no less than if every limit had its uᵢ; the cheapest box is halved across its
+    widest side (Land & Doig 1960; own bound). Limits that hardly count keep all failures.
+    """
+    guarantees = [own.guarantee for own in joint.joint.requirements]
+    yields = {at: own.target for at, own in enumerate(guarantees) if isinstance(own, AtYield)}
+    counting = [at for at, part in enumerate(joint.joint.parts) if part > _COUNTS and at in yields]
+    room = _coinciding(design, joint) * joint.joint.failures
+
+    def cost(upper: Float[np.ndarray, " counting"]) -> float:
+        rises = np.zeros(len(joint.tails))
+        for at, part in zip(counting, upper, strict=True):
+            alone = 1 - yields[at]
+            rises[at] = joint.tails[at].rise(min(part * room, joint.joint.failures, alone), alone)
+        return least(rises)
+
+    lower, upper = np.zeros(len(counting)), np.ones(len(counting))
+    boxes = [(cost(upper), 0, lower, upper)]
+    for number in range(1, _CUTS + 1 if len(counting) > 1 else 1):
+        _, _, lower, upper = heapq.heappop(boxes)
+        for half, (below, above) in enumerate(_halves(lower, upper)):
+            heapq.heappush(boxes, (cost(above), 2 * number + half, below, above))
+    return boxes[0][0]
+
+
+Box = tuple[Float[np.ndarray, " counting"], Float[np.ndarray, " counting"]]
+"""Least and largest part of the failures of every limit that counts [-]."""
+
+
+def _halves(lower: Float[np.ndarray, " counting"], upper: Float[np.ndarray, " counting"]) -> list[Box]:
+    """Return the halves of a box across its widest side; one that holds no division is left out."""
+    at, found = int(np.argmax(upper - lower)), []
+    middle = float(upper[at] + lower[at]) / 2
+    for low, high in ((lower[at], middle), (middle, upper[at])):
+        below, above = lower.copy(), upper.copy()
+        below[at], above[at] = low, high
+        # No part is larger than what the least of all others leaves.
+        above = np.minimum(above, 1 - below.sum() + below)
+        if (above >= below).all():
+            found.append((below, above))
+    return found
+
+
+def _coinciding(design: VerifiedDesign, joint: JointCheck) -> float:
+    """Return κ at its largest: the failures of all limits over the units that fail any, with 95 % confidence [-].
+
+    Counted among the units furthest out, some hundred, in the division in force; Clopper & Pearson 1934.
+    """
+    from scipy.stats import beta
+
+    samples = [_sample(design, check) for check in _alone(design)]
+    excess = np.stack([own.excess for own in samples])
+    wider = max(1.0, _COUNTED / (samples[0].units.drawn.units * joint.joint.failures))
+    limits = [tail.excess(min(joint.joint.share(at, 1.0, wider), _WIDEST)) for at, tail in enumerate(joint.tails)]
+    failed = (excess > np.array(limits)[:, np.newaxis]).sum(axis=0)
+    any_of_them, several = int(np.count_nonzero(failed)), int(np.count_nonzero(failed > 1))
+    if several == any_of_them:
+        return float(max(failed.max(initial=1), 1))
+    share = float(beta.ppf(CONFIDENCE, several + 1, any_of_them - several))
+    return 1 + share * float(max(failed.max() - 1, 1))
 
 
 def _is_certified(design: VerifiedDesign) -> bool:
     """Return whether the bound holds for all allowed designs rather than near this one."""
     shared = design.space.shared
+    if isinstance(design.checks[-1], JointCheck):  # how many failures coincide elsewhere is not known
+        return False
     if np.any(shared.upper > shared.lower):
         return False
     return all(_is_exact(check, design) for check in _alone(design))
@@ -130,11 +244,14 @@ def _is_exact(check: Check, design: VerifiedDesign) -> bool:
     )
 
 
-def _weaker(design: VerifiedDesign) -> list[tuple[OneSidedConstraint, Stack]]:
-    """Return every one-sided constraint with the stack that a design keeps that keeps the limit, the error counted."""
+def _weaker(design: VerifiedDesign) -> list[tuple[int, OneSidedConstraint, Stack]]:
+    """Return every one-sided constraint with the stack that a design keeps that keeps the limit, the error counted.
+
+    The position of its check stands before it.
+    """
     constraints = sum(len(check.constraints) for check in _alone(design))
     found = []
-    for check in _alone(design):
+    for number, check in enumerate(_alone(design)):
         bounds: tuple[QuantileBound, ...] = ()
         if isinstance(check.requirement.guarantee, Sampled):
             confidence = 1 - (1 - CONFIDENCE) / (2 * constraints)  # the other half is that of the derivatives
@@ -144,7 +261,7 @@ def _weaker(design: VerifiedDesign) -> list[tuple[OneSidedConstraint, Stack]]:
             if np.isfinite(excess):
                 load = float(constraint.stack.load(design.scales, design.settings))
                 budget = load - excess + _ROUNDING * (abs(load) + abs(excess))
-                found.append((constraint, replace(_touching(constraint, design), budget=budget)))
+                found.append((number, constraint, replace(_touching(constraint, design), budget=budget)))
     return found
 
 
