@@ -310,3 +310,40 @@ def test_a_run_first_says_how_the_drawing_stands_as_it_is(tmp_path):
     study.run(tmp_path / "run", ta.Effort(ranking=replace(QUICK_RANKING, sobol=sobol, **few)), heard)
     assert heard.said[:2] == ["the drawing as it is", 1024]
     assert says(heard.said[2], "check.today", share=found.joint.estimate)
+
+
+def _sums(effort: ta.Effort, function=lambda a, b: a + 2 * b) -> ta.Study:
+    row = {"plus": 3.0, "minus": -3.0, "unit": "µm", "distribution": "uniform", "min": 1, "max": 9, "cost": 1}
+    return ta.Study(
+        ta.model(function, inputs=("a", "b"), outputs=("y [mm]",)),
+        ta.Drawing.of_rows([{"id": name, **row} for name in "ab"]),
+        limits={"y [mm]": ta.Limit(upper=0.008)},
+        questions=[ta.Ranking(), ta.Allocation(front=False, what_if=False)],
+        name="sums",
+        effort=effort,
+    )
+
+
+def test_seconds_are_counted_and_shared_by_ranking_and_allocation():
+    """Four sources' worth of units at 20,000 a second; twice the time is twice the units, whatever the machine."""
+    numbers = lambda a, b: float(a) + 2 * float(b)  # noqa: E731 (no arrays)
+    short, longer = (Prepared(study=_sums(ta.Effort(seconds=seconds), numbers)) for seconds in (4.0, 8.0))
+    assert longer.ranking_effort.units == pytest.approx(2 * short.ranking_effort.units, abs=1)
+    assert longer.ranking_effort.sobol.limit == 2 * short.ranking_effort.sobol.limit
+    assert short.ranking_effort.counted(2) == pytest.approx(2.0 * 20_000, rel=0.5)
+    assert longer.allocation_effort.counted == pytest.approx(4.0 * 20_000, rel=0.02)
+    assert "8 s at 20,000 units a second" in longer.header.assumptions[-1]
+
+
+def test_blocks_grow_until_the_order_that_is_asked_for_is_stable():
+    found = _sums(ta.Effort(ranking=QUICK_RANKING, until="order of the first two")).rank().result.sobol.convergence
+    assert found.stable
+    assert found.history[-1].first == (1, 0)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"seconds": 0}, {"seconds": "3"}, {"until": "three"}, {"until": "order of the first"}]
+)
+def test_an_effort_that_means_nothing_is_refused(wrong):
+    with pytest.raises(InputError, match=r"^effort: (seconds|until) is .*; allowed is "):
+        ta.Effort(**wrong)

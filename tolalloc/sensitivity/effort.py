@@ -173,7 +173,8 @@ class RankingEffort(NamedFields):
     def within(self, units: float, sources: int) -> RankingEffort:
         """Return this effort scaled to about so many units in all, each number at least what its measure needs.
 
-        Every number times units/`counted` (own derivation), blocks down to a power of two.
+        Random units and blocks times units/`counted` (own derivation), blocks down to a power of two; the other numbers
+        likewise where that is less.
 
         Examples
         --------
@@ -185,11 +186,11 @@ class RankingEffort(NamedFields):
         blocks = max(1 << max(int(share * self.sobol.limit).bit_length() - 1, 0), _FEWEST_BLOCKS)
 
         def scaled(number: int, fewest: int) -> int:
-            return max(round(share * number), fewest)
+            return max(round(min(share, 1.0) * number), fewest)
 
         return replace(
             self,
-            units=scaled(self.units, fewest_units()),
+            units=max(round(share * self.units), fewest_units()),
             sobol=replace(self.sobol, start=blocks, limit=blocks),
             trajectories=scaled(self.trajectories, FEWEST_TRAJECTORIES),
             moment_units=scaled(self.moment_units, FEWEST_UNITS_OF_CLASS * CLASSES),

@@ -158,27 +158,28 @@ def _least_of_divisions(design: VerifiedDesign, joint: JointCheck, least: Callab
 
     Notes
     -----
-    Shares fᵢ of the units fail the limits, Σ fᵢ ≤ κ·F where F may fail in all and κ counts those that fail several. A
-    box of parts lᵢ ≤ fᵢ/(κF) ≤ uᵢ costs no less than if every limit had its uᵢ; the cheapest box is halved across its
-    widest side (Land & Doig 1960; own bound). Limits that hardly count keep all failures.
+    Shares fᵢ of the units fail the limits, and of all failures but those of the limit that fails most a part ρ
+    coincides with others: Σ fᵢ − ρ·(Σ fᵢ − max fᵢ) ≤ F, where F may fail in all. A box of parts lᵢ ≤ fᵢ/F ≤ uᵢ costs no
+    less than if every limit had its uᵢ; the cheapest box is halved across its widest side (Land & Doig 1960; own
+    bound). Limits that hardly count keep all failures.
     """
     guarantees = [own.guarantee for own in joint.joint.requirements]
     yields = {at: own.target for at, own in enumerate(guarantees) if isinstance(own, AtYield)}
     counting = [at for at, part in enumerate(joint.joint.parts) if part > _COUNTS and at in yields]
-    room = _coinciding(design, joint) * joint.joint.failures
+    apart = 1 - _coinciding(design, joint)
 
     def cost(upper: Float[np.ndarray, " counting"]) -> float:
         rises = np.zeros(len(joint.tails))
         for at, part in zip(counting, upper, strict=True):
             alone = 1 - yields[at]
-            rises[at] = joint.tails[at].rise(min(part * room, joint.joint.failures, alone), alone)
+            rises[at] = joint.tails[at].rise(min(part * joint.joint.failures, alone), alone)
         return least(rises)
 
     lower, upper = np.zeros(len(counting)), np.ones(len(counting))
     boxes = [(cost(upper), 0, lower, upper)]
     for number in range(1, _CUTS + 1 if len(counting) > 1 else 1):
         _, _, lower, upper = heapq.heappop(boxes)
-        for half, (below, above) in enumerate(_halves(lower, upper)):
+        for half, (below, above) in enumerate(_halves(lower, upper, apart)):
             heapq.heappush(boxes, (cost(above), 2 * number + half, below, above))
     return boxes[0][0]
 
@@ -187,22 +188,32 @@ Box = tuple[Float[np.ndarray, " counting"], Float[np.ndarray, " counting"]]
 """Least and largest part of the failures of every limit that counts [-]."""
 
 
-def _halves(lower: Float[np.ndarray, " counting"], upper: Float[np.ndarray, " counting"]) -> list[Box]:
-    """Return the halves of a box across its widest side; one that holds no division is left out."""
+def _halves(lower: Float[np.ndarray, " counting"], upper: Float[np.ndarray, " counting"], apart: float) -> list[Box]:
+    """Return the halves of a box across its widest side, 1 − ρ given; one that holds no division is left out."""
     at, found = int(np.argmax(upper - lower)), []
     middle = float(upper[at] + lower[at]) / 2
     for low, high in ((lower[at], middle), (middle, upper[at])):
         below, above = lower.copy(), upper.copy()
         below[at], above[at] = low, high
-        # No part is larger than what the least of all others leaves.
-        above = np.minimum(above, 1 - below.sum() + below)
+        above = np.minimum(above, [_largest_part(below, own, apart) for own in range(below.size)])
         if (above >= below).all():
             found.append((below, above))
     return found
 
 
+def _largest_part(lower: Float[np.ndarray, " counting"], at: int, apart: float) -> float:
+    """Return what a limit may have of the failures at most where the others have their least, 1 − ρ given [-]."""
+    others = np.delete(lower, at)
+    most = 1 - apart * float(others.sum())
+    if most >= others.max():
+        return most
+    # Another limit fails more often, and so much of this one's own failures must not add to it.
+    left = 1 - float(others.max()) - apart * float(others.sum() - others.max())
+    return min(left / apart, 1.0) if apart > 0 else 1.0
+
+
 def _coinciding(design: VerifiedDesign, joint: JointCheck) -> float:
-    """Return κ at its largest: the failures of all limits over the units that fail any, with 95 % confidence [-].
+    """Return ρ at its largest, with 95 % confidence [-].
 
     Counted among the units furthest out, some hundred, in the division in force; Clopper & Pearson 1934.
     """
@@ -212,12 +223,11 @@ def _coinciding(design: VerifiedDesign, joint: JointCheck) -> float:
     excess = np.stack([own.excess for own in samples])
     wider = max(1.0, _COUNTED / (samples[0].units.drawn.units * joint.joint.failures))
     limits = [tail.excess(min(joint.joint.share(at, 1.0, wider), _WIDEST)) for at, tail in enumerate(joint.tails)]
-    failed = (excess > np.array(limits)[:, np.newaxis]).sum(axis=0)
-    any_of_them, several = int(np.count_nonzero(failed)), int(np.count_nonzero(failed > 1))
-    if several == any_of_them:
-        return float(max(failed.max(initial=1), 1))
-    share = float(beta.ppf(CONFIDENCE, several + 1, any_of_them - several))
-    return 1 + share * float(max(failed.max() - 1, 1))
+    failed = excess > np.array(limits)[:, np.newaxis]
+    each = failed.sum(axis=1)
+    rest = int(each.sum() - each.max())
+    coinciding = int(each.sum() - np.count_nonzero(failed.any(axis=0)))
+    return 1.0 if coinciding == rest else float(beta.ppf(CONFIDENCE, coinciding + 1, rest - coinciding))
 
 
 def _is_certified(design: VerifiedDesign) -> bool:
