@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
+import textwrap
 import time
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
@@ -203,6 +205,8 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print machine-readable out
 ReportFolder = Annotated[Path | None, typer.Option(help="Write a report into this folder, new or empty.")]
 
 _FRAME, _BETWEEN = 4, 3
+_NARROWEST = 40
+"""Characters of a line below which nothing is broken [-]."""
 """What the frame takes around the first column, and around every other one [characters]."""
 
 
@@ -305,9 +309,17 @@ def tell(answer: Answer[Any], as_json: bool, *tables: tuple[pd.DataFrame, str]) 
     for frame, title in tables:
         print_table(frame, title)
     for sentence in answer.sentences:
-        typer.echo(sentence)
+        say(sentence)
     for warning in answer.warnings:
-        typer.secho(warning, fg="yellow")
+        say(warning, warns=True)
+
+
+def say(sentence: str, *, warns: bool = False) -> None:
+    """Print a sentence, on a screen broken between words and never inside one."""
+    if sys.stdout.isatty():
+        width = max(shutil.get_terminal_size().columns, _NARROWEST)
+        sentence = textwrap.fill(sentence, width, break_long_words=False, break_on_hyphens=False)
+    typer.secho(sentence, fg="yellow" if warns else None)
 
 
 def write_report(answer: Answer[Any], out: Path | None, progress: Progress) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tolalloc.cli.console import AsJson, announce_kernel, note, print_json, shown_progress, tell
+from tolalloc.cli.console import AsJson, announce_kernel, note, print_json, print_table, say, shown_progress, tell
 from tolalloc.exceptions import InputError, StoppedError
 from tolalloc.study.script import load_study
 
@@ -37,6 +37,7 @@ Scheduler = Annotated[
     str,
     typer.Option(help="Workers that solve the units: 'local' for one per core, or the address of a Dask scheduler."),
 ]
+Verbose = Annotated[bool, typer.Option("--verbose", help="Say everything that the report says in sentences.")]
 Pdf = Annotated[bool, typer.Option("--pdf", help="Print the report as report.pdf too, by an installed browser.")]
 Paper = Annotated[str, typer.Option(help="Paper of --pdf: A4 or Letter.")]
 
@@ -55,12 +56,19 @@ def run(
     scheduler: Scheduler = "",
     pdf: Pdf = False,
     paper: Paper = "A4",
+    verbose: Verbose = False,
     as_json: AsJson = False,
 ) -> None:
     """Run a study: every question once, one folder, one report."""
     study = _asked(script, quick, seconds, seed)
     kinds = tuple(kind.strip() for kind in only.split(",") if kind.strip())
-    _run(study, kinds, _Place.of(out, study.name), checkpoint, _Way(fresh, scheduler, paper if pdf else "", as_json))
+    _run(
+        study,
+        kinds,
+        _Place.of(out, study.name),
+        checkpoint,
+        _Way(fresh, scheduler, paper if pdf else "", verbose, as_json),
+    )
 
 
 def rank(
@@ -73,12 +81,13 @@ def rank(
     scheduler: Scheduler = "",
     pdf: Pdf = False,
     paper: Paper = "A4",
+    verbose: Verbose = False,
     as_json: AsJson = False,
 ) -> None:
     """Tell which error drives which output, which order and the rejects: short for run --only ranking."""
     study = _asked(script, quick, seconds, seed)
     place = _Place.of(out, f"{study.name}-rank")
-    _run(study, ("ranking",), place, None, _Way(fresh, scheduler, paper if pdf else "", as_json))
+    _run(study, ("ranking",), place, None, _Way(fresh, scheduler, paper if pdf else "", verbose, as_json))
 
 
 def allocate(
@@ -101,6 +110,7 @@ def allocate(
     scheduler: Scheduler = "",
     pdf: Pdf = False,
     paper: Paper = "A4",
+    verbose: Verbose = False,
     as_json: AsJson = False,
 ) -> None:
     """Find the cheapest drawing that keeps every limit, verified: short for run --only allocation."""
@@ -112,7 +122,7 @@ def allocate(
         graded = replace(own, grades=True) if isinstance(own, Allocation) else own
         study = replace(study, questions=(*(q for q in study.questions if q.kind != "allocation"), graded))
     place = _Place.of(out, f"{study.name}-allocate")
-    _run(study, ("allocation",), place, checkpoint, _Way(fresh, scheduler, paper if pdf else "", as_json))
+    _run(study, ("allocation",), place, checkpoint, _Way(fresh, scheduler, paper if pdf else "", verbose, as_json))
 
 
 def _asked(script: Path, quick: bool, seconds: float | None, seed: int | None) -> Study:
@@ -157,6 +167,7 @@ class _Way:
     fresh: bool
     scheduler: str  # Whose workers solve the units; empty for this process
     paper: str  # On which the report is printed; empty if it is not
+    verbose: bool  # Whether every sentence is said
     as_json: bool
 
 
@@ -214,7 +225,6 @@ def _run(study: Study, kinds: tuple[str, ...], place: _Place, checkpoint: Path |
         raise StoppedError(
             f"Stopped: no report was written. {what if kept.is_dir() else 'Nothing was kept.'}"
         ) from None
-    note(f"Report: {folder / 'report.html'}")
     if way.paper:
         with shown_progress() as progress:
             progress.begin("printing")
@@ -222,10 +232,14 @@ def _run(study: Study, kinds: tuple[str, ...], place: _Place, checkpoint: Path |
         note(f"Printed: {folder / 'report.pdf'}")
     if way.as_json:
         print_json({"folder": str(folder), **found.document.summary})
-        return
-    for answer in found.answers.values():
-        _show(answer)
-    place.tell_changes()
+    else:
+        # What has a table to show, such as a drawing, comes first.
+        for answer in sorted(found.answers.values(), key=lambda own: own.teller.headline_table is None):
+            (_show if way.verbose else _show_headline)(answer)
+        for warning in () if way.verbose else found.document.warnings:
+            say(warning, warns=True)
+        place.tell_changes()
+    note(f"Report: {folder / 'report.html'}")
 
 
 def solvers(scheduler: str) -> AbstractContextManager[Mapper]:
@@ -235,6 +249,14 @@ def solvers(scheduler: str) -> AbstractContextManager[Mapper]:
     from tolalloc.running.workers import workers_at
 
     return workers_at(scheduler)
+
+
+def _show_headline(answer: Answer[Any]) -> None:
+    """Print the first sentences of an answer, and its one table."""
+    for sentence in answer.teller.headline:
+        say(sentence)
+    if table := answer.teller.headline_table:
+        print_table(*table)
 
 
 def _show(answer: Answer[Any]) -> None:

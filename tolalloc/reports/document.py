@@ -32,6 +32,8 @@ class Section:
         Whether its tables stand open however large they are, as a drawing does.
     first
         Whether it stands on the first page, behind the answer.
+    folded
+        Whether it is there for who asks, behind its heading; paper has the heading alone.
     """
 
     heading: str
@@ -41,6 +43,12 @@ class Section:
     part: str = ""
     unfolded: bool = False
     first: bool = False
+    folded: bool = False
+
+    @property
+    def behind_heading(self) -> Section:
+        """The same, folded."""
+        return replace(self, folded=True)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -78,6 +78,16 @@ class Teller(ABC, Generic[Result]):
         return ()
 
     @property
+    def headline(self) -> tuple[str, ...]:
+        """What a terminal says first; the first sentences unless a teller says otherwise."""
+        return self.sentences[:3]
+
+    @property
+    def headline_table(self) -> tuple[pd.DataFrame, str] | None:
+        """The one table that a terminal shows with it, and its title; none unless a teller says otherwise."""
+        return None
+
+    @property
     def terminal(self) -> tuple[tuple[pd.DataFrame, str], ...]:
         """Tables that a command prints above the sentences, each with its title."""
         return ()

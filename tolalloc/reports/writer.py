@@ -179,10 +179,17 @@ def _block(document: Document) -> list[tuple[str, str]]:
 
 
 def _in_full(document: Document) -> list[dict[str, Any]]:
-    """Return the answers in full where the first page has only their first sentences."""
+    """Return the answers in full where the first page has only their first sentences, but for the first one folded."""
     return [
-        {"part": title, "heading": "The answer in full", "paragraphs": sentences, "figures": (), "tables": ()}
-        for title, sentences in _answers(document)
+        {
+            "part": title,
+            "heading": "The answer in full",
+            "paragraphs": sentences,
+            "figures": (),
+            "tables": (),
+            "folded": number > 0,
+        }
+        for number, (title, sentences) in enumerate(_answers(document))
         if _is_shortened(document) and len(sentences) > _SENTENCES
     ]
 
@@ -199,6 +206,7 @@ def _write_page(document: Document, path: Path) -> None:
             "part": section.part,
             "heading": section.heading,
             "first": section.first,
+            "folded": section.folded,
             "paragraphs": section.paragraphs,
             "figures": [_drawn_by(chart(figure)) for figure in section.figures],
             "tables": [
@@ -208,6 +216,8 @@ def _write_page(document: Document, path: Path) -> None:
         }
         for section in document.sections
     ]
+    leading = next((own["part"] for own in sections if own["first"]), "")
+    sections.sort(key=lambda own: own["part"] != leading)  # the part of the first page comes first
     for full in reversed(_in_full(document)):
         sections.insert(next((at for at, own in enumerate(sections) if own["part"] == full["part"]), 0), full)
     for number, section in enumerate(sections, start=1):

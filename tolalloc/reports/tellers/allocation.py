@@ -6,6 +6,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
+
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.reading.units import unit_of
 from tolalloc.reports.columns import plain
@@ -63,6 +65,17 @@ class AllocationTeller(Teller[AllocationResult]):
         return texts.assumptions(self.result, self.header)
 
     @property
+    def headline(self) -> tuple[str, ...]:
+        """The verdict and the cost."""
+        return texts.headline(self.result, self.header.cost_unit)
+
+    @property
+    def headline_table(self) -> tuple[pd.DataFrame, str]:
+        """The drawing as it is and as drawn."""
+        table = tables.today_table(self.result, self.header.cost_unit)
+        return table.terminal(self.header.cost_unit), self.header.name
+
+    @property
     def shown(self) -> tuple[str, ...]:
         """What to write, its total-effect index and its cost."""
         return dimensions_table(self.result).shown(self.header.cost_unit)
@@ -78,6 +91,7 @@ class AllocationTeller(Teller[AllocationResult]):
             if count
         )
         return (
+            self._today,
             self._dimensions,
             Section(
                 heading=_say("heading_sources"),
@@ -85,10 +99,11 @@ class AllocationTeller(Teller[AllocationResult]):
                 tables=((sources.name, sources.frame(unit)),),
                 paragraphs=(_say("sources"),),
                 unfolded=True,
+                folded=True,
             ),
             Section(heading=_say("heading_shares", output=leading), tables=(("shares", sobol_table(result.shares)),)),
-            self._requirements,
-            *self._illustrated,
+            self._requirements.behind_heading,
+            *(own.behind_heading for own in self._illustrated),
             self._optimality,
             *self._what_if,
             Section(
@@ -99,18 +114,30 @@ class AllocationTeller(Teller[AllocationResult]):
                     ("tolerances", tolerances_frame(result, unit)),
                     ("work", tables.work_frame(self.header)),
                 ),
+                folded=True,
             ),
+        )
+
+    @property
+    def _today(self) -> Section:
+        """The first page: the drawing as it is beside the drawing as drawn."""
+        result, unit = self.result, self.header.cost_unit
+        table = tables.today_table(result, unit)
+        return Section(
+            heading=_say("heading_today"),
+            figures=(figures.units_figure(result), *effects_figure(result)),
+            tables=((table.name, table.frame(unit)),),
+            first=True,
         )
 
     @property
     def _dimensions(self) -> Section:
         """The first page: what to write, a line per dimension."""
         result = self.result
-        made = " ".join((*texts.drawn_amounts(result), *texts.amounts_convention(result)))
+        made = " ".join(texts.amounts_convention(result))
         return Section(
             heading=_say("heading_dimensions"),
-            paragraphs=(made, _say("dimensions"), _say("files")),
-            figures=effects_figure(result),
+            paragraphs=(*((made,) if made else ()), _say("dimensions"), _say("files")),
             tables=(("dimensions", dimensions_table(result).frame(self.header.cost_unit)),),
             unfolded=True,
             first=True,
@@ -123,7 +150,6 @@ class AllocationTeller(Teller[AllocationResult]):
         return Section(
             heading=_say("heading_requirements"),
             paragraphs=texts.quantiles(self.result),
-            figures=(figures.units_figure(self.result),),
             tables=tuple((own.name, own.frame(self.header.cost_unit)) for own in shown),
         )
 

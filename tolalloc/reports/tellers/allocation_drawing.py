@@ -38,6 +38,9 @@ _say = Sentences("allocation")
 _STEP = 0.1
 """Share of a zone by which the figure of effects opens it [-]."""
 
+_EFFECTS = 12
+"""Dimensions whose effect is drawn, the largest first [-]."""
+
 _Source = tuple[Source, Source]
 """A source before and after."""
 _Dimension = tuple[str, Sequence[_Source]]
@@ -115,8 +118,8 @@ def _after(row: _Dimension) -> list[Source]:
 
 
 def _change(row: _Source) -> float:
-    """Return the change of a zone, 0 where only the last bits of a product differ [%]."""
-    return round((row[1].zone / row[0].zone - 1) * 100, 8) + 0.0
+    """Return the change of a zone, 0 where rounding alone differs [%]."""
+    return round((row[1].zone / row[0].zone - 1) * 100, 2) + 0.0
 
 
 def _processes(result: AllocationResult) -> tuple[Column[_Source], Column[_Source]]:
@@ -187,7 +190,7 @@ def effects_figure(result: AllocationResult) -> tuple[Figure, ...]:
         name: sum(_STEP * source.zone * slope.get(source.name, 0.0) for source in members)
         for name, members in result.dimensions.items()
     }
-    order = sorted(effects, key=lambda name: -abs(effects[name]))
+    order = sorted(effects, key=lambda name: -abs(effects[name]))[:_EFFECTS]
     kept, guarantee = with_unit(f"{result.chosen.quantile_bound:.4g}", result.leading), result.requirements[0].guarantee
     key = "figure_effects" if isinstance(guarantee, AtYield) else "figure_effects_other"
     label, lengths = "effect with its sign, to first order", [effects[name] for name in order]

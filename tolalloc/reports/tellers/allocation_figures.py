@@ -29,7 +29,7 @@ def units_figure(result: AllocationResult) -> Figure:
         x_label=leading,
         y_label="share of the units [%]",
         series=(
-            Series(label="tolerance table as it is", kind="histogram", x=list(before)),
+            Series(label="as it is", kind="histogram", x=list(before)),
             Series(label="as drawn", kind="histogram", x=list(after)),
         ),
         vertical=tuple(

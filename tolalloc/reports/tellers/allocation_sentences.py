@@ -66,6 +66,11 @@ def verdict(result: AllocationResult) -> tuple[str, ...]:
     return (fault, _verdict(result)) if fault else (_verdict(result),)
 
 
+def headline(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
+    """Return the verdict and the cost."""
+    return (*verdict(result), _cost(result, cost_unit))
+
+
 def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     """Return the answer in sentences; the first ones stand in the headline of a report."""
     chosen = result.chosen
@@ -76,9 +81,9 @@ def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
         found.append(_say("error", error=result.error))
     return (
         *found,
+        *_certificate(result),
         *_solved(chosen),
         _compared(result),
-        *_certificate(result),
         *_modification(result, cost_unit),
         *_prices(result, cost_unit),
         *_good_unit(result, cost_unit),
@@ -93,8 +98,7 @@ def _verdict(result: AllocationResult) -> str:
     key, achieved, said = "met", chosen.achieved, {"stay": _stay(result)}
     if chosen.jointly:
         key, achieved, check = "met_jointly", chosen.joint, chosen.checks[-1]
-        alone = (_say("each", output=short(name), share=own.estimate) for name, own in result.yields.items())
-        said = {"each": "; ".join(alone)}
+        said = {}
     return _say(
         key,
         verdict=_say("verdict_met" if result.met else "verdict_missed"),

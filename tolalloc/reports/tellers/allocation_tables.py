@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pandas as pd
 
@@ -10,8 +12,9 @@ from tolalloc.allocation.front.pareto_front import Front, Fronts
 from tolalloc.allocation.front.what_if import Robustness, SettingTrade
 from tolalloc.allocation.result import AllocationResult, limit_price, solver_noise, unit_quantile
 from tolalloc.allocation.search.candidates import GRADES
+from tolalloc.allocation.space.joint_yield import JointRequirement
 from tolalloc.allocation.space.problem import OneSidedConstraint
-from tolalloc.allocation.space.requirement import Check
+from tolalloc.allocation.space.requirement import AtYield, Check
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.columns import Column, Table
@@ -61,6 +64,76 @@ def _limit(row: _Limited) -> str:
     """Return a limit in words."""
     _, side, check = row
     return f"{'at most' if side.sign > 0 else 'at least'} {side.limit:g} {unit_of(check.requirement.output)}"
+
+
+_BINDS = 1e-3
+"""Worth of a limit over the cost, from which it is said to bind [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Compared:
+    """What is compared between the drawing as it is and as drawn."""
+
+    name: str
+    shown: str = ""  # What must be shown of the limit
+    limit: str = ""
+    before: float = float("nan")
+    after: float = float("nan")
+    kept_before: float = float("nan")  # Share of units within the limit [%]
+    kept_after: float = float("nan")
+    binds: str = ""
+
+
+def today_table(result: AllocationResult, cost_unit: str) -> Table[_Compared]:
+    """Return cost, limits and amounts of the drawing as it is beside the drawing as drawn, and which limits bind."""
+    before, after = result.free.baseline, result.chosen
+    rows = [_Compared(name=f"cost [{cost_unit}]", before=before.cost, after=after.cost)]
+    sides = zip(before.limited_sides, after.limited_sides, strict=True)
+    for (check, side), (own, drawn) in sides:
+        asked = own.requirement
+        if isinstance(asked, JointRequirement):
+            continue
+        price = result.free.prices.get(drawn.stack.name, 0.0)
+        rows.append(
+            _Compared(
+                name=f"{short(asked.output)} [{unit_of(asked.output)}]",
+                shown="" if after.jointly else asked.guarantee.words,
+                limit=f"{'≤' if drawn.sign > 0 else '≥'} {drawn.limit:.4g}",
+                before=_shown(before, check, side),
+                after=_shown(after, own, drawn),
+                kept_before=100 * before.yield_of(check.requirement).estimate,
+                kept_after=100 * after.yield_of(asked).estimate,
+                binds="yes" if price * drawn.scale > _BINDS * after.cost else "",
+            )
+        )
+    if len(rows) > 2:
+        asked_of_all = after.checks[-1].requirement.guarantee if after.jointly else None
+        rows.append(
+            _Compared(
+                name="all limits at once",
+                limit=f"≥ {100 * asked_of_all.target:.4g} %" if isinstance(asked_of_all, AtYield) else "",
+                kept_before=100 * before.joint.estimate,
+                kept_after=100 * after.joint.estimate,
+            )
+        )
+    rows += [_Compared(name=own.name, before=own.before, after=own.value) for own in result.amounts]
+    columns: list[Column[_Compared]] = [
+        Column(header="drawing", value=lambda row: row.name, terminal=1),
+        Column(header="shown for", value=lambda row: row.shown, nothing=""),
+        Column(header="limit", value=lambda row: row.limit, nothing="", terminal=2),
+        Column(header="as it is", value=lambda row: row.before, terminal=3),
+        Column(header="as drawn", value=lambda row: row.after, terminal=4),
+        Column(header="kept as it is [% of units]", value=lambda row: row.kept_before, terminal=5),
+        Column(header="kept as drawn [% of units]", value=lambda row: row.kept_after, terminal=6),
+        Column(header="binds", value=lambda row: row.binds, nothing=""),
+    ]
+    return Table(name="today and as drawn", columns=columns, rows=rows)
+
+
+def _shown(design: VerifiedDesign, check: Check, side: OneSidedConstraint) -> float:
+    """Return the value that just the target share of the units keeps; what is compared where a limit has none."""
+    found = unit_quantile(design, check)
+    return side.value if np.isnan(found) else found
 
 
 def designs_table(result: AllocationResult) -> Table[_Named]:

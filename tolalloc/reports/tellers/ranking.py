@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from tolalloc.drawings.seeds import SamplingDesign
+from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import table_frame
 from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.document import Section
@@ -45,7 +46,7 @@ _NAMED = 3
 """Sources that the answer names [-]."""
 _AS_STRONG = 0.9
 """Share of the largest change per micrometre from which a source is as strong as any [-]."""
-_SHOWN = 24
+_SHOWN = 20
 """Rows of a picture; the table has all [-]."""
 _LINE = 14
 """Letters of a line in the head of a heat map [-]."""
@@ -142,12 +143,14 @@ class RankingTeller(Teller[RankingResult]):
 
     def _per_micrometre(self) -> Iterator[str]:
         """Yield the order per micrometre, and why it is not that of the ranking, if a zone weighs in it."""
-        local, indices, errors = self.result.local, self.result.indices, self.result.errors
-        ranked = [indices.sources[at] for at in indices.order if indices.sources[at] in local.sources]
+        local, indices = self.result.local, self.result.dimensions or self.result.indices
+        lines = self._lines
+        ranked = [indices.sources[at] for at in indices.order if indices.sources[at] in lines]
         if not ranked:
             return
-        first = [(local.sources[at], local.per_micrometre[at]) for at in tables.largest_first(local.per_micrometre)]
-        zones = dict(zip((source.name for source in errors.active), errors.zones / MICROMETRE, strict=False))
+        changes = {name: local.of_line([own.name for own in lines[name]]).per_micrometre for name in ranked}
+        first = sorted(changes.items(), key=lambda own: -own[1])
+        zones = {name: members[0].zone / MICROMETRE for name, members in lines.items()}
         names = ", ".join(
             _say("per_micrometre_name", source=name, change=change, sign=self._sign) for name, change in first[:_NAMED]
         )
@@ -160,6 +163,16 @@ class RankingTeller(Teller[RankingResult]):
             first=first[0][0],
             zone_of_first=zones[first[0][0]],
         )
+
+    @property
+    def _lines(self) -> dict[str, list[Source]]:
+        """What the first page ranks, with its sources: dimensions of the drawing, or sources where no two share one."""
+        found, known = dict[str, list[Source]](), set(self.result.local.sources)
+        for source in self.result.errors.active:
+            if source.name in known:
+                name = source.dimension if self.result.dimensions else source.name
+                found.setdefault(name, []).append(source)
+        return found
 
     def _orders(self) -> Iterator[str]:
         """Yield who makes the strongest orders."""
@@ -317,7 +330,8 @@ class RankingTeller(Teller[RankingResult]):
     @cached_property
     def sections(self) -> tuple[Section, ...]:
         """Drivers, limits, and what the answer rests on."""
-        return (*self._driver_sections(), *self._limit_sections(), *self._trust_sections())
+        behind = (*self._limit_sections(), *self._trust_sections())
+        return (*self._driver_sections(), *(own.behind_heading for own in behind))
 
     @cached_property
     def _requirements(self) -> pd.DataFrame:
@@ -344,6 +358,7 @@ class RankingTeller(Teller[RankingResult]):
                 tables=(("dimensions", tables.dimensions_table(result, result.dimensions)),),
                 unfolded=True,
                 first=True,
+                folded=True,
             )
         if result.shapley is not None:
             yield Section(
@@ -358,6 +373,7 @@ class RankingTeller(Teller[RankingResult]):
             paragraphs=(_say("overall", outputs=names, blocks=blocks, others=others),),
             figures=(self._requirements_figure(),),
             tables=(("all requirements", tables.overall_table(result)),),
+            folded=True,
         )
         if result.orders is not None:
             note = f"{self._portrait.spectra_note}. " if self._portrait.spectra_note else ""
@@ -366,6 +382,7 @@ class RankingTeller(Teller[RankingResult]):
                 paragraphs=(f"{note}{_say('orders', blocks=others)}",),
                 figures=(self._orders_figure(),),
                 tables=(("orders", tables.orders_table(result, self._wave_unit)),),
+                folded=True,
             )
         total = result.indices.total
         shares = dict(zip(result.indices.sources, (total / total.sum()).tolist(), strict=True))
@@ -494,7 +511,7 @@ class RankingTeller(Teller[RankingResult]):
                         x=[indices.sources[at] for at in rows],
                         y=[max(values[at], 0.0) for at in rows],
                         low=[max(interval[0, at], 0.0) for at in rows],
-                        high=[max(interval[1, at], 0.0) for at in rows],
+                        high=[float(np.clip(interval[1, at], 0.0, 1.0)) for at in rows],
                     )
                     for name, values, interval in bars
                 ),
