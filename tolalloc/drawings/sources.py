@@ -210,7 +210,8 @@ class Source:
         A size has its step in each of its two deviations. A zone within a step of the smallest one becomes that one.
         """
         sides = 2 if self.feature is Feature.SIZE else 1
-        return min(zone, max(sides * rounded_down(zone / sides, self.step, usual), self.minimum))
+        # What a solver left a hair below a whole step is that step.
+        return max(sides * rounded_down(zone / sides, self.step, usual), min(self.minimum, zone))
 
     @cached_property
     def middles(self) -> Float[np.ndarray, " column"]:

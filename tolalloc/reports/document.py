@@ -122,7 +122,6 @@ def joined(title: str, subtitle: str, parts: Iterable[tuple[str, Document]], **m
         What is needed to repeat the run and to trust it.
     """
     sections: list[Section] = []
-    answer: list[str] = []
     warnings: list[str] = []
     assumptions: list[str] = []
     summary: dict[str, Any] = {}
@@ -146,26 +145,23 @@ def joined(title: str, subtitle: str, parts: Iterable[tuple[str, Document]], **m
                     figures=tuple(replace(figure, name=figures[figure.name]) for figure in section.figures),
                 )
             )
-        answer += document.answer
         warnings += document.warnings
         assumptions += document.assumptions
         summary[part] = document.summary
+    # The report that has something for the first page comes first.
+    leading_first = sorted(reports, key=lambda report: report[0] not in leading)
+    sections.sort(key=lambda section: section.part != leading_first[0][1].title)
     return Document(
         title=title,
         subtitle=subtitle,
-        answer=tuple(answer),
+        answer=tuple(sentence for _, document in leading_first for sentence in document.answer),
         warnings=tuple(dict.fromkeys(warnings)),
         sections=tuple(sections),
         assumptions=tuple(dict.fromkeys(assumptions)),
         summary=summary,
         seed=manifest.get("seed"),
         manifest=manifest,
-        answers=tuple(
-            (document.title, document.answer)
-            for part, document in sorted(reports, key=lambda report: report[0] not in leading)
-        )
-        if len(reports) > 1
-        else (),
+        answers=tuple((document.title, document.answer) for _, document in leading_first) if len(reports) > 1 else (),
     )
 
 

@@ -24,6 +24,10 @@ _FORMATS = {"µm": "0.0##", "mm": "0.0000", "%": "0.0", "cost units": "0.00", "a
 """Unit in a header → format of its numbers."""
 
 
+ANSWER, CONTENTS = "answer", "contents"
+"""Sheets that stand before those of the tables."""
+
+
 @dataclass(frozen=True)
 class Formula:
     """A formula of ours; every other text of a table is text in its workbook, however it begins."""
@@ -54,6 +58,19 @@ def write_sheets(sheets: dict[str, pd.DataFrame], path: Path) -> None:
                     if isinstance(value, float | Formula):
                         cell.number_format = _FORMATS.get(in_cost_units(unit_of(str(header))), "0.0###")
                     _keep_text(cell, value)
+        _lay_out(writer.sheets)
+
+
+def _lay_out(sheets: Mapping[str, Worksheet]) -> None:
+    """Let the answer be read as text, and every entry of the contents lead to its sheet."""
+    if ANSWER in sheets:
+        sheet = sheets[ANSWER]
+        sheet.column_dimensions["A"].width = 110
+        for (cell,) in sheet.iter_rows(min_row=2):
+            cell.alignment = Alignment(wrap_text=True, vertical="top")
+    if CONTENTS in sheets:
+        for (cell,) in sheets[CONTENTS].iter_rows(min_row=2, max_col=1):
+            cell.hyperlink, cell.style = f"#'{cell.value}'!A1", "Hyperlink"
 
 
 def set_up_print(sheet: Worksheet) -> None:

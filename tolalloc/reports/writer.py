@@ -21,7 +21,7 @@ from markupsafe import Markup, escape
 from tolalloc.reading.files import no_formula
 from tolalloc.reading.units import in_cost_units, unit_of
 from tolalloc.reports.document import Document
-from tolalloc.reports.excel import write_sheets
+from tolalloc.reports.excel import ANSWER, CONTENTS, write_sheets
 from tolalloc.reports.figure import Figure, HeatMap, chart
 from tolalloc.reports.page import as_json, scripts, style
 from tolalloc.reports.wording import signed, true_minus, words_in
@@ -140,14 +140,27 @@ def write_document(document: Document, folder: Path) -> None:
     (folder / "tables").mkdir()
     for name, frame in document.tables.items():
         write_csv(frame, folder / "tables" / f"{name}.csv")
-    assumptions = pd.DataFrame({"assumption": document.assumptions})
-    write_sheets({**document.tables, "assumptions": assumptions}, folder / "results.xlsx")
+    write_sheets(_sheets(document), folder / "results.xlsx")
     for name, figure in document.figures.items():
         save_png(figure, figures / f"{name}.png")
     write_json(document.summary, folder / "summary.json")
     known = {"title": document.title, "seed": document.seed, **(document.manifest or {})}
     machine = {"processor": processor(), "threads": thread_count(), "versions": versions()}
     write_json({**known, **machine}, folder / "manifest.json")
+
+
+def _sheets(document: Document) -> dict[str, pd.DataFrame]:
+    """Return the sheets of the workbook: the answer and a list of the others first."""
+    sheets = {**document.tables, "assumptions": pd.DataFrame({"assumption": document.assumptions})}
+    headings = {name: section.heading for section in document.sections for name, _ in section.tables}
+    contents = pd.DataFrame(
+        [
+            {"sheet": name, "rows [-]": len(frame), "of the report's section": headings.get(name, "Assumptions")}
+            for name, frame in sheets.items()
+        ]
+    )
+    said = [*document.answer, *document.warnings]
+    return {ANSWER: pd.DataFrame({document.title: said}), CONTENTS: contents, **sheets}
 
 
 def write_csv(frame: pd.DataFrame, path: Path) -> None:
@@ -216,8 +229,6 @@ def _write_page(document: Document, path: Path) -> None:
         }
         for section in document.sections
     ]
-    leading = next((own["part"] for own in sections if own["first"]), "")
-    sections.sort(key=lambda own: own["part"] != leading)  # the part of the first page comes first
     for full in reversed(_in_full(document)):
         sections.insert(next((at for at, own in enumerate(sections) if own["part"] == full["part"]), 0), full)
     for number, section in enumerate(sections, start=1):

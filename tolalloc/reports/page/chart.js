@@ -100,7 +100,7 @@ export class Chart {
     this.tip.hidden = true;
     this.update(figure);
     new ResizeObserver(() => {
-      if (Math.abs(element.clientWidth - this.width) > 2) this.draw();
+      if (!this.onPaper && Math.abs(element.clientWidth - this.width) > 2) this.draw();
     }).observe(element);
   }
 
@@ -109,13 +109,24 @@ export class Chart {
     this.draw();
   }
 
-  draw() {
-    this.width = Math.max(this.element.clientWidth || 720, 240);
+  // Paper is as wide as it is, whatever the screen was: a chart that is only made smaller cannot be read.
+  draw(width = this.element.clientWidth) {
+    this.width = Math.max(width || 720, 240);
     const bars = this.figure.series?.some((item) => item.kind === "bars");
     const drawn = this.figure.values ? this.heat() : bars ? this.bars() : this.plane();
     drawn.setAttribute("role", "img");
     drawn.setAttribute("aria-label", this.figure.title);
     this.element.replaceChildren(this.legend(), drawn, this.tip);
+  }
+
+  print(width) {
+    this.onPaper = true;
+    this.draw(width);
+  }
+
+  show() {
+    this.onPaper = false;
+    this.draw();
   }
 
   legend() {

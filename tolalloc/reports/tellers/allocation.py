@@ -101,7 +101,11 @@ class AllocationTeller(Teller[AllocationResult]):
                 unfolded=True,
                 folded=True,
             ),
-            Section(heading=_say("heading_shares", output=leading), tables=(("shares", sobol_table(result.shares)),)),
+            Section(
+                heading=_say("heading_shares", output=leading),
+                tables=(("shares", sobol_table(result.shares)),),
+                folded=True,
+            ),
             self._requirements.behind_heading,
             *(own.behind_heading for own in self._illustrated),
             self._optimality,

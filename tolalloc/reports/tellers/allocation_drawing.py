@@ -38,7 +38,7 @@ _say = Sentences("allocation")
 _STEP = 0.1
 """Share of a zone by which the figure of effects opens it [-]."""
 
-_EFFECTS = 12
+_EFFECTS = 8
 """Dimensions whose effect is drawn, the largest first [-]."""
 
 _Source = tuple[Source, Source]

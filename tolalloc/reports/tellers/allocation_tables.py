@@ -106,7 +106,7 @@ def today_table(result: AllocationResult, cost_unit: str) -> Table[_Compared]:
                 binds="yes" if price * drawn.scale > _BINDS * after.cost else "",
             )
         )
-    if len(rows) > 2:
+    if len(result.requirements) > 1:
         asked_of_all = after.checks[-1].requirement.guarantee if after.jointly else None
         rows.append(
             _Compared(

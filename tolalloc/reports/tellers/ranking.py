@@ -48,6 +48,8 @@ _AS_STRONG = 0.9
 """Share of the largest change per micrometre from which a source is as strong as any [-]."""
 _SHOWN = 20
 """Rows of a picture; the table has all [-]."""
+_DRIVERS = 10
+"""Drivers of a picture [-]."""
 _LINE = 14
 """Letters of a line in the head of a heat map [-]."""
 _say = Sentences("ranking")
@@ -143,13 +145,11 @@ class RankingTeller(Teller[RankingResult]):
 
     def _per_micrometre(self) -> Iterator[str]:
         """Yield the order per micrometre, and why it is not that of the ranking, if a zone weighs in it."""
-        local, indices = self.result.local, self.result.dimensions or self.result.indices
-        lines = self._lines
+        indices, lines = self.result.dimensions or self.result.indices, self._lines
         ranked = [indices.sources[at] for at in indices.order if indices.sources[at] in lines]
         if not ranked:
             return
-        changes = {name: local.of_line([own.name for own in lines[name]]).per_micrometre for name in ranked}
-        first = sorted(changes.items(), key=lambda own: -own[1])
+        first = sorted(self._changes.items(), key=lambda own: -own[1])
         zones = {name: members[0].zone / MICROMETRE for name, members in lines.items()}
         names = ", ".join(
             _say("per_micrometre_name", source=name, change=change, sign=self._sign) for name, change in first[:_NAMED]
@@ -173,6 +173,14 @@ class RankingTeller(Teller[RankingResult]):
                 name = source.dimension if self.result.dimensions else source.name
                 found.setdefault(name, []).append(source)
         return found
+
+    @property
+    def _changes(self) -> dict[str, float]:
+        """What a micrometre in every place of each of them does, root mean square [unit of the output per µm]."""
+        local = self.result.local
+        return {
+            name: local.of_line([own.name for own in members]).per_micrometre for name, members in self._lines.items()
+        }
 
     def _orders(self) -> Iterator[str]:
         """Yield who makes the strongest orders."""
@@ -493,8 +501,8 @@ class RankingTeller(Teller[RankingResult]):
 
     def _ranking_figure(self) -> Figure:
         """Return total and first-order indices of the leading output with their intervals."""
-        indices = self.result.indices
-        rows = indices.order[:_SHOWN]
+        indices = self.result.dimensions or self.result.indices
+        rows = indices.order[:_DRIVERS]
         bars = (
             ("total-effect index", indices.total, indices.total_interval),
             ("first-order index", indices.first, indices.first_interval),
@@ -521,10 +529,10 @@ class RankingTeller(Teller[RankingResult]):
 
     def _per_micrometre_bars(self, names: list[str]) -> Series:
         """Return the change per micrometre of sources as shares of the largest one."""
-        local = self.result.local
-        largest = float(local.per_micrometre.max()) or 1.0
-        share = dict(zip(local.sources, (local.per_micrometre / largest).tolist(), strict=True))
-        return Series(label=_say("per_micrometre_bars"), kind="bars", x=names, y=[share.get(own, 0.0) for own in names])
+        changes = self._changes
+        largest = max(changes.values(), default=0.0) or 1.0
+        lengths = [changes.get(own, 0.0) / largest for own in names]
+        return Series(label=_say("per_micrometre_bars"), kind="bars", x=names, y=lengths)
 
     def _requirements_figure(self) -> HeatMap:
         """Return the total index of every source for every requirement."""
