@@ -123,8 +123,8 @@ def today_table(result: AllocationResult, cost_unit: str) -> Table[_Compared]:
         Column(header="limit", value=lambda row: row.limit, nothing="", terminal=2),
         Column(header="as it is", value=lambda row: row.before, terminal=3),
         Column(header="as drawn", value=lambda row: row.after, terminal=4),
-        Column(header="kept as it is [% of units]", value=lambda row: row.kept_before, terminal=5),
-        Column(header="kept as drawn [% of units]", value=lambda row: row.kept_after, terminal=6),
+        Column(header="as it is [% kept]", value=lambda row: row.kept_before, terminal=5),
+        Column(header="as drawn [% kept]", value=lambda row: row.kept_after, terminal=6),
         Column(header="binds", value=lambda row: row.binds, nothing=""),
     ]
     return Table(name="today and as drawn", columns=columns, rows=rows)
