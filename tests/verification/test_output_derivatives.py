@@ -11,7 +11,7 @@ from tests.builders import baseline_errors, table_of_three_cranks
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.model import ReducerModel
-from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.design import Clearances, Reducer
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.reducers.response.outputs import DIFFERENTIABLE
@@ -39,13 +39,19 @@ def three_cranks() -> tuple[ReducerModel, np.ndarray]:
     return bound(replace(load_reducer("rv20e_liu2020"), crank_count=3), errors)
 
 
+def with_play() -> tuple[ReducerModel, np.ndarray]:
+    """Bearings and meshes that yield where they touch alone."""
+    loose = Clearances(gear_mesh=3e-6, crank_disc_bearing=1e-6)
+    return bound(replace(load_reducer("rv20e"), clearances=loose), baseline_errors())
+
+
 def deviations(errors: ErrorModel) -> np.ndarray:
     uniform = np.random.default_rng(20261123).uniform(size=(UNITS, len(errors.columns)))
     return errors.deviations(errors.standard_values(uniform), errors.zones)
 
 
 @pytest.mark.parametrize("output", DIFFERENTIABLE)
-@pytest.mark.parametrize("case", [two_cranks, three_cranks])
+@pytest.mark.parametrize("case", [two_cranks, three_cranks, with_play])
 def test_they_are_the_differences_of_the_output(case, output):
     """Pins that just take over within a step make a few units differ: the median is compared."""
     model, x = case()
