@@ -146,7 +146,8 @@ def test_the_report_folder_is_complete(run):
     assert (run.report / "identified.stiffness.toml").read_bytes() == run.stiffness.read_bytes()
     assert load_identified_stiffness(run.report / "identified.stiffness.toml").values
     sheets = pd.read_excel(run.report / "results.xlsx", sheet_name=None)
-    assert set(sheets) == {"parameters", "directions", "choices", "units", "assumptions"}
+    assert list(sheets)[:2] == ["answer", "contents"]
+    assert set(sheets) == {"answer", "contents", "parameters", "directions", "choices", "units", "assumptions"}
     assert len(sheets["units"]) == 6
 
 

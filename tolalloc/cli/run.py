@@ -234,9 +234,15 @@ def _run(study: Study, kinds: tuple[str, ...], place: _Place, checkpoint: Path |
         print_json({"folder": str(folder), **found.document.summary})
     else:
         # What has a table to show, such as a drawing, comes first.
-        for answer in sorted(found.answers.values(), key=lambda own: own.teller.headline_table is None):
-            (_show if way.verbose else _show_headline)(answer)
-        for warning in () if way.verbose else found.document.warnings:
+        answers = sorted(found.answers.values(), key=lambda own: own.teller.headline_table is None)
+        warnings = list[str]()
+        for answer in answers:
+            if way.verbose or not answer.teller.headline:
+                _show(answer)
+            else:
+                _show_headline(answer)
+                warnings += answer.warnings
+        for warning in dict.fromkeys(warnings):
             say(warning, warns=True)
         place.tell_changes()
     note(f"Report: {folder / 'report.html'}")

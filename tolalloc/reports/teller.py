@@ -79,8 +79,8 @@ class Teller(ABC, Generic[Result]):
 
     @property
     def headline(self) -> tuple[str, ...]:
-        """What a terminal says first; the first sentences unless a teller says otherwise."""
-        return self.sentences[:3]
+        """What a terminal says in place of all tables and sentences; nothing where it says everything."""
+        return ()
 
     @property
     def headline_table(self) -> tuple[pd.DataFrame, str] | None:

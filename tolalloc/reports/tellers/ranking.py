@@ -92,6 +92,11 @@ class RankingTeller(Teller[RankingResult]):
             *self._portrait.remarks,
         )
 
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """The first drivers."""
+        return tuple(_drivers(self.result.dimensions or self.result.indices))
+
     @cached_property
     def _portrait(self) -> Portrait[Any]:
         """Words and pictures of the model."""
