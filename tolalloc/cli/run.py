@@ -235,15 +235,16 @@ def _run(study: Study, kinds: tuple[str, ...], place: _Place, checkpoint: Path |
     else:
         # What has a table to show, such as a drawing, comes first.
         answers = sorted(found.answers.values(), key=lambda own: own.teller.headline_table is None)
-        warnings = list[str]()
+        unsaid = set[str]()
         for answer in answers:
             if way.verbose or not answer.teller.headline:
                 _show(answer)
             else:
                 _show_headline(answer)
-                warnings += answer.warnings
-        for warning in dict.fromkeys(warnings):
-            say(warning, warns=True)
+                unsaid.update(answer.warnings)
+        for warning in found.document.warnings:
+            if warning in unsaid:
+                say(warning, warns=True)
         place.tell_changes()
     note(f"Report: {folder / 'report.html'}")
 
