@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from tolalloc.drawings.seeds import SamplingDesign
-from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import table_frame
 from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.document import Section
@@ -150,11 +149,11 @@ class RankingTeller(Teller[RankingResult]):
 
     def _per_micrometre(self) -> Iterator[str]:
         """Yield the order per micrometre, and why it is not that of the ranking, if a zone weighs in it."""
-        indices, lines = self.result.dimensions or self.result.indices, self._lines
+        indices, lines = self.result.dimensions or self.result.indices, tables.ranked_lines(self.result)
         ranked = [indices.sources[at] for at in indices.order if indices.sources[at] in lines]
         if not ranked:
             return
-        first = sorted(self._changes.items(), key=lambda own: -own[1])
+        first = sorted(tables.per_micrometre(self.result).items(), key=lambda own: -own[1])
         zones = {name: members[0].zone / MICROMETRE for name, members in lines.items()}
         names = ", ".join(
             _say("per_micrometre_name", source=name, change=change, sign=self._sign) for name, change in first[:_NAMED]
@@ -168,24 +167,6 @@ class RankingTeller(Teller[RankingResult]):
             first=first[0][0],
             zone_of_first=zones[first[0][0]],
         )
-
-    @property
-    def _lines(self) -> dict[str, list[Source]]:
-        """What the first page ranks, with its sources: dimensions of the drawing, or sources where no two share one."""
-        found, known = dict[str, list[Source]](), set(self.result.local.sources)
-        for source in self.result.errors.active:
-            if source.name in known:
-                name = source.dimension if self.result.dimensions else source.name
-                found.setdefault(name, []).append(source)
-        return found
-
-    @property
-    def _changes(self) -> dict[str, float]:
-        """What a micrometre in every place of each of them does, root mean square [unit of the output per µm]."""
-        local = self.result.local
-        return {
-            name: local.of_line([own.name for own in members]).per_micrometre for name, members in self._lines.items()
-        }
 
     def _orders(self) -> Iterator[str]:
         """Yield who makes the strongest orders."""
@@ -534,7 +515,7 @@ class RankingTeller(Teller[RankingResult]):
 
     def _per_micrometre_bars(self, names: list[str]) -> Series:
         """Return the change per micrometre of sources as shares of the largest one."""
-        changes = self._changes
+        changes = tables.per_micrometre(self.result)
         largest = max(changes.values(), default=0.0) or 1.0
         lengths = [changes.get(own, 0.0) / largest for own in names]
         return Series(label=_say("per_micrometre_bars"), kind="bars", x=names, y=lengths)

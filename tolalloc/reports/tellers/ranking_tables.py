@@ -164,6 +164,23 @@ def dimensions_table(result: RankingResult, found: SobolIndices) -> pd.DataFrame
     return with_own_words(frame, "dimension", by_group)
 
 
+def ranked_lines(result: RankingResult) -> dict[str, list[Source]]:
+    """Return what the first page ranks, with its sources: dimensions, or sources where no two share one."""
+    found, known = dict[str, list[Source]](), set(result.local.sources)
+    for source in result.errors.active:
+        if source.name in known:
+            found.setdefault(source.dimension if result.dimensions else source.name, []).append(source)
+    return found
+
+
+def per_micrometre(result: RankingResult) -> dict[str, float]:
+    """Return what a micrometre in every place of each of them does, root mean square [unit of the output per µm]."""
+    return {
+        name: result.local.of_line([own.name for own in members]).per_micrometre
+        for name, members in ranked_lines(result).items()
+    }
+
+
 def _line_derivatives(result: RankingResult, members: Sequence[Source]) -> LineDerivatives | None:
     """Return what a micrometre of a dimension does; none of what is no length, or where places depend on each other."""
     names = {own.name for own in members}
