@@ -448,7 +448,6 @@ def test_the_tables_of_the_drawing_add_up(drawn):
 
 def test_a_zone_a_hair_below_a_whole_step_is_that_step():
     """A solver ends at 9.99999995 µm where 10 µm are allowed; the drawing says 10 µm and no 9.9."""
-    (source,) = (own for own in baseline_errors().sources if own.name == "housing.pitch")
-    assert source.rounded_down(10e-6 * (1 - 5e-9)) == pytest.approx(10e-6, rel=1e-12)
-    assert source.rounded_down(9.6e-6) == pytest.approx(9.6e-6, rel=1e-12)
-    assert source.rounded_down(9.69e-6) == pytest.approx(9.6e-6, rel=1e-12)
+    own = source("a", Feature.POSITION, zone=8.0 * UM)
+    for zone, drawn in ((10.0 * (1 - 5e-9), 10.0), (9.6, 9.6), (9.69, 9.6)):
+        assert own.rounded_down(zone * UM) == pytest.approx(drawn * UM, rel=1e-12)
