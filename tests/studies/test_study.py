@@ -325,7 +325,7 @@ def _sums(effort: ta.Effort, function=lambda a, b: a + 2 * b) -> ta.Study:
 
 
 def test_seconds_are_counted_and_shared_by_ranking_and_allocation():
-    """Four sources' worth of units at 20,000 a second; twice the time is twice the units, whatever the machine."""
+    """At 20,000 units a second; twice the time is twice the units, whatever the machine."""
     numbers = lambda a, b: float(a) + 2 * float(b)  # noqa: E731 (no arrays)
     short, longer = (Prepared(study=_sums(ta.Effort(seconds=seconds), numbers)) for seconds in (4.0, 8.0))
     assert longer.ranking_effort.units == pytest.approx(2 * short.ranking_effort.units, abs=1)
@@ -333,6 +333,10 @@ def test_seconds_are_counted_and_shared_by_ranking_and_allocation():
     assert short.ranking_effort.counted(2) == pytest.approx(2.0 * 20_000, rel=0.5)
     assert longer.allocation_effort.counted == pytest.approx(4.0 * 20_000, rel=0.02)
     assert "8 s at 20,000 units a second" in longer.header.assumptions[-1]
+    whole_day = Prepared(study=_sums(ta.Effort(seconds=86_400.0)))
+    assert whole_day.ranking_effort.sobol.limit * 4 <= 2**26, "what is kept of a day's units must fit into memory"
+    assert whole_day.ranking_effort.units * 2 <= 2**20
+    assert whole_day.allocation_effort.confirmation_units <= 2**23
 
 
 def test_blocks_grow_until_the_order_that_is_asked_for_is_stable():
@@ -342,7 +346,7 @@ def test_blocks_grow_until_the_order_that_is_asked_for_is_stable():
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"seconds": 0}, {"seconds": "3"}, {"until": "three"}, {"until": "order of the first"}]
+    "wrong", [{"seconds": 0}, {"seconds": 1e9}, {"seconds": "3"}, {"until": "three"}, {"until": "order of the first"}]
 )
 def test_an_effort_that_means_nothing_is_refused(wrong):
     with pytest.raises(InputError, match=r"^effort: (seconds|until) is .*; allowed is "):

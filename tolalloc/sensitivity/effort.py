@@ -43,6 +43,8 @@ def fewest_units() -> int:
 
 _FEWEST_BLOCKS = 16
 """Blocks of a Sobol analysis that is given too little time for more [-]."""
+_MOST_UNITS, _MOST_SAMPLES = 2**17, 2**26
+"""Random units, and samples of a Sobol analysis, that memory holds however long a run may take [-]."""
 _CHAIN = 10
 """Units of a level or width come in chains of so many [-]."""
 
@@ -183,14 +185,15 @@ class RankingEffort(NamedFields):
         (4096, 128, 128)
         """
         share = units / self.counted(sources)
-        blocks = max(1 << max(int(share * self.sobol.limit).bit_length() - 1, 0), _FEWEST_BLOCKS)
+        wanted = min(int(share * self.sobol.limit), _MOST_SAMPLES // (sources + 2))
+        blocks = max(1 << max(wanted.bit_length() - 1, 0), _FEWEST_BLOCKS)
 
         def scaled(number: int, fewest: int) -> int:
             return max(round(min(share, 1.0) * number), fewest)
 
         return replace(
             self,
-            units=max(round(share * self.units), fewest_units()),
+            units=min(max(round(share * self.units), fewest_units()), max(_MOST_UNITS, self.units)),
             sobol=replace(self.sobol, start=blocks, limit=blocks),
             trajectories=scaled(self.trajectories, FEWEST_TRAJECTORIES),
             moment_units=scaled(self.moment_units, FEWEST_UNITS_OF_CLASS * CLASSES),

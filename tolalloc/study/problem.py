@@ -127,7 +127,9 @@ class Effort(NamedFields):
     ranking: Annotated[RankingEffort, a(RankingEffort)] = field(default_factory=RankingEffort)
     allocation: Annotated[AllocationEffort, a(AllocationEffort)] = field(default_factory=AllocationEffort)
     is_quick: Annotated[bool, a(bool)] = False
-    seconds: Annotated[float | None, or_none(number("a number above 0, or None", above=0))] = None
+    seconds: Annotated[
+        float | None, or_none(number("a number above 0 up to 86,400, or None", above=0, most=86_400))
+    ] = None
     until: Annotated[str | None, _UNTIL] = None
 
     @property

@@ -27,8 +27,7 @@ _CUTS = 10
 _COUNTED = 100.0
 """Failing units that tell how many failures coincide [-]."""
 _WIDEST = 0.25
-"""The same of all units, at most [-]."""
-
+"""Share of all units, at most, that is counted as failing for it [-]."""
 _LEAST_WORTH = 0.1
 """Worth of a budget, over the largest one, from which its price is looked for [-]."""
 

@@ -9,7 +9,9 @@ from tolalloc.reading.named_fields import NamedFields, Rule, a, each, number, wh
 from tolalloc.sensitivity.surrogate import validation
 
 FEWEST_FOR_YIELD = 1152
-"""Units with which the usual yield, 99.73 %, can just be shown [-]."""
+"""Units of a design in the shortest run: 1,109 just show the usual yield, 99.73 %, with 95 % confidence [-]."""
+_MOST_OF_DESIGN, _MOST_CONFIRMED = 2**16, 2**23
+"""Units of a design, and those that confirm one, that memory holds however long a run may take [-]."""
 
 
 def _least(fewest: int) -> Rule:
@@ -147,16 +149,16 @@ class AllocationEffort(NamedFields):
         """
         share = units / self.counted
 
-        def scaled(number: int, fewest: int) -> int:
-            return max(round(share * number), fewest)
+        def scaled(number: int, fewest: int, most: int = _MOST_OF_DESIGN) -> int:
+            return min(max(round(share * number), fewest), most)
 
         return replace(
             self,
             verification_units=scaled(self.verification_units, FEWEST_FOR_YIELD),
-            confirmation_units=scaled(self.confirmation_units, 2 * FEWEST_FOR_YIELD),
+            confirmation_units=scaled(self.confirmation_units, 2 * FEWEST_FOR_YIELD, _MOST_CONFIRMED),
             shared_units=scaled(self.shared_units, 48),
             stiffness_units=scaled(self.stiffness_units, FEWEST_FOR_YIELD),
-            share_blocks=max(1 << max(int(share * self.share_blocks).bit_length() - 1, 0), 16),
+            share_blocks=min(max(1 << max(int(share * self.share_blocks).bit_length() - 1, 0), 16), 2**12),
         )
 
     @property
