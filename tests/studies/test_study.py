@@ -339,6 +339,7 @@ def test_seconds_are_counted_and_shared_by_ranking_and_allocation():
     assert whole_day.allocation_effort.confirmation_units <= 2**23
 
 
+@pytest.mark.slow
 def test_blocks_grow_until_the_order_that_is_asked_for_is_stable():
     found = _sums(ta.Effort(ranking=QUICK_RANKING, until="order of the first two")).rank().result.sobol.convergence
     assert found.stable

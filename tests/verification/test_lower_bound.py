@@ -66,6 +66,7 @@ def test_the_bound_of_a_linear_function_lies_below_its_optimum_and_the_answer_at
         assert OPTIMUM * 0.999 < found.bound <= OPTIMUM <= found.cost < OPTIMUM * 1.002
 
 
+@pytest.mark.slow
 def test_a_function_of_single_numbers_has_the_same_bound_from_fewer_units():
     """A function of single numbers: none of 4,608 units leaves the plane, so up to 0.1 % might."""
 
@@ -220,6 +221,7 @@ def test_a_function_that_is_linear_but_for_a_rare_jump_is_judged_by_its_units():
     assert not found.met or kept > 0.9973 - 3 * np.sqrt(0.0027 / a.size)
 
 
+@pytest.mark.slow
 def test_the_bound_of_two_limits_at_once_lies_just_below_their_optimum():
     """y = a, z = b, each below 0.1 with 1/zone its cost: by symmetry each fails (1 − √0.9973) of the units.
 

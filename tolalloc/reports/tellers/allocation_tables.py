@@ -85,7 +85,10 @@ class _Compared:
 
 
 def today_table(result: AllocationResult, cost_unit: str) -> Table[_Compared]:
-    """Return cost, limits and amounts of the drawing as it is beside the drawing as drawn, and which limits bind."""
+    """Return cost, limits and amounts of the drawing as it is beside the drawing as drawn, and which limits bind.
+
+    Beside a limit stands what was shown to be kept, which is compared with it, as in the workbook of the drawing.
+    """
     before, after = result.free.baseline, result.chosen
     rows = [_Compared(name=f"cost [{cost_unit}]", before=before.cost, after=after.cost)]
     sides = zip(before.limited_sides, after.limited_sides, strict=True)
@@ -99,8 +102,8 @@ def today_table(result: AllocationResult, cost_unit: str) -> Table[_Compared]:
                 name=f"{short(asked.output)} [{unit_of(asked.output)}]",
                 shown="" if after.jointly else asked.guarantee.words,
                 limit=f"{'≤' if drawn.sign > 0 else '≥'} {drawn.limit:.4g}",
-                before=_shown(before, check, side),
-                after=_shown(after, own, drawn),
+                before=side.value,
+                after=drawn.value,
                 kept_before=100 * before.yield_of(check.requirement).estimate,
                 kept_after=100 * after.yield_of(asked).estimate,
                 binds="yes" if price * drawn.scale > _BINDS * after.cost else "",
@@ -128,12 +131,6 @@ def today_table(result: AllocationResult, cost_unit: str) -> Table[_Compared]:
         Column(header="binds", value=lambda row: row.binds, nothing=""),
     ]
     return Table(name="today and as drawn", columns=columns, rows=rows)
-
-
-def _shown(design: VerifiedDesign, check: Check, side: OneSidedConstraint) -> float:
-    """Return the value that just the target share of the units keeps; what is compared where a limit has none."""
-    found = unit_quantile(design, check)
-    return side.value if np.isnan(found) else found
 
 
 def designs_table(result: AllocationResult) -> Table[_Named]:
