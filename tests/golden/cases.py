@@ -117,12 +117,15 @@ class Case:
     wandering
         Pattern of lines that tell of a random search, whose path turns with the last bit of another processor: they are
         compared by ``--check`` alone.
+    agreement
+        How closely processors agree on its numbers [-], relative; where that is more than 1e-6, absolute too.
     """
 
     name: str
     files: dict[str, str] = field(default_factory=dict)
     commands: tuple[str, ...]
     wandering: str = r"(?!)"
+    agreement: float = 1e-6
 
 
 NEW = "new @mine --like rv40e --cranks 3 --with all"
@@ -239,16 +242,28 @@ SHIPPED = "shipped_{}"
 """Name of the case of a shipped study, which is run quick."""
 
 
+FRONT = r'^ +"[\d.]+,[\d.]+,[\d.]*,[\d.]+,(yes)?",?$'
 WANDERING = {
+    "liu2020_allocation": FRONT,
+    "liu2020_allocation_full": FRONT,
+    "rv20e_allocation": FRONT,
     "rv20e_diagnosis": r"\d",
     "song2019_modification": r"genetic|^ +\d+\.\d+,?$",
     "zhang2025_assembly": r"^zhang2025's genetic algorithm|^ +\"[\d.]+,[\d.]+,2,",
 }
 """Study → lines that follow a random search: the whole of a search for causes, the amounts of an evolution, its excess
-over a certified cost."""
+over a certified cost, the designs of a front with the radial clearance."""
+AGREEMENT = {"liu2020_allocation_full": 1e-5}
+"""Study → agreement of processors on where a convex program has its least cost: the place is flatter than the value,
+which agrees to 1e-8."""
 
 
 def shipped(study: str) -> Case:
     """Return the case of a shipped study by its file's stem."""
     command = f"run studies/{study}.py --quick --out @run"
-    return Case(name=SHIPPED.format(study), commands=(command,), wandering=WANDERING.get(study, Case.wandering))
+    return Case(
+        name=SHIPPED.format(study),
+        commands=(command,),
+        wandering=WANDERING.get(study, Case.wandering),
+        agreement=AGREEMENT.get(study, Case.agreement),
+    )

@@ -19,11 +19,11 @@ def can_print() -> bool:
 
 
 class _Shown(HTMLParser):
-    """Texts of the cells that are not folded, and the texts of every picture."""
+    """Texts of the cells and of the pictures that are not folded."""
 
     def __init__(self, page: str):
         super().__init__()
-        self.cells, self.pictures = [""], []
+        self.cells, self.pictures, self._drawn = [""], [], []
         self._open, self._folded = "", 0
         self.feed(page)
 
@@ -32,10 +32,12 @@ class _Shown(HTMLParser):
         if tag == "details":
             self._folded += 1
         elif tag == "svg":
-            self.pictures.append([])
+            self._drawn = []
+            if not self._folded:
+                self.pictures.append(self._drawn)
         if tag in ("td", "text"):
             self._open = tag
-            (self.cells if tag == "td" else self.pictures[-1]).append("")
+            (self.cells if tag == "td" else self._drawn).append("")
 
     def handle_endtag(self, tag):
         self._separate()
@@ -52,7 +54,7 @@ class _Shown(HTMLParser):
         if self._open == "td" and not self._folded:
             self.cells[-1] += data
         elif self._open == "text":
-            self.pictures[-1][-1] += data
+            self._drawn[-1] += data
 
 
 def lost(page: Path, folder: Path, paper: str = "A4") -> list[str]:

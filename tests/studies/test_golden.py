@@ -23,11 +23,11 @@ def value(text: str) -> float:
     return float(text.replace(",", "").replace("−", "-"))
 
 
-def alike(one: str, other: str, relative: float) -> bool:
+def alike(one: str, other: str, relative: float, absolute: float = 1e-9) -> bool:
     """Return whether two numbers agree, or differ by one in the last place that is written."""
     decimals = len(one.partition(".")[2]) if "e" not in one.lower() else 0
     last = 10.0**-decimals if decimals < 8 else 0.0
-    return isclose(value(one), value(other), rel_tol=relative, abs_tol=max(1.01 * last, 1e-9))
+    return isclose(value(one), value(other), rel_tol=relative, abs_tol=max(1.01 * last, absolute))
 
 
 def laid_out(text: str) -> list[str]:
@@ -35,12 +35,12 @@ def laid_out(text: str) -> list[str]:
     return re.sub(r"[ ─━]+", " ", NUMBER.sub("#", text)).splitlines()
 
 
-def require_alike(before: str, now: str, relative: float) -> None:
+def require_alike(before: str, now: str, relative: float, absolute: float = 1e-9) -> None:
     """Assert the same words and numbers, whichever of equal extremes of a turn a processor finds first."""
     before, now = (re.sub(r"at [\d.]+°", "at °", text) for text in (before, now))
     assert laid_out(now) == laid_out(before)
     pairs = zip(NUMBER.findall(before), NUMBER.findall(now), strict=True)
-    assert not [pair for pair in pairs if not alike(*pair, relative)]
+    assert not [pair for pair in pairs if not alike(*pair, relative, absolute)]
 
 
 def require_golden(name: str, run: Run = tolalloc, look: Look = lambda *_: None) -> None:
@@ -49,7 +49,10 @@ def require_golden(name: str, run: Run = tolalloc, look: Look = lambda *_: None)
     prose, numbers = recorded(case, run, look)
     before, known = kept(name)
     require_alike(*(_settled(case, text) for text in (before, prose)), 1e-3)
-    require_alike(*(_settled(case, json.dumps(these, indent=1)) for these in (known, numbers)), 1e-6)
+    absolute = case.agreement if case.agreement > Case.agreement else 1e-9
+    require_alike(
+        *(_settled(case, json.dumps(these, indent=1)) for these in (known, numbers)), case.agreement, absolute
+    )
 
 
 def _settled(case: Case, text: str) -> str:

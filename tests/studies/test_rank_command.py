@@ -53,7 +53,7 @@ def ranked(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("rank")
     result = tolalloc("rank", script_with(path), "--out", path / "report")
     assert result.returncode == 0, result.stderr
-    assert "total index" in result.stdout
+    assert "total-effect index" in result.stdout
     return path / "report"
 
 

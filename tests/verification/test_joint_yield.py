@@ -168,6 +168,4 @@ def test_the_first_sentence_says_the_yield_of_all_limits(answers):
     answer = answers["independent"]
     chosen = answer.result.chosen
     assert says(answer.sentences[0], "allocation.met_jointly", share=chosen.joint.estimate, high=chosen.joint.high)
-    for own in answer.result.yields.values():
-        assert says(answer.sentences[0], "allocation.each", share=own.estimate)
     assert not says(answer.sentences, "allocation.all_limits")
