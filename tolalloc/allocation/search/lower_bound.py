@@ -10,26 +10,26 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.search import process_choice
-from tolalloc.allocation.search.lagrange_dual import cost_bound
 from tolalloc.allocation.space.joint_yield import JointCheck, JointRequirement
 from tolalloc.allocation.space.output_sample import LimitedSample
 from tolalloc.allocation.space.problem import OneSidedConstraint, Solution, Stack, root_sum_square_stack
 from tolalloc.allocation.space.requirement import AtYield, Check, QuantileBound, RootSumSquare, Sampled
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.capability.monte_carlo import CONFIDENCE
+from tolalloc.exceptions import SolveError
 
 _ROUNDING = 1e-9
 """Part of a budget by which a load that is its own budget may lie beyond it [-]."""
 _COUNTS = 0.05
 """Part of the failures below which a limit hardly counts [-]."""
-_CUTS = 10
+_CUTS = 20
 """Cuts of boxes of divisions [-]."""
+_NODES = 50
+"""Nodes of the search for what a box costs [-]."""
 _COUNTED = 100.0
 """Failing units that tell how many failures coincide [-]."""
 _WIDEST = 0.25
 """Share of all units, at most, that is counted as failing for it [-]."""
-_LEAST_WORTH = 0.1
-"""Worth of a budget, over the largest one, from which its price is looked for [-]."""
 
 Rises = Float[np.ndarray, " limit"]
 """By how much every limit is further in [unit of its output]."""
@@ -73,20 +73,20 @@ def lower_bound(design: VerifiedDesign) -> LowerBound:
     >>> round(lower_bound(verifier.verify(verifier.space.uniform(1.0), "as drawn")).cost, 4)
     1.9731
     """
-    space, solved = design.space, list[Solution]()
+    space, series = design.space, list[process_choice.BudgetSeries]()
 
     def cheapest(stacks: tuple[Stack, ...]) -> tuple[float, Float[np.ndarray, " variable"]] | None:
         found = process_choice.allocate(space.problem(stacks))
-        if not isinstance(found, Solution):
-            return None
-        solved.append(found)
-        return found.bound, np.concatenate([found.zones, found.shared])
+        return (found.bound, np.concatenate([found.zones, found.shared])) if isinstance(found, Solution) else None
 
     def near_by(stacks: tuple[Stack, ...]) -> float:
-        problem, worth = space.problem(stacks), solved[-1].prices
-        # A limit that costs nothing where it is may cost something further in.
-        least = _LEAST_WORTH * float((worth * problem.scales).max(initial=0.0)) / problem.scales
-        return cost_bound(problem, np.maximum(worth, least), solved[-1].zones)
+        if not series:
+            series.append(process_choice.BudgetSeries(space.problem(stacks)))
+        try:
+            found = series[0].allocate(np.array([stack.budget for stack in stacks]), _NODES)
+        except SolveError:
+            return -np.inf
+        return found.bound if isinstance(found, Solution) else np.inf
 
     return LowerBound(
         cost=least_cost(design, cheapest, near_by) + space.locked_cost,
@@ -107,7 +107,7 @@ def least_cost(design: VerifiedDesign, cheapest: Cheapest, near_by: Callable[[tu
     cheapest
         What chooses the design.
     near_by
-        Lower bound on the cost of what keeps stacks that are tighter than those chosen for last [cost units].
+        Lower bound on the cost of what keeps the stacks chosen for last with other budgets [cost units].
 
     Notes
     -----
@@ -177,9 +177,9 @@ def _least_of_divisions(design: VerifiedDesign, joint: JointCheck, least: Callab
     lower, upper = np.zeros(len(counting)), np.ones(len(counting))
     boxes = [(cost(upper), 0, lower, upper)]
     for number in range(1, _CUTS + 1 if len(counting) > 1 else 1):
-        _, _, lower, upper = heapq.heappop(boxes)
+        whole, _, lower, upper = heapq.heappop(boxes)
         for half, (below, above) in enumerate(_halves(lower, upper, apart)):
-            heapq.heappush(boxes, (cost(above), 2 * number + half, below, above))
+            heapq.heappush(boxes, (max(whole, cost(above)), 2 * number + half, below, above))
     return boxes[0][0]
 
 

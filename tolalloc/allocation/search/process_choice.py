@@ -62,20 +62,57 @@ def front(
 ) -> tuple[Solution | LeastInfeasible, ...]:
     """Return what `allocate` finds for every budget of the stack at a position.
 
-    Each search begins with the processes and the prices of the one before: neighbours are mostly made alike, and a
-    program that is compiled takes other budgets.
-
     Raises
     ------
     InputError, SolveError
         As of `allocate`.
     """
-    found, before = list[Solution | LeastInfeasible](), None
-    for budget in budgets.tolist():
-        stacks = (*problem.stacks[:at], replace(problem.stacks[at], budget=budget), *problem.stacks[at + 1 :])
-        before = _BranchAndBound(replace(problem, stacks=stacks), before)
-        found.append(before.answer(most_nodes))
-    return tuple(found)
+    series, rows = BudgetSeries(problem), np.tile([stack.budget for stack in problem.stacks], (budgets.size, 1))
+    rows[:, at] = budgets
+    return tuple(series.allocate(row, most_nodes) for row in rows)
+
+
+class BudgetSeries:
+    """Allocations of one problem at other budgets of its stacks.
+
+    Each begins with the processes and the prices of the one before: neighbours are mostly made alike, and a program
+    that is compiled takes other budgets.
+
+    Parameters
+    ----------
+    problem
+        The allocation; its own budgets are not used.
+    """
+
+    def __init__(self, problem: AllocationProblem) -> None:
+        self.problem = problem
+        self._before: _BranchAndBound | None = None
+
+    def allocate(self, budgets: Float[np.ndarray, " stack"], most_nodes: int = 500) -> Solution | LeastInfeasible:
+        """Return what `allocate` finds for other budgets [unit of each stack].
+
+        Raises
+        ------
+        InputError, SolveError
+            As of `allocate`.
+
+        Examples
+        --------
+        A bore that costs 12/zone, at most 4 and at most 2 wide:
+
+        >>> from tolalloc.allocation.cost.model import Process, Reciprocal
+        >>> from tolalloc.allocation.space.problem import PricedFeature, Stack
+        >>> ground = Process(name="ground", cost=Reciprocal(factor=12.0), minimum=1.0, maximum=9.0)
+        >>> stack = Stack(name="play", worst_case=np.ones(1), root_sum_square=np.zeros(1), budget=0.0)
+        >>> bore = PricedFeature(name="bore", processes=(ground,))
+        >>> series = BudgetSeries(AllocationProblem(features=(bore,), stacks=(stack,)))
+        >>> [round(series.allocate(np.array([budget])).cost, 6) for budget in (4.0, 2.0)]
+        [3.0, 6.0]
+        """
+        pairs = zip(self.problem.stacks, budgets.tolist(), strict=True)
+        stacks = tuple(replace(stack, budget=budget) for stack, budget in pairs)
+        self._before = _BranchAndBound(replace(self.problem, stacks=stacks), self._before)
+        return self._before.answer(most_nodes)
 
 
 def second_best(problem: AllocationProblem, best: Solution, most_nodes: int = 500) -> Solution | None:
