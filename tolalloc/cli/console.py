@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import sys
 import textwrap
@@ -204,10 +205,13 @@ class Bars:
 AsJson = Annotated[bool, typer.Option("--json", help="Print machine-readable output only.")]
 ReportFolder = Annotated[Path | None, typer.Option(help="Write a report into this folder, new or empty.")]
 
-_FRAME, _BETWEEN = 4, 3
+_BETWEEN = 3
+"""Blanks between two columns [characters]."""
 _NARROWEST = 40
 """Characters of a line below which nothing is broken [-]."""
-"""What the frame takes around the first column, and around every other one [characters]."""
+_UNIT = re.compile(r"(?<=\d) (?=(?:%|µm|mm|N|N·m|s|units|arcmin|arcsec|K)(?![^\W\d_]))")
+_JOINED = "\u00a0"
+"""Blank between a number and its unit, which are not parted at the end of a line."""
 
 
 def note(sentence: str, *, dim: bool = False) -> None:
@@ -244,6 +248,7 @@ def print_table(frame: pd.DataFrame, title: str) -> None:
 
     Columns that do not stand beside the others follow in a table of their own, with the first column again.
     """
+    from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
@@ -254,13 +259,15 @@ def print_table(frame: pd.DataFrame, title: str) -> None:
     words = [word for text in (names[0], *cells[0]) for word in text.split()]
     first = max(map(len, words), default=1)
     widths = [max(map(len, (" ", *name.split(), *own))) for name, own in zip(names, cells, strict=True)]
-    for number, columns in enumerate(_side_by_side(widths[1:], console.width - first - _FRAME)):
-        table = Table(title=escape(title if number == 0 else f"{title}, continued"))
+    for number, columns in enumerate(_side_by_side(widths[1:], console.width - first)):
+        heading = escape(title if number == 0 else f"{title}, continued")
+        table = Table(title=heading, title_justify="left", box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
         shown = [0, *columns]
         least = [first, *(widths[column] for column in columns)]
         most = [max(map(len, (names[column], *cells[column]))) for column in shown]
-        room = console.width - _FRAME - _BETWEEN * len(columns)
-        for column, width in zip(shown, _widened(least, most, room), strict=True):
+        room = console.width - _BETWEEN * len(columns)
+        named = _widened(least, [most[0], *least[1:]], room)  # a head may have several lines, a name had better not
+        for column, width in zip(shown, _widened(named, most, room), strict=True):
             table.add_column(escape(names[column]), justify="right" if column else "left", width=width)
         for row in rows:
             table.add_row(escape(row[0]), *(escape(row[column]) for column in columns))
@@ -318,7 +325,8 @@ def say(sentence: str, *, warns: bool = False) -> None:
     """Print a sentence, on a screen broken between words and never inside one."""
     if sys.stdout.isatty():
         width = max(shutil.get_terminal_size().columns, _NARROWEST)
-        sentence = textwrap.fill(sentence, width, break_long_words=False, break_on_hyphens=False)
+        sentence = textwrap.fill(_UNIT.sub(_JOINED, sentence), width, break_long_words=False, break_on_hyphens=False)
+        sentence = sentence.replace(_JOINED, " ")
     typer.secho(sentence, fg="yellow" if warns else None)
 
 

@@ -3,7 +3,7 @@
 const SVG = "http://www.w3.org/2000/svg";
 const COLOURS = ["#1f4e79", "#d9822b", "#3a8f5c", "#8c3b7a", "#7f7f7f", "#b8a100", "#17a2b8", "#c0392b", "#6a4fc3"];
 const LETTER = 6.6; // width of a letter at 12 px, on average
-const NARROW = 520; // below, the names of bars stand above them
+const NARROW = 520; // below, names of bars that take more than two fifths stand above them
 
 export const colour = (number) => `var(--series-${number % COLOURS.length}, ${COLOURS[number % COLOURS.length]})`;
 
@@ -144,12 +144,17 @@ export class Chart {
     return list;
   }
 
+  middle(left, right, label) { // of a label below the plot, which may be wider than that
+    const half = LETTER * String(label ?? "").length / 2;
+    return Math.max(half, Math.min((left + this.width - right) / 2, this.width - half));
+  }
+
   canvas(height, width = this.width) {
     return node("svg", { viewBox: `0 0 ${width} ${height}`, width, height });
   }
 
   plane() {
-    const { figure } = this, height = figure.height ?? Math.max(220, Math.min(380, 0.55 * this.width));
+    const { figure } = this, height = figure.height ?? Math.max(180, Math.min(380, 0.55 * this.width));
     const svg = this.canvas(height);
     let [xl, xh] = this.zoom ?? padded(range(extent(figure, "x")), 0.02, figure.logarithmic_x);
     const positive = (values, logarithmic) => (logarithmic ? values.filter((value) => value > 0) : values);
@@ -187,7 +192,7 @@ export class Chart {
       svg.append(node("line", { class: "grid", x1: x.at(value), x2: x.at(value), y1: top, y2: height - bottom }));
       svg.append(node("text", { class: "tick", x: x.at(value), y: height - bottom + 16, "text-anchor": "middle" }, number(value)));
     }
-    svg.append(node("text", { class: "label", x: (left + this.width - right) / 2, y: height - 8, "text-anchor": "middle" }, figure.x_label));
+    svg.append(node("text", { class: "label", x: this.middle(left, right, figure.x_label), y: height - 8, "text-anchor": "middle" }, figure.x_label));
     svg.append(node("text", { class: "label", x: 4, y: 12 }, figure.y_label ?? "")); // above its axis, where it is read without turning
   }
 
@@ -241,8 +246,9 @@ export class Chart {
 
   bars() {
     const { figure } = this, items = figure.series.filter((item) => item.kind === "bars");
-    const names = items[0].x, narrow = this.width < NARROW;
+    const names = items[0].x;
     const longest = Math.max(...names.map((name) => String(name).length), 4);
+    const narrow = this.width < NARROW && 16 + LETTER * longest > 0.4 * this.width;
     const left = narrow ? 12 : Math.min(16 + LETTER * longest, 0.45 * this.width), right = 16, top = 8;
     const row = (narrow ? 16 : 4) + 14 * items.length + 4, height = top + row * names.length + 44;
     const svg = this.canvas(height);
@@ -255,7 +261,7 @@ export class Chart {
       svg.append(node("line", { class: "grid", x1: x.at(value), x2: x.at(value), y1: top, y2: height - 44 }));
       svg.append(node("text", { class: "tick", x: x.at(value), y: height - 28, "text-anchor": "middle" }, number(value)));
     }
-    svg.append(node("text", { class: "label", x: (left + this.width - right) / 2, y: height - 8, "text-anchor": "middle" }, figure.x_label));
+    svg.append(node("text", { class: "label", x: this.middle(left, right, figure.x_label), y: height - 8, "text-anchor": "middle" }, figure.x_label));
     const zero = x.at(figure.logarithmic_x ? low : Math.max(low, Math.min(0, high)));
     names.forEach((name, place) => {
       const from = top + row * place + (narrow ? 16 : 2);

@@ -14,7 +14,7 @@ from tolalloc.allocation.space.requirement import USUAL_YIELD
 from tolalloc.exceptions import InputError
 from tolalloc.models.model import Units
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE
-from tolalloc.reducers import PRELOAD
+from tolalloc.reducers import FRICTION_TORQUE, PRELOAD, RADIAL_CLEARANCE
 from tolalloc.reducers.contact import contact_of
 from tolalloc.reducers.cycloid.clearance import LARGE, is_large
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
@@ -39,6 +39,12 @@ if TYPE_CHECKING:
 
 _ORDERS = 130
 """Orders of the output turn that a report lists [-]."""
+_SPOKEN = {
+    PRELOAD: "pin force without torque",
+    FRICTION_TORQUE: "no-load friction torque",
+    RADIAL_CLEARANCE: "least radial clearance",
+}
+"""Output → what a sentence and the first table call it, shorter than its name."""
 _COARSE = 8
 """Angles per turn of the cranks in a report, which stays small [-]."""
 _COUNTED = (
@@ -109,8 +115,8 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
         )
 
     def display_name(self, output: str) -> str:
-        """Return what a sentence calls an output; there is one peak-to-peak."""
-        return super().display_name(output).removesuffix(" transmission error")
+        """Return what a sentence calls an output; there is one peak-to-peak, and one friction without load."""
+        return _SPOKEN.get(output, super().display_name(output).removesuffix(" transmission error"))
 
     def amounts(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, float]:
         """Return the amounts that a grinder sets, and the clearances that they leave [µm]."""
