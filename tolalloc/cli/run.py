@@ -201,7 +201,7 @@ class _Place:
                 asked = Compare(first=self.before, second=self.folder)
                 found = asked.solve(asked.prepare(), SILENT)
                 for sentence in ComparisonTeller(found.result, found.header).since:
-                    typer.echo(sentence)
+                    say(sentence)
 
 
 def _run(study: Study, kinds: tuple[str, ...], place: _Place, checkpoint: Path | None, way: _Way) -> None:
