@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -162,7 +163,8 @@ def on_screen(width: int, folder: Path) -> dict[str, str]:
     folder.mkdir()
     (folder / "own.py").write_text(OWN, encoding="utf-8")
     program = [sys.executable, "-c", PROGRAM, str(width), json.dumps(ON_SCREEN)]
-    result = subprocess.run(program, cwd=folder, capture_output=True, text=True, check=True)
+    environment = {name: value for name, value in os.environ.items() if name != "COLUMNS"}
+    result = subprocess.run(program, cwd=folder, env=environment, capture_output=True, text=True, check=True)
     return {command: kept(text) for command, text in json.loads(result.stdout).items()}
 
 
