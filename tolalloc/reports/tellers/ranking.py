@@ -419,7 +419,6 @@ class RankingTeller(Teller[RankingResult]):
             ),
             Section(
                 heading=_say("surrogates_heading"),
-                paragraphs=(chosen_surrogate(result.choice),),
                 tables=(("surrogates", tables.surrogate_table(result.choice)),),
             ),
             Section(
