@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
     from tolalloc.drawings.error_model import ErrorModel
 
+_PHASES = 24
+"""Angles of a turn of the crankshafts at which its turns are compared [-]."""
 _ORDERS = 130
 """Orders of the output turn that a report lists [-]."""
 _SPOKEN = {
@@ -369,7 +371,11 @@ def _illustrated(model: ReducerModel, units: Units) -> tuple[Section, ...]:
     return (
         Section(
             heading="Single units over one output turn",
-            figures=(_curve_figure(curves, model.kernel.torque), _order_figure(curves, model.reducer)),
+            figures=(
+                _curve_figure(curves, model.kernel.torque),
+                _crank_turn_figure(curves, model.reducer),
+                _order_figure(curves, model.reducer),
+            ),
             tables=(("orders of units", _order_table(curves)),),
         ),
         Section(
@@ -411,6 +417,30 @@ def _curve_figure(curves: Mapping[str, Equilibria], torque: float) -> Figure:
             for label, curve in curves.items()
         ),
     )
+
+
+def _crank_turn_figure(curves: Mapping[str, Equilibria], reducer: Reducer) -> Figure:
+    """Return the same over one turn of the crankshafts: the mean of all their turns, and between which they lie."""
+    return Figure(
+        name="crank_turn",
+        title="The same over one turn of the crankshafts: mean of all turns, the band holds every one",
+        x_label="crank angle [°]",
+        y_label="transmission error, output side [arcsec]",
+        series=tuple(_crank_turn(label, curve, reducer.cycloid_stage.disc_teeth) for label, curve in curves.items()),
+    )
+
+
+def _crank_turn(label: str, curve: Equilibria, disc_teeth: int) -> Series:
+    """Return the curve of a unit folded onto one turn of the crankshafts."""
+    phase = (curve.carrier_angle * disc_teeth / (2 * np.pi)) % 1.0
+    place = np.minimum((phase * _PHASES + 0.5).astype(int) % _PHASES, _PHASES - 1)
+    errors = curve.transmission_error[0] / ARCSECOND
+    parts = [errors[place == at] for at in range(_PHASES)]
+    known = [at for at, own in enumerate(parts) if own.size]
+    low, mean, high = zip(
+        *((float(own.min()), float(own.mean()), float(own.max())) for own in parts if own.size), strict=True
+    )
+    return Series(label=label, kind="line", x=[360.0 / _PHASES * at for at in known], y=mean, low=low, high=high)
 
 
 def _amplitudes(curve: Equilibria) -> Float[np.ndarray, " order"]:
