@@ -357,6 +357,8 @@ def warnings(result: AllocationResult, header: Header) -> tuple[str, ...]:
     found += [f"{own.sentence}." for own in result.space.settings if own.out_of_bounds]
     fault = examined(result).fault or ""
     found += [own for own in portrait_of(result.model).cautions(chosen.settings) if own not in fault]
+    if result.front_lacks:
+        found.append(_say("front_lacks", why=result.front_lacks))
     if result.fronts and not result.fronts.score.q2 >= NEEDED_Q2:
         found.append(_say("surrogate"))
     if result.fronts and (lost := result.fronts.searched.failed):
