@@ -280,8 +280,8 @@ def _examination(portrait: ReducerPortrait, figures: Mapping[str, float]) -> Exa
     half, least = figures["median pin force without torque [N]"], figures["least radial clearance [µm]"]
     sentences = (
         *model.mismatches,
-        f"Nominal clearance {flank:.3g} µm on the flank and {radial:.3g} µm at tip and root, which leave "
-        f"{2 * flank * MICROMETRE / stage.disc_pitch_radius / ARCMINUTE:.2g}′ of free rotation.",
+        f"Nominal clearance {number(flank, '.3g')} µm on the flank and {number(radial, '.3g')} µm at tip and root, which "
+        f"leave {number(2 * flank * MICROMETRE / stage.disc_pitch_radius / ARCMINUTE, '.2g')}′ of free rotation.",
         f"Of {count:,} simulated reducers {number(figures['share preloaded [-]'], '.1%')} are preloaded"
         f"{unsolved}: without torque their pins press with more than "
         f"the {model.rated_pin_force:,.0f} N of the rated torque; half of all press with "
@@ -358,7 +358,7 @@ def _advice(model: ReducerModel) -> str:
         else "flank_clearance=(smallest, largest) of ta.reducer(...) would let the allocation open it"
     )
     return (
-        f"a tooth modification that leaves more than the present {flank:.3g} µm on the flank frees them; "
+        f"a tooth modification that leaves more than the present {number(flank, '.3g')} µm on the flank frees them; "
         f"`tolalloc modify` proposes one, and {freely}"
     )
 
