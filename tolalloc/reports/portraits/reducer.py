@@ -280,8 +280,8 @@ def _examination(portrait: ReducerPortrait, figures: Mapping[str, float]) -> Exa
     half, least = figures["median pin force without torque [N]"], figures["least radial clearance [µm]"]
     sentences = (
         *model.mismatches,
-        f"Nominal clearance {number(flank, '.3g')} µm on the flank and {number(radial, '.3g')} µm at tip and root, which "
-        f"leave {number(2 * flank * MICROMETRE / stage.disc_pitch_radius / ARCMINUTE, '.2g')}′ of free rotation.",
+        f"Nominal clearance {number(flank, '.3g')} µm on the flank and {number(radial, '.3g')} µm at tip and root, "
+        f"which leave {number(2 * flank * MICROMETRE / stage.disc_pitch_radius / ARCMINUTE, '.2g')}′ of free rotation.",
         f"Of {count:,} simulated reducers {number(figures['share preloaded [-]'], '.1%')} are preloaded"
         f"{unsolved}: without torque their pins press with more than "
         f"the {model.rated_pin_force:,.0f} N of the rated torque; half of all press with "
