@@ -71,6 +71,32 @@ def test_one_cell_is_both_deviations(tmp_path, sign, with_minus):
     assert lid == plain(tmp_path)[2]
 
 
+@pytest.mark.parametrize(
+    ("fit", "size", "unit", "plus", "minus"),
+    [("h5", "25", "mm", 0, -9), ("H7", "25", "µm", 21, 0), ("js6", "40", "µm", 8, -8), ("IT6", "40", "mm", 8, -8)],
+)
+def test_a_fit_is_both_deviations_of_a_size(tmp_path, fit, size, unit, plus, minus):
+    row = f"pin;pin;{size};{fit};{unit};normal;no;;{'0.002;0.1' if unit == 'mm' else '2;100'};1"
+    (pin,) = load_tolerance_table(written(tmp_path, f"{HEADS.replace('minus [unit];', '')}\n{row}\n"))
+    assert pin.zone == pytest.approx((plus - minus) * 1e-6)
+    assert pin.middle == pytest.approx((plus + minus) / 2 * 1e-6, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        ("pin;pin;;h5;0;mm;normal;no;;0.002;0.1;1", "plus is 'h5'; allowed is a number"),
+        ("pin;pin;;h5;;mm;normal;no;;0.002;0.1;1", "a fit is that of a diameter or width with its nominal size"),
+        ("pin.radius;pin;3;h5;;mm;normal;no;;0.002;0.1;1", "a fit is that of a diameter or width"),
+        ("pin;pin;30;z5;;mm;normal;no;;0.002;0.1;1", r"row 2 \(pin\): ISO 286-2: fit is 'z5'"),
+        ("pin;pin;900;h5;;mm;normal;no;;0.002;0.1;1", r"row 2 \(pin\): ISO 286-1: nominal \[mm\] is 900"),
+    ],
+)
+def test_a_fit_without_a_size_is_refused(tmp_path, row, words):
+    with pytest.raises(InputError, match=words):
+        load_tolerance_table(written(tmp_path, f"{HEADS}\n{row}\n"))
+
+
 def own_columns(folder):
     heads = HEADS.replace("id;", "id;Zeichn.-Nr.;") + ";Bemerkung;Prüfmittel [Nr]"
     rows = [row.replace(";", f";Z-{at};", 1) + f";Zeile {at};{at}7" for at, row in enumerate(ROWS)]

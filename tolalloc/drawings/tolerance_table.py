@@ -18,10 +18,12 @@ from pydantic import Field, model_validator
 
 from tolalloc.drawings.distributions import Distribution, require_shape
 from tolalloc.drawings.fields import ALLOWED_UNITS, COLUMNS, UNITS, Cell, ToleranceRow, headers_in
+from tolalloc.drawings.ladder import RADII, fit_deviations, is_fit
 from tolalloc.drawings.sources import Source, known_as
 from tolalloc.drawings.table_file import (
     DATA,
     Heads,
+    plain_number,
     read_rows,
     read_table_file,
     require_columns,
@@ -296,7 +298,7 @@ def load_tolerance_table(
     """Return the sources of a tolerance table and its processes, each by shipped name or from the user's file.
 
     Of a workbook the named sheet is read, the first unless named. Columns of the user's own are kept (`own_heads`); an
-    office's heads stand for names of columns. One cell "± 0.05" is both deviations of a row.
+    office's heads stand for names of columns. One cell "± 0.05" or "h6" is both deviations of a row.
 
     Raises
     ------
@@ -309,7 +311,7 @@ def load_tolerance_table(
     own = own_heads(path, [name for name, _ in stated])
     headers = tuple(name for name, _ in stated)
     plus = headers.index("plus") if "plus" in headers else 0
-    both = others and "minus" not in headers and all(_BOTH.match(cells[plus]) for _, cells in others)
+    both = others and "minus" not in headers and all(_says_both(cells[plus]) for _, cells in others)
     kept = tuple(name for name in headers if name not in own)
     require_columns(path, (*kept, "minus") if both else kept, ToleranceRow)
     if len(set(own)) < len(own):
@@ -319,7 +321,10 @@ def load_tolerance_table(
         raise InputError(f"{path}: the table has no rows; one row per source is needed.")
     rows = [(number, dict(zip(headers, cells, strict=True))) for number, cells in others]
     _require_units(path, [(name, unit) for name, unit in stated if name not in own], rows)
-    known = [(number, _both_ways({name: row[name] for name in kept})) for number, row in rows]
+    known = [
+        (number, _both_ways({name: row[name] for name in kept}, f"{path}, row {number} ({row['id'] or 'no id'})"))
+        for number, row in rows
+    ]
     sources = sources_of_rows(known, capabilities, str(path), path.parent)
     full = dict(zip((split_header(header)[0] for header in first), first, strict=True))
     return tuple(
@@ -332,13 +337,38 @@ _BOTH = re.compile(r"(?:±|\+/-|\+-)\s*")
 """What stands before a number that is both deviations."""
 
 
-def _both_ways(row: dict[str, str]) -> dict[str, str]:
-    """Return a row with the minus of a plus that is both deviations, where it states no other."""
-    sign = _BOTH.match(row.get("plus", ""))
-    if sign is None or row.get("minus"):
+def _says_both(plus: str) -> bool:
+    """Return whether a cell says both deviations: behind ±, or as a fit."""
+    return _BOTH.match(plus) is not None or is_fit(plus)
+
+
+def _both_ways(row: dict[str, str], place: str) -> dict[str, str]:
+    """Return a row with both deviations of one cell that says both, where it states no other.
+
+    Raises
+    ------
+    InputError
+        A fit of what has no nominal size, or is no size or a radius.
+    """
+    plus = row.get("plus", "")
+    if not _says_both(plus) or row.get("minus"):
         return row
-    size = row["plus"][sign.end() :].replace(",", ".")
-    return {**row, "plus": size, "minus": f"-{size}"}
+    if sign := _BOTH.match(plus):
+        size = plus[sign.end() :].replace(",", ".")
+        return {**row, "plus": size, "minus": f"-{size}"}
+    nominal, feature = row.get("nominal", ""), row.get("feature", "") or Feature.SIZE
+    if feature != Feature.SIZE or row["id"].rsplit(".", 1)[-1] in RADII or not nominal:
+        allowed = "plus and minus, since a fit is that of a diameter or width with its nominal size"
+        raise InputError.at(place, "plus", plus, allowed)
+    unit = UNITS.get(usual_signs(row.get("unit", "")), 1.0) * MICROMETRE
+    try:
+        deviations = fit_deviations(plus, plain_number(nominal) * MILLIMETRE)
+    except ValueError:
+        raise InputError.at(place, "nominal", nominal, "a number with a decimal point") from None
+    except InputError as error:
+        raise InputError(f"{place}: {error}") from None
+    upper, lower = (f"{round(one / unit, 9):.9g}" for one in deviations)
+    return {**row, "plus": upper, "minus": lower}
 
 
 def _require_units(path: Path, stated: Sequence[tuple[str, str]], rows: Sequence[tuple[int, dict[str, str]]]) -> None:
