@@ -55,6 +55,11 @@ table = found.to_frame("drawing")
 print(table.to_string(index=False, max_colwidth=24))
 
 # %%
-# The cost against the limit, as far as it may move:
+# The gap before and after, in random units, with both limits:
 
-found.plot()
+found.plot("gap")
+
+# %%
+# And the zones:
+
+found.plot("zones")
