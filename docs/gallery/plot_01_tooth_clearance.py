@@ -2,10 +2,10 @@
 Gaps of the modified teeth
 ==========================
 
-What the tooth modification takes off, along the normal, from the root of a tooth to its tip.
+The clearance that the tooth modification leaves, from root to tip, once the first pin touches, and how far the load closes it.
 
-**Read off it:** the teeth touch first where the curve, seen by its lever, is lowest; the ends of the curve are the gaps at
-root and tip, where no tooth may press.
+**Read off it:** the first pin touches where the clearance is zero; pins carry between the dashed lines, where the load closes
+more than the clearance; at both ends, root and tip, the gap must stay open.
 """
 
 import tolalloc as ta

@@ -2,10 +2,11 @@
 Which tolerance drives the error
 ================================
 
-Each bar is the part of the variance of the peak-to-peak in which one source takes part, with its 90 % interval; the dark
-part is what it does alone.
+Three bars for each line of the drawing: its part in the variance of the peak-to-peak (total-effect index), what it does
+alone (first-order index), each with its 90 % interval, and the effect of one micrometre, relative to the largest.
 
-**Read off it:** where intervals of neighbours overlap, their order is not settled. A longer run settles it.
+**Read off it:** the first bar says which tolerance to improve. Where intervals of neighbours overlap, their order is not
+settled; a longer run settles it.
 """
 
 import tolalloc as ta

@@ -40,7 +40,8 @@ for row, (label, locked) in enumerate({"all free": (), "shaft locked": ("shaft",
     found = allocated(locked)
     table = found.to_frame("drawing")
     places = [place + 0.4 * row - 0.2 for place in range(len(table))]
-    axes.barh(places, table["zone [µm]"], 0.36, label=f"{label}: cost {found.result.cost:.2f}")
+    colour = ("#1f4e79", "#d9822b")[row]
+    axes.barh(places, table["zone [µm]"], 0.36, color=colour, label=f"{label}: cost {found.result.cost:.2f}")
 axes.set_yticks(range(len(table)), table["source"])
 axes.set(xlabel="zone [µm]")
 axes.legend()

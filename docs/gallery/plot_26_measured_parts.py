@@ -18,7 +18,8 @@ import tolalloc as ta
 
 folder = ta.new(Path(mkdtemp()) / "mine", samples="all")
 pins = pd.read_csv(folder / "pin_diameters.csv", comment="#").iloc[:, 0].to_numpy()
-zone = 4.0  # µm, the full width
+rows = ta.drawing(folder / "zones.csv").to_frame().set_index("id")
+zone = rows.loc["pin.diameter", "plus [unit]"] - rows.loc["pin.diameter", "minus [unit]"]  # µm, the full width
 sigma, along = zone / 6, np.linspace(-zone, zone, 200)
 figure, axes = plt.subplots(figsize=(8, 4), constrained_layout=True)
 axes.hist(pins, bins=15, density=True, color="#9bb7d4", label=f"{pins.size} measured pins")
