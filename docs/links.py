@@ -44,7 +44,9 @@ class PercentSigns(SphinxTransform):
     def apply(self, **_: Any) -> None:
         """Put a narrow space that does not break before each."""
         for node in list(self.document.findall(nodes.Text)):
-            if not isinstance(node.parent, nodes.literal | nodes.literal_block | nodes.math | nodes.math_block | nodes.raw):
+            if not isinstance(
+                node.parent, nodes.literal | nodes.literal_block | nodes.math | nodes.math_block | nodes.raw
+            ):
                 text = PERCENT.sub("\u202f%", node.astext())
                 if text != node.astext():
                     node.parent.replace(node, nodes.Text(text))

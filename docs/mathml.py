@@ -1,6 +1,6 @@
-"""Equations of the handbook as MathML, which a browser draws by itself: no script, no network, no picture.
+r"""Equations of the handbook as MathML, which a browser draws by itself: no script, no network, no picture.
 
-A displayed equation says its number by ``\\tag{13}``; the page shows it at the right, and ``#equation-13`` leads there.
+A displayed equation says its number by ``\tag{13}``; the page shows it at the right, and ``#equation-13`` leads there.
 The font of the equations is made when the handbook is: the glyphs that equations need, of STIX Two Math.
 """
 
@@ -9,10 +9,10 @@ from __future__ import annotations
 import logging
 import re
 from html import escape
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import ziamath
 from docutils import nodes
 from fontTools import subset
 from latex2mathml.converter import convert
@@ -22,7 +22,8 @@ TAG = re.compile(r"\s*\\tag\{(\d+)\}\s*")
 FUNCTION = re.compile(r"<m[io]>(sin|cos|ln|arg|exp|max|min|diag|std)</m[io]>(?P<bracket><mo[^>]*>&#x00028;)?")
 BARS = re.compile(r"(?<!\\left)(?<!\\right)\|([^|]+?)(?<!\\left)(?<!\\right)\|")
 SIGN = re.compile(r"((?:&#x0003D;|&#x00028;|&#x0002C;)</mo>)<mo>(&#x02212;|&#x0002B;)</mo>")
-FONT = Path(ziamath.__file__).parent / "fonts" / "STIXTwoMath-Regular.ttf"
+FONT = "fonts/STIXTwoMath-Regular.ttf"
+"""Place of the font in the package that brings it."""
 GLYPHS = (range(0x20, 0x250), range(0x2B0, 0x400), range(0x2000, 0x2300), range(0x1D400, 0x1D800))
 """Latin, Greek, signs, and the letters of mathematics."""
 
@@ -54,8 +55,10 @@ def _spaced(found: re.Match[str]) -> str:
 def write_font(target: Path) -> None:
     """Write the part of the font that equations need."""
     logging.getLogger("fontTools.subset").setLevel(logging.WARNING)
+    package = find_spec("ziamath")
+    assert package and package.origin
     options = subset.Options(flavor="woff", layout_features=["*"], notdef_outline=True)
-    font = subset.load_font(str(FONT), options)
+    font = subset.load_font(str(Path(package.origin).parent / FONT), options)
     cut = subset.Subsetter(options)
     cut.populate(unicodes=[code for codes in GLYPHS for code in codes])
     cut.subset(font)

@@ -2,8 +2,8 @@
 Which error makes which order
 =============================
 
-The strongest orders of one measured reducer, divided among the errors of its parts. The shares of an order add up to its
-amplitude; a bar to the left works against the others.
+The strongest orders of one measured reducer, divided among the errors of its parts. The shares of an order add up to
+its amplitude; a bar to the left works against the others.
 
 **Read off it:** which part to measure again if one order of the bench curve is too large.
 """
@@ -22,6 +22,8 @@ for number, order in enumerate(orders):
     places = [row + 0.27 * (1 - number) for row in range(len(parts))]
     axes.barh(places, parts[order], 0.25, color=colours[number], label=order.split(" [")[0])
 axes.set_yticks(range(len(parts)), parts["source"])
-axes.set(xlabel="share of the amplitude [arcsec]", title="Errors of the parts; the modification of the teeth is left out")
+axes.set(
+    xlabel="share of the amplitude [arcsec]", title="Errors of the parts; the modification of the teeth is left out"
+)
 axes.legend()
 plt.show()

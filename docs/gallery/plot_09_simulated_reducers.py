@@ -2,11 +2,11 @@
 Simulated reducers and the limit
 ================================
 
-The peak-to-peak transmission error of random reducers whose part errors have the zones of a drawing. The table above the
-picture has the classical sums beside it: root sum square and worst case.
+The peak-to-peak transmission error of random reducers whose part errors have the zones of a drawing. The table above
+the picture has the classical sums beside it: root sum square and worst case.
 
-**Read off it:** the share to the right of the limit is scrap. The classical sums say little here, because pins change their
-contact.
+**Read off it:** the share to the right of the limit is scrap. The classical sums say little here, because pins change
+their contact.
 """
 
 import tolalloc as ta

@@ -2,11 +2,12 @@
 Which tolerance drives the error
 ================================
 
-Three bars for each line of the drawing: its part in the variance of the peak-to-peak (total-effect index), what it does
-alone (first-order index), each with its 90 % interval, and the effect of one micrometre, relative to the largest.
+Three bars for each line of the drawing: its part in the variance of the peak-to-peak (total-effect index), what it
+does alone (first-order index), each with its 90 % interval, and the effect of one micrometre, relative to the
+largest.
 
-**Read off it:** the first bar says which tolerance to improve. Where intervals of neighbours overlap, their order is not
-settled; a longer run settles it.
+**Read off it:** the first bar says which tolerance to improve. Where intervals of neighbours overlap, their order is
+not settled; a longer run settles it.
 """
 
 import tolalloc as ta

@@ -2,8 +2,8 @@
 Effect of one micrometre
 ========================
 
-How much the peak-to-peak changes for one micrometre of each tolerance: sensitivity without the size of the zone. A ranking
-weighs it with the zone.
+How much the peak-to-peak changes for one micrometre of each tolerance: sensitivity without the size of the zone. A
+ranking weighs it with the zone.
 
 **Read off it:** a long bar here with a short one in the ranking is a tolerance that is tight already.
 """

@@ -2,11 +2,11 @@
 Has the ranking converged?
 ==========================
 
-The blocks of a ranking double until the order of the first three places is stable. The model here is a plain function, the
-offset of two pins in two bores, so that it takes seconds.
+The blocks of a ranking double until the order of the first three places is stable. The model here is a plain
+function, the offset of two pins in two bores, so that it takes seconds.
 
-**Read off it:** the share of resamples with the same order. Above the dashed line, the probability that was asked for, the
-order may be trusted, and the ranking stops.
+**Read off it:** the share of resamples with the same order. Above the dashed line, the probability that was asked
+for, the order may be trusted, and the ranking stops.
 """
 
 import matplotlib.pyplot as plt

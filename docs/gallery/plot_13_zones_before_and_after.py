@@ -17,5 +17,5 @@ study = ta.Study(
     seed=1,
 )
 found = study.allocate(effort="quick")
-print(found.sentences[0])
+print(found.sentences[3])
 found.plot("zones")

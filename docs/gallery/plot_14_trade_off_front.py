@@ -2,8 +2,8 @@
 What the limit costs
 ====================
 
-The cheapest drawing for each value of a limit: the trade-off front. The model is a lever whose stroke must not become too
-long, a plain function of two sizes.
+The cheapest drawing for each value of a limit: the trade-off front. The model is a lever whose stroke must not become
+too long, a plain function of two sizes.
 
 **Read off it:** how much a tighter limit costs, and from where on it costs much.
 """

@@ -2,8 +2,8 @@
 What if one zone changes?
 =========================
 
-Four changes of the drawing, one at a time, each solved on the same random reducers as the drawing as it is, so that small
-differences show.
+Four changes of the drawing, one at a time, each solved on the same random reducers as the drawing as it is, so that
+small differences show.
 
 **Read off it:** dearer is to the right, a larger error is up; what lies below and to the left is better and cheaper.
 """

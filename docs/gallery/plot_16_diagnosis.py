@@ -2,10 +2,11 @@
 The bench curve of a bad reducer
 ================================
 
-A reducer with one bad part, its curve as a test bench would read it, and the curve of the errors that explain it best, joined at the angles that were read.
+A reducer with one bad part, its curve as a test bench would read it, and the curve of the errors that explain it
+best, joined at the angles that were read.
 
-**Read off it:** the two agree to the noise of the bench, so the errors that were found may be trusted. The tutorial on a bad
-unit says which part it is.
+**Read off it:** the two agree to the noise of the bench, so the errors that were found may be trusted. The tutorial
+on a bad unit says which part it is.
 """
 
 from pathlib import Path

@@ -2,8 +2,8 @@
 A reducer in motion
 ===================
 
-An RV-40E at full speed under load, after it was started: the equivalent model with the masses of its parts, and a disc of
-1 kg·m² at the output, beside the static model.
+An RV-40E at full speed under load, after it was started: the equivalent model with the masses of its parts, and a
+disc of 1 kg·m² at the output, beside the static model.
 
 **Read off it:** how far motion leaves the static model. Without the mass at the output there is hardly a difference.
 """

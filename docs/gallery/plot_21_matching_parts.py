@@ -2,8 +2,8 @@
 Which part goes where
 =====================
 
-Two reducers are to be built from measured parts in stock. The list with the smallest peak-to-peak is compared with random
-mountings of the same parts.
+Two reducers are to be built from measured parts in stock. The list with the smallest peak-to-peak is compared with
+random mountings of the same parts.
 
 **Read off it:** how much choosing is worth against taking parts as they come.
 """

@@ -4,8 +4,8 @@ ISO grades only
 
 Zones that may come from ISO 286 grades alone, before and after.
 
-**Read off it:** the zone of each grade that was chosen. Steps of the ladder are wide, so a grade often leaves part of the
-limit unused.
+**Read off it:** the zone of each grade that was chosen. Steps of the ladder are wide, so a grade often leaves part of
+the limit unused.
 """
 
 import tolalloc as ta

@@ -4,8 +4,8 @@ Two limits at once
 
 A gap and a stroke of the same four parts are both limited. Each row is a part, each column a limit.
 
-**Read off it:** a part that matters for one limit alone can be left wide for the other; a part dark in both columns is the
-one to improve.
+**Read off it:** a part that matters for one limit alone can be left wide for the other; a part dark in both columns
+is the one to improve.
 """
 
 import tolalloc as ta

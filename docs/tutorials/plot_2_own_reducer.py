@@ -2,13 +2,13 @@
 A reducer of your own
 =====================
 
-Sizes, bearings and tooth modification of a reducer stand in one TOML file. This page makes one, looks at it, and changes a
-number in it.
+Sizes, bearings and tooth modification of a reducer stand in one TOML file. This page makes one, looks at it, and
+changes a number in it.
 """
 
 # %%
-# ``ta.new`` writes a folder that runs at once: a reducer like the preset that you name, its tolerance table, a study. On
-# the command line it is ``tolalloc new mine --like rv40e --cranks 3``.
+# ``ta.new`` writes a folder that runs at once: a reducer like the preset that you name, its tolerance table, a study.
+# On the command line it is ``tolalloc new mine --like rv40e --cranks 3``.
 
 from pathlib import Path
 from tempfile import mkdtemp
@@ -28,8 +28,8 @@ lines = [line for line in text.splitlines() if line and not line.startswith("#")
 print(*[line[:110] for line in lines[:24]], sep="\n")
 
 # %%
-# **What do exact parts of it do?** Under rated torque and at rest, without any part error. The second sentence holds the
-# stiffness against the catalogue's.
+# **What do exact parts of it do?** Without any part error, at rest and under rated torque. The sentences hold stiffness
+# and lost motion against the catalogue's.
 
 exact = ta.te(reducer=str(folder / "reducer.toml"))
 print(*exact.sentences, sep="\n")

@@ -2,8 +2,8 @@
 An Excel table of your own
 ==========================
 
-The tolerance table may be an Excel file with a row for each tolerance. This page writes one as an office would, reads it,
-and asks what a change of one row does.
+The tolerance table may be an Excel file with a row for each tolerance. This page writes one as an office would, reads
+it, and asks what a change of one row does.
 """
 
 # %%
@@ -68,7 +68,9 @@ plt.show()
 
 broken = load_workbook(table)
 heads = [cell.value for cell in broken.active[1]]
-broken.active.cell(row=2, column=1 + next(i for i, head in enumerate(heads) if str(head).startswith("plus"))).value = "abc"
+broken.active.cell(
+    row=2, column=1 + next(i for i, head in enumerate(heads) if str(head).startswith("plus"))
+).value = "abc"
 broken.save(folder / "broken.xlsx")
 try:
     ta.drawing(folder / "broken.xlsx")

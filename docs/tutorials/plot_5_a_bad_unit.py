@@ -7,8 +7,8 @@ should be measured first?
 """
 
 # %%
-# The curve is a table of two columns. This one is simulated: a unit whose pitch of the pin housing is bad. Every eighth
-# reading is enough for this page.
+# The curve is a table of two columns. This one is simulated: a unit whose pitch of the pin housing is bad. Every
+# twelfth reading is enough for this page.
 
 from pathlib import Path
 from tempfile import mkdtemp
@@ -18,7 +18,7 @@ import tolalloc as ta
 folder = ta.new(Path(mkdtemp()) / "mine", samples="all")
 lines = (folder / "unit7.csv").read_text(encoding="utf-8").splitlines()
 curve = folder / "curve.csv"
-curve.write_text("\n".join(lines[:2] + lines[2::8]) + "\n", encoding="utf-8")
+curve.write_text("\n".join(lines[:2] + lines[2::12]) + "\n", encoding="utf-8")
 print(*lines[:5], sep="\n")
 
 # %%
@@ -38,7 +38,7 @@ answer.plot("curve")
 answer.plot("dominant")
 
 # %%
-# **What would a gauge show?** For each source, with a 95 % interval. Where the interval is as wide as the zone, the curve
-# says nothing of that part.
+# **What would a gauge show?** For each source, with a 95 % interval. Where the interval is as wide as the zone, the
+# curve says nothing of that part.
 
 print(answer.to_frame("sources").iloc[:6, :6].to_string(index=False))

@@ -2,13 +2,13 @@
 Many studies
 ============
 
-A product series, or a grid of limits: many studies that differ in a few numbers, one table of answers, and two of them side
-by side.
+A product series, or a grid of limits: many studies that differ in a few numbers, one table of answers, and two of
+them side by side.
 """
 
 # %%
-# The model is a plain function, so that the page takes seconds; with reducers only the first line changes. A limit of the
-# gap is tightened step by step.
+# The model is a plain function, so that the page takes seconds; with reducers only the first line changes. A limit of
+# the gap is tightened step by step.
 
 from dataclasses import replace
 from pathlib import Path
