@@ -57,7 +57,7 @@ def whole(page: str) -> str:
     """Return the page of commands with the first sentence of each in its list, which typer cuts, as a link to it."""
     said = dict(re.findall(r"^## `tolalloc (\S+)`\n+(.+)", page, re.MULTILINE))
     page = re.sub(r"^\* `(\w+)`: .*$", lambda found: _line(found, said), page, flags=re.MULTILINE)
-    return page.replace(", …", " and so on")
+    return page.replace(", …", " and so on").replace("study = Study(...)", "`study = ta.Study(...)`")
 
 
 def _line(found: re.Match[str], said: dict[str, str]) -> str:

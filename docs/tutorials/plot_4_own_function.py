@@ -39,7 +39,7 @@ print(*ranking.sentences, sep="\n")
 
 # %%
 # **Which zones are cheapest?** A zone costs as 1/zone here. The dear shaft gets the wider zone. The answer names its
-# cost, a bound that no drawing of the local models undercuts, and whether fresh random units keep the limits.
+# cost, a lower bound of the cost, and whether an independent sample keeps the limits.
 
 found = study.allocate(effort="quick")
 print(*found.sentences, sep="\n")
@@ -55,7 +55,7 @@ table = found.to_frame("drawing")
 print(table.to_string(index=False, max_colwidth=24))
 
 # %%
-# The gap before and after, in random units, with both limits:
+# The gap before and after, in simulated units, with both limits:
 
 found.plot("gap")
 
