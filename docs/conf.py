@@ -30,6 +30,7 @@ extensions = [
 exclude_patterns = ["_build", "tutorials", "gallery"]
 myst_enable_extensions = ["attrs_block", "attrs_inline", "dollarmath"]
 html_math_renderer = "mathml"
+smartquotes_action = "q"  # two hyphens begin an option
 html_theme = "furo"
 html_static_path = ["static"]
 html_css_files = ["handbook.css"]

@@ -16,8 +16,9 @@ import tolalloc as ta
 
 folder = ta.new(Path(mkdtemp()) / "mine", samples="all")
 lines = (folder / "unit7.csv").read_text(encoding="utf-8").splitlines()
-curve = folder / "curve.csv"
+curve = folder / "unit7_short.csv"
 curve.write_text("\n".join(lines[:2] + lines[2::12]) + "\n", encoding="utf-8")
-answer = ta.diagnose(curve, reducer=str(folder / "reducer.toml"), tolerances=str(folder / "zones.csv"))
+drawn = {"reducer": str(folder / "reducer.toml"), "tolerances": str(folder / "zones.csv")}
+answer = ta.diagnose(curve, **drawn)
 print(answer.sentences[0])
 answer.plot("curve")

@@ -26,7 +26,8 @@ print(*ta.check(study).sentences[:4], sep="\n")
 # **What is on the drawing?** A row for each error of a part: its zone, the distribution that is made of it, its cost.
 
 rows = study.drawing.to_frame()
-print(rows[["id", "plus [unit]", "minus [unit]", "unit", "cost [cost units]"]].head(8).to_string(index=False))
+shown = ["id", "plus [unit]", "minus [unit]", "unit", "cost [cost units]"]
+print(rows[shown].head(8).to_string(index=False))
 
 # %%
 # **Which tolerance drives the error?** ``effort="quick"`` is enough for a first look: every number is real, every
@@ -59,10 +60,11 @@ found.plot("zones")
 found.plot("peak_to_peak")
 
 # %%
-# **What goes on the drawing?** The table beside the picture; ``found.result.drawing.to_csv("new.csv")`` writes the same
+# **What goes on the drawing?** The zones as a table; ``found.result.drawing.to_csv("new.csv")`` writes the same
 # in the layout of the tolerance table.
 
-print(found.to_frame("dimensions").iloc[:, :6].to_string(index=False))
+shown = ["source", "zone before [µm]", "zone [µm]", "change [%]"]
+print(found.to_frame("drawing")[shown].to_string(index=False, float_format="%.1f"))
 
 # %%
 # Before you set a drawing, leave the efforts out: a full run takes minutes and narrows every interval.

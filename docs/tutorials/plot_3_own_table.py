@@ -30,7 +30,7 @@ for row in rows:
 office.save(folder / "office.xlsx")
 
 drawing = ta.drawing(folder / "office.xlsx")
-shown = ["id", "plus [unit]", "minus [unit]", "unit", "min [unit]", "max [unit]", "cost [cost units]"]
+shown = ["id", "plus [unit]", "minus [unit]", "unit", "cost [cost units]"]
 frame = drawing.to_frame()
 print(frame[[head for head in shown if head in frame]].head(6).to_string(index=False))
 

@@ -52,7 +52,8 @@ print(f"met: {result.met}, cost {result.cost:.2f}, bound {result.bound:.2f}")
 # and finds:
 
 table = found.to_frame("drawing")
-print(table.to_string(index=False, max_colwidth=24))
+shown = ["source", "zone before [µm]", "zone [µm]", "cost before [cost units]", "cost [cost units]"]
+print(table[shown].to_string(index=False, float_format="%.2f"))
 
 # %%
 # The gap before and after, in simulated units, with both limits:

@@ -17,14 +17,15 @@ import tolalloc as ta
 
 folder = ta.new(Path(mkdtemp()) / "mine", samples="all")
 lines = (folder / "unit7.csv").read_text(encoding="utf-8").splitlines()
-curve = folder / "curve.csv"
+curve = folder / "unit7_short.csv"
 curve.write_text("\n".join(lines[:2] + lines[2::12]) + "\n", encoding="utf-8")
 print(*lines[:5], sep="\n")
 
 # %%
 # ``diagnose`` looks for the errors of the parts that explain the curve, with the drawing as what is known beforehand.
 
-answer = ta.diagnose(curve, reducer=str(folder / "reducer.toml"), tolerances=str(folder / "zones.csv"))
+drawn = {"reducer": str(folder / "reducer.toml"), "tolerances": str(folder / "zones.csv")}
+answer = ta.diagnose(curve, **drawn)
 print(*answer.sentences, sep="\n")
 
 # %%
@@ -41,4 +42,4 @@ answer.plot("dominant")
 # **What would a gauge show?** For each source, with a 95 % interval. Where the interval is as wide as the zone, the
 # curve says nothing of that part.
 
-print(answer.to_frame("sources").iloc[:6, :6].to_string(index=False))
+print(answer.to_frame("sources").iloc[:6, :6].to_string(index=False, float_format="%.1f"))

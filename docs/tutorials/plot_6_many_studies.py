@@ -50,7 +50,7 @@ runs = Path(mkdtemp()) / "runs"
 answer = ta.series(studies, runs, effort="quick")
 print(*answer.sentences, sep="\n")
 table = answer.to_frame()
-print(table.iloc[:, :6].to_string(index=False))
+print(table.iloc[:, :5].to_string(index=False))
 
 # %%
 # **What does the limit cost?**
