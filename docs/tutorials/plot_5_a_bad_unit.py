@@ -42,4 +42,5 @@ answer.plot("dominant")
 # **What would a gauge show?** For each source, with a 95 % interval. Where the interval is as wide as the zone, the
 # curve says nothing of that part.
 
-print(answer.to_frame("sources").iloc[:6, :6].to_string(index=False, float_format="%.1f"))
+table = answer.to_frame("sources").drop(columns=["named"])
+print(table.iloc[:6, :5].to_string(index=False, float_format="%.1f"))
