@@ -233,7 +233,9 @@ def test_the_quantile_of_the_units_is_what_the_target_share_keeps(results):
 def test_prices_are_marginal_and_per_what_the_limit_is_large_of(results):
     side = results.free.chosen.constraints[0]
     assert limit_price(side, 0.9) == (0.9, "arcsec")
-    assert limit_price(replace(side, limit=0.5), 0.9) == (0.09, "0.1 arcsec")
+    assert limit_price(replace(side, limit=1.0), 0.9) == (pytest.approx(0.09), "0.1 arcsec")
+    assert limit_price(replace(side, limit=0.13), 0.9) == (pytest.approx(0.009), "0.01 arcsec")
+    assert limit_price(replace(side, limit=542.9), 0.9) == (pytest.approx(9.0), "10 arcsec")
     price = results.free.prices[side.stack.name]
     sentence = said(results, "peak-to-peak transmission error, limit 50″")
     assert says(sentence, "allocation.price", price=price, cost_unit="cost units", step="1″")

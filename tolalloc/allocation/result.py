@@ -287,10 +287,30 @@ def solver_noise(solution: Solution) -> float:
     return max(solution.gap, _ROUNDING) * solution.cost
 
 
-def limit_price(side: OneSidedConstraint, price: float) -> tuple[float, str]:
-    """Return the price of a limit [cost units] and what it is per: its unit, or a tenth where the limit is below 1.
+def limit_step(side: OneSidedConstraint) -> float:
+    """Return a small change of a limit to tell its price by: a power of ten, a tenth of the limit at most.
 
-    λ per unit, or λ/10 per tenth where |limit| < 1 (own derivation); as every shadow price for small changes.
+    10^⌊log₁₀(|limit|/10)⌋, of what outputs are compared by where the limit is 0 (own derivation) [unit of the output].
+
+    Examples
+    --------
+    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
+    >>> verifiers = [verifier_of_sum(0.6, 0.8, limit=limit) for limit in (0.5, 60.0)]
+    >>> [limit_step(own.verify(own.space.uniform(1.0), "as drawn").constraints[0]) for own in verifiers]
+    [0.01, 1.0]
+    """
+    size = abs(side.limit) or side.scale
+    return float(10.0 ** np.floor(np.log10(size / 10) + _ROUNDING)) if size > 0 else 1.0
+
+
+_ROUNDING = 1e-9
+"""What a logarithm may lose [-]."""
+
+
+def limit_price(side: OneSidedConstraint, price: float) -> tuple[float, str]:
+    """Return the price of a small change of a limit [cost units], and that change with its unit.
+
+    λ·step (own derivation), as every shadow price for small changes.
 
     Examples
     --------
@@ -298,10 +318,10 @@ def limit_price(side: OneSidedConstraint, price: float) -> tuple[float, str]:
     >>> verifier = verifier_of_sum(0.6, 0.8, limit=0.5)
     >>> [side] = verifier.verify(verifier.space.uniform(1.0), "as drawn").constraints
     >>> limit_price(side, 2.0)
-    (0.2, '0.1 mm')
+    (0.02, '0.01 mm')
     """
-    unit = unit_of(side.stack.name)
-    return (price / 10, f"0.1 {unit}") if abs(side.limit) < 1 else (price, unit)
+    step, unit = limit_step(side), unit_of(side.stack.name)
+    return price * step, unit if step == 1 else f"{step:g} {unit}"
 
 
 def unit_quantile(design: VerifiedDesign, check: Check) -> float:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from tolalloc.allocation.front.what_if import COST_CHANGE, SAME
-from tolalloc.allocation.result import AllocationResult, limit_price, unit_quantile
+from tolalloc.allocation.result import AllocationResult, limit_price, limit_step, unit_quantile
 from tolalloc.allocation.search.candidates import ALONE
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
 from tolalloc.allocation.space.joint_yield import JointRequirement
@@ -299,11 +299,11 @@ def _prices(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     for side in free.chosen.constraints if free.chosen.met else ():
         price = free.prices[side.stack.name]
         if price * abs(side.limit) > _NOTHING * free.chosen.cost:
-            cost, per = limit_price(side, price)
+            cost, _ = limit_price(side, price)
             gaps = {
                 "output": quantity(side.stack.name),
                 "limit": with_unit(f"{side.limit:g}", side.stack.name),
-                "step": with_unit("0.1" if per.startswith("0.1 ") else "1", side.stack.name),
+                "step": with_unit(f"{limit_step(side):g}", side.stack.name),
             }
             said.append(_say("price", price=cost, cost_unit=cost_unit, **gaps))
     return tuple(said)
