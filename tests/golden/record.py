@@ -36,7 +36,7 @@ _UNSTEADY = (
     (r"Compiling the kernel.*\n", ""),
     (r", \d+ units/s", ", # units/s"),
     (r'(computing time \[s\](": |,))[\d.e+,-]*\d', r"\g<1>0"),
-    (r"(│ computing time \[s\]).*$", r"\1"),
+    (r"(computing time \[s\]) .*$", r"\1"),
 )
 """What no two runs or machines have in common, and what stands for it."""
 _TIMED = re.compile(r"seconds \[s\]|per second|speed over|computing time|time a set")
