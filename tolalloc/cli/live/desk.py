@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shlex
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -36,6 +38,9 @@ class Job:
     settings: tuple[str, ...]  # Names of the settings that an answer may choose
     stage: str = "begins"
     units: int = 0
+    expected: int = 0  # Units of the whole stage; 0 where nobody knows [-]
+    counted: str = "units"
+    told: str = ""  # What is known already
     answer: dict[str, Any] | None = None
     error: str = ""
     began: float = field(default_factory=time.monotonic)
@@ -60,10 +65,10 @@ class Job:
         """Stop it as soon as the next units are solved."""
         self._stop.set()
 
-    def begin(self, stage: str, units: int = 0, counted: str = "") -> None:  # noqa: ARG002
-        """Begin a stage."""
+    def begin(self, stage: str, units: int = 0, counted: str = "") -> None:
+        """Begin a stage of so many units, or of what is counted."""
         self._look()
-        self.stage, self.units = stage, 0
+        self.stage, self.units, self.expected, self.counted = stage, 0, units, counted or "units"
 
     def advance(self, units: int) -> None:
         """So many more units are solved."""
@@ -71,13 +76,15 @@ class Job:
         self.units += units
 
     def tell(self, sentence: str) -> None:
-        """Nothing is said before the answer."""
+        """Say what is known already."""
+        self.told = sentence
 
     @property
     def state(self) -> dict[str, Any]:
         """How far it has come, and its answer once there is one."""
         seconds = round(time.monotonic() - self.began, 1)
         told = {"kind": self.kind, "stage": self.stage, "units": self.units, "seconds": seconds}
+        told |= {"expected": self.expected, "counted": self.counted, "told": self.told}
         return {**told, "answer": self.answer, "error": self.error}
 
     def _look(self) -> None:
@@ -100,7 +107,7 @@ class Job:
 
 def _found(answer: Any, settings: tuple[str, ...]) -> dict[str, Any]:
     """Return what the page takes over of an answer: shares of the sources, or the zones of the cheapest drawing."""
-    from tolalloc.reports.figure import chart
+    from tolalloc.reports.figure import chart, numbers
 
     first = next(iter(answer.figures.values()), None)
     drawn = {"figure": chart(first)} if first else {}
@@ -110,7 +117,11 @@ def _found(answer: Any, settings: tuple[str, ...]) -> dict[str, Any]:
     result = answer.result
     zones = {own.name: own.zone / MICROMETRE for own in result.drawn_sources if own.zone > 0}
     chosen = {name: float(answer.summary[name]) for name in settings if answer.summary.get(name) is not None}
-    return {**drawn, "met": bool(result.met), "cost": float(result.cost), "zones": zones, "settings": chosen}
+    found = {"met": bool(result.met), "cost": float(result.cost), "zones": zones, "settings": chosen}
+    if result.fronts:  # Cost against the leading output's limit, as far as the question asked for it
+        exact = result.fronts.exact
+        found["front"] = {"x": numbers(exact.limits), "y": numbers(exact.cost)}
+    return {**drawn, **found}
 
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,59}")
@@ -169,7 +180,7 @@ class Saving:
         values = self._settings(design)
         text = _SCRIPT.format(before=before, module=self.script.stem, table=table.name, settings=values, name=name)
         write_new(script, text)
-        return {"table": table.name, "script": script.name, "folder": str(self.script.parent)}
+        return {"table": table.name, "script": script.name, "command": f"tolalloc run {_quoted(script)}"}
 
     def _require_readable(self, table: Path, design: LiveDesign) -> None:
         """Take a table back that no study would read, such as one with a zone that the model does not believe."""
@@ -194,6 +205,11 @@ def _with_range(source: Source) -> Source:
     return replace(source, minimum=smallest, maximum=largest)
 
 
+def _quoted(path: Path) -> str:
+    """Return a path as it may be pasted into a command line, from whatever folder."""
+    return f'"{path}"' if os.name == "nt" else shlex.quote(str(path))
+
+
 _TABS = 64
 """Tabs whose latest request is known [-]."""
 
@@ -215,6 +231,7 @@ class Desk:
             "design": self._design,
             "units": self._units,
             "examined": self._examined,
+            "scaled": self._scaled,
             "scene": self._scene,
             "sweep": self._sweep,
             "save": self._save,
@@ -255,6 +272,11 @@ class Desk:
 
     def _examined(self, sent: dict[str, Any]) -> dict[str, Any]:
         return {"sentences": self.session.examined(self._read(sent))}
+
+    def _scaled(self, sent: dict[str, Any]) -> dict[str, Any]:
+        wanted = self._newest(sent)
+        found = self.session.scaled(self._read(sent), wanted)
+        return {"called off": True} if found is None else {"designs": found}
 
     def _scene(self, sent: dict[str, Any]) -> dict[str, Any]:
         swept = (str(sent["source"]), sent.get("share", 0.0)) if "source" in sent else None
