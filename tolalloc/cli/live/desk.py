@@ -19,7 +19,9 @@ from tolalloc.drawings.tolerance_table import table_text
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
 from tolalloc.reading.files import write_new
 from tolalloc.reading.units import MICROMETRE
+from tolalloc.study.duration import durations
 from tolalloc.study.prepared import Prepared
+from tolalloc.study.questions import questions_of
 from tolalloc.study.study import Study
 
 KINDS = ("ranking", "allocation")
@@ -41,6 +43,8 @@ class Job:
     expected: int = 0  # Units of the whole stage; 0 where nobody knows [-]
     counted: str = "units"
     told: str = ""  # What is known already
+    solved: int = 0  # Units of all stages [-]
+    most: int = 0  # About how many units it solves at most; 0 until that is known [-]
     answer: dict[str, Any] | None = None
     error: str = ""
     began: float = field(default_factory=time.monotonic)
@@ -74,6 +78,7 @@ class Job:
         """So many more units are solved."""
         self._look()
         self.units += units
+        self.solved += units
 
     def tell(self, sentence: str) -> None:
         """Say what is known already."""
@@ -85,6 +90,7 @@ class Job:
         seconds = round(time.monotonic() - self.began, 1)
         told = {"kind": self.kind, "stage": self.stage, "units": self.units, "seconds": seconds}
         told |= {"expected": self.expected, "counted": self.counted, "told": self.told}
+        told |= {"solved": self.solved, "most": self.most}
         return {**told, "answer": self.answer, "error": self.error}
 
     def _look(self) -> None:
@@ -93,6 +99,7 @@ class Job:
 
     def _run(self) -> None:
         try:
+            self.most = _most_units(self.kind, self.study)
             answer = self.study.ask(self.kind, "quick", self)
             said = {"sentences": list(answer.sentences), "warnings": list(answer.warnings)}
             self.answer = said | _found(answer, self.settings)
@@ -103,6 +110,13 @@ class Job:
         except Exception:
             self.error = "The program failed; the terminal says where."
             raise
+
+
+def _most_units(kind: str, study: Study) -> int:
+    """Return about how many units a question solves at most, at the quick effort [-]."""
+    asked = questions_of((kind,), tuple(study.questions), study.place)
+    quick = replace(study.with_effort("quick"), questions=asked)
+    return max((own.units[1] for own in durations(Prepared(study=quick))), default=0)
 
 
 def _found(answer: Any, settings: tuple[str, ...]) -> dict[str, Any]:

@@ -263,10 +263,10 @@ export class Chart {
       return text;
     };
     if (item.ghost && item.kind === "stems") {
-      const wide = Math.max(4, Math.min(14, 0.6 * (x.at(1) - x.at(0))));
+      const wide = Math.max(6, Math.min(14, 0.6 * (x.at(1) - x.at(0))));
       item.x.forEach((value, k) => {
         const tall = zero - y.at(item.y[k]);
-        if (tall > 0) inside.append(node("rect", { class: "ghost", x: x.at(value) - wide / 2, y: zero - tall, width: wide, height: tall, fill: paint, opacity: 0.35 }));
+        if (tall > 0) inside.append(node("rect", { class: "ghost", x: x.at(value) - wide / 2, y: zero - tall, width: wide, height: tall, fill: paint, opacity: 0.45 }));
       });
     } else if (item.kind === "line") {
       if (item.low?.length)

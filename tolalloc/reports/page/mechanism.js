@@ -152,9 +152,10 @@ export function follow(mechanism, root = document) {
 }
 
 export class Mechanism {
-  constructor(element, scene, { onPoint = () => {}, onChoose = () => {}, onTurn = () => {}, controls = true } = {}) {
+  constructor(element, scene, { onPoint = () => {}, onChoose = () => {}, onTurn = () => {}, errorAt = null, controls = true } = {}) {
     this.element = element;
     this.handlers = { onPoint, onChoose, onTurn };
+    this.errorAt = errorAt; // a finer curve of the forward turn: its error [arcsec] at an angle of the carrier [°]
     this.withControls = controls;
     this.phase = 0;
     this.sense = 1;
@@ -556,7 +557,8 @@ export class Mechanism {
   }
 
   tell(pose) {
-    const turn = degrees(this.carrierAngle), seconds = degrees(pose.state.error) * 3600;
+    const turn = degrees(this.carrierAngle), own = degrees(pose.state.error) * 3600;
+    const seconds = (this.sense > 0 ? this.errorAt?.(turn % 360) : null) ?? own;
     const touching = pose.contacts.map((own) => own.filter(({ force }) => force > 0).length).join(" and ");
     this.stated.textContent =
       `Errors, gaps and displacements are drawn ${short(pose.magnification)} times larger. Carrier at ${turn.toFixed(2)}°, ` +

@@ -35,7 +35,7 @@ export class CostChart {
     const here = value(judged.outputs);
     if (here !== null) series.push({ label: "present design", kind: "points", x: [here], y: [cost], note: "you are here", colour: "var(--accent)" });
     return {
-      title: `Cost over ${name}, ${number(judged.units)} units${line.length > 1 ? "; 256 along the line" : ""}`, x_label: `${name} [${own.unit}]`, y_label: `cost [${currency}]`, height: 260, series,
+      title: `Cost over ${name}, ${judged.units.toLocaleString("en-US")} units${line.length > 1 ? "; 256 along the line" : ""}`, x_label: `${name} [${own.unit}]`, y_label: `cost [${currency}]`, height: 260, series,
       vertical: limit === null ? [] : [[limit, `limit ${number(limit)} ${own.unit}`]], horizontal: [],
     };
   }

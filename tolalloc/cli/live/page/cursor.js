@@ -36,6 +36,11 @@ export class Cursor {
     this.mark(this.value ?? low);
   }
 
+  // The value of the curve that is shown, nothing without one.
+  valueAt(place) {
+    return this.line && valueAt(this.line, place);
+  }
+
   mark(value) {
     if (!this.line) return void (this.value = value);
     this.value = Math.max(this.line.x[0], Math.min(this.line.x.at(-1), value));

@@ -342,7 +342,7 @@ async function begin() {
   picture = new Picture(study, zones, () => {
     const record = { design: zones.design, unit: unit() };
     return swept ? { ...record, source: swept.source, share: swept.figure.series[0].x[at("effect-share").value] } : record;
-  }, (angle) => cursor.mark(angle));
+  }, { onTurn: (angle) => cursor.mark(angle), errorAt: (angle) => cursor.valueAt(angle) });
   cursor = new Cursor({ turned: (angle) => picture.turnTo(angle), pointed: (angle) => picture.runs || picture.turnTo(angle) });
   costChart = new CostChart(at("cost-choice"), () => ({ judged, cost: drawn?.cost, currency: study.currency, pins: designs.pinned, scaled: scaled?.designs, found }), (figure) => draw("costs", at("costs"), figure));
   question = new Question({

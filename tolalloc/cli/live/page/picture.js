@@ -7,8 +7,9 @@ const at = (id) => document.getElementById(id);
 
 export class Picture {
   // asked() returns the record of the scene to show.
-  constructor(study, zones, asked, onTurn) {
-    Object.assign(this, { study, zones, asked, onTurn, mechanism: null, shown: "", pictured: "", busy: false, angle: 0 });
+  // onTurn(angle) is called when it turns; errorAt(angle) is the error of the curve [arcsec] at an angle of the carrier [°].
+  constructor(study, zones, asked, { onTurn, errorAt }) {
+    Object.assign(this, { study, zones, asked, onTurn, errorAt, mechanism: null, shown: "", pictured: "", busy: false, angle: 0 });
   }
 
   // The picture is that of an earlier design or unit until it has followed.
@@ -59,7 +60,7 @@ export class Picture {
       this.angle = now;
       this.onTurn(now);
     };
-    this.mechanism = new Mechanism(at("mechanism"), scene, { onPoint, onChoose, onTurn });
+    this.mechanism = new Mechanism(at("mechanism"), scene, { onPoint, onChoose, onTurn, errorAt: this.errorAt });
     this.mechanism.turnTo(angle);
   }
 

@@ -8,10 +8,11 @@ const EVERY = 500; // ms between two looks at how far it is
 const NAMES = { ranking: "What drives it", allocation: "Cheapest drawing" };
 const count = (value) => value.toLocaleString("en-US");
 
-// How far a question is: stage, what is done and what is left of it.
-export function progress({ stage, units, expected, counted, seconds }) {
-  const left = expected > units ? ` of ${count(expected)} ${counted}, ${count(expected - units)} left` : ` ${counted}`;
-  return `${stage}${units || expected > units ? `: ${count(units)}${left}` : ""}, ${seconds.toFixed(0)} s`;
+// How far a question is: its stage, and what is done and left of that and of all.
+export function progress({ stage, units, expected, counted, seconds, solved, most }) {
+  const known = expected > units, left = known ? ` of ${count(expected)} ${counted}, ${count(expected - units)} left` : ` ${counted}`;
+  const all = most > solved ? `; in all ${count(solved)} done, at most ${count(most - solved)} left` : "";
+  return `${stage}${units || known ? `: ${count(units)}${left}` : ""}${all}; ${seconds.toFixed(0)} s`;
 }
 
 export class Question {
@@ -27,6 +28,7 @@ export class Question {
     const { design, locked } = this.asked(), own = ++this.running;
     this.design = this.taken = null;
     at("found").replaceChildren();
+    at("asked").textContent = `${NAMES[kind]}: begins`;
     let state = await refusable(ask("ask", { question: kind, design, locked }));
     while (state && !state.answer && !state.error && own === this.running) {
       this.tell(kind, state);
@@ -47,7 +49,7 @@ export class Question {
   tell(kind, state) {
     at("stop").hidden = at("asked-bar").hidden = false;
     at("asked").textContent = `${NAMES[kind]}: ${progress(state)}${state.told ? `. ${state.told}` : ""}`;
-    if (state.expected > state.units) Object.assign(at("asked-bar"), { max: state.expected, value: state.units });
+    if (state.most > state.solved) Object.assign(at("asked-bar"), { max: state.most, value: state.solved });
     else at("asked-bar").removeAttribute("value");
   }
 
