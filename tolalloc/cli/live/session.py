@@ -310,12 +310,14 @@ class Session:
     def scaled(self, design: LiveDesign, wanted: Callable[[], bool]) -> list[dict[str, Any]] | None:
         """Return cost and limited quantiles of the drawing with all zones scaled alike, at the settings of a design.
 
-        Every zone stays within its range or that of a process, and one that is locked stays as drawn. Nothing if it is not wanted any more.
+        Every zone stays within its range or that of a process, and one that is locked stays as drawn. Nothing if it is
+        not wanted any more.
         """
         found: list[dict[str, Any]] = []
         for factor in _FACTORS:
             zones = {own.name: zone for own in self.prepared.errors.active if (zone := self._scaled(own, factor))}
-            scaled = replace(design, zones=tuple(sorted(zones.items())) if factor != 1.0 else ())
+            as_drawn = factor == 1.0 and not self.prepared.space.processes  # else what its cheapest processes make it
+            scaled = replace(design, zones=() if as_drawn else tuple(sorted(zones.items())))
             values = self._solved(scaled, FIRST, wanted)
             if values is None:
                 return None

@@ -113,7 +113,8 @@ function named(marks, x, from, to) {
     for (let sides = 0; sides < 3 ** order.length; sides++) {
       const labels = [];
       let worth = 0;
-      order.forEach((own, k) => {
+      for (let k = 0; k < order.length && worth < best.worth; k++) {
+        const own = order[k];
         const side = ["start", "end", "middle"][Math.floor(sides / 3 ** k) % 3], middle = side === "middle"; // over its mark where neither side has room
         const low = middle ? Math.max(from, Math.min(to - own.wide, own.at - own.wide / 2)) : side === "end" ? own.at - own.wide : own.at, high = low + own.wide;
         if (middle) worth += 0.5;
@@ -124,7 +125,8 @@ function named(marks, x, from, to) {
         for (const other of labels) if (meets(other)) row = Math.max(row, other.row + 1);
         for (const other of labels) if (other.row < row && own.at > other.low - 3 && own.at < other.high + 3 && own.at !== other.at) worth += 30;
         labels.push({ ...own, side, low, high, row });
-      });
+      }
+      if (labels.length < order.length) continue;
       const rows = Math.max(0, ...labels.map((own) => own.row + 1));
       if (worth + rows < best.worth) best = { worth: worth + rows, labels, rows };
     }
@@ -263,7 +265,7 @@ export class Chart {
       return text;
     };
     if (item.ghost && item.kind === "stems") {
-      const wide = Math.max(6, Math.min(14, 0.6 * (x.at(1) - x.at(0))));
+      const wide = Math.max(3, Math.min(6, 1.1 * (x.at(1) - x.at(0))));
       item.x.forEach((value, k) => {
         const tall = zero - y.at(item.y[k]);
         if (tall > 0) inside.append(node("rect", { class: "ghost", x: x.at(value) - wide / 2, y: zero - tall, width: wide, height: tall, fill: paint, opacity: 0.45 }));

@@ -26,10 +26,10 @@ export class CostChart {
     this.draw(this.figure(choices[Math.max(this.choice.selectedIndex, 0)], shown));
   }
 
-  figure({ output, place, own, share, name }, { judged, cost, currency, pins, scaled, found }) {
+  figure({ output, place, own, share, name }, { judged, cost, currency, pins, scaled, found, byProcess }) {
     const value = (outputs) => outputs[output]?.quantiles[place]?.value ?? null, limit = share < 0.5 ? own.lower : own.upper, series = [];
     const line = (scaled ?? []).map((item) => [item.quantiles[output][place], item.cost]).filter(([x]) => x !== null);
-    if (line.length > 1) series.push({ label: "the drawing, all zones scaled alike", kind: "line", x: line.map(([x]) => x), y: line.map(([, y]) => y), colour: "var(--faint)" });
+    if (line.length > 1) series.push({ label: `the drawing, all zones scaled alike${byProcess ? ", by the cheapest processes" : ""}`, kind: "line", x: line.map(([x]) => x), y: line.map(([, y]) => y), colour: "var(--faint)" });
     if (found?.front && !output) series.push({ label: "cheapest at other limits", kind: "line", ...found.front, colour: "var(--series-1)" });
     for (const pin of pins) if (value(pin.outputs) !== null) series.push({ label: pin.name, kind: "points", x: [value(pin.outputs)], y: [pin.cost], colour: pin.colour });
     const here = value(judged.outputs);

@@ -24,7 +24,7 @@ export class Designs {
 
   // What more units say of a pinned design.
   refine(record, judged) {
-    this.pinned = this.pinned.map((own) => (own === record ? { ...own, units: judged.units, yield: judged.yield, outputs: judged.outputs } : own));
+    Object.assign(record, { units: judged.units, yield: judged.yield, outputs: judged.outputs });
     this.update();
   }
 
@@ -51,15 +51,30 @@ export class Designs {
   draw() {
     this.element.hidden = !this.pinned.length;
     if (!this.pinned.length) return;
-    const heads = ["design", `cost [${this.currency}]`, "yield [%], 95 % interval", "units [-]", ...this.pinned[0].outputs.flatMap((own) => own.quantiles.map(({ share }) => `${own.name} [${own.unit}], ${number(100 * Math.max(share, 1 - share))} % of units ${share < 0.5 ? "above" : "below"}`)), "take or drop"];
-    const rows = this.pinned.map((own) => make("tr", {},
-      make("td", {}, make("i", { style: `background: ${own.colour}` }), own.name), make("td", { class: "number" }, own.cost.toFixed(2)),
-      make("td", { class: "number" }, `${(100 * own.yield[0]).toFixed(2)} (${(100 * own.yield[1]).toFixed(2)}…${(100 * own.yield[2]).toFixed(2)})`),
-      make("td", { class: "number" }, own.units.toLocaleString("en-US")), ...own.outputs.flatMap((item) => item.quantiles.map(({ value }) => make("td", { class: "number" }, number(value)))),
-      make("td", {}, make("button", { onclick: () => this.take(own), "aria-label": `take ${own.name}` }, "take"), make("button", { onclick: () => this.drop(own), "aria-label": `drop ${own.name}` }, "drop"))));
-    const table = make("table", { class: "data" }, make("thead", {}, make("tr", {}, ...heads.map((text) => make("th", {}, text)))), make("tbody", {}, ...rows));
-    this.element.querySelector("#pinned").replaceChildren(table);
+    const same = this.rows?.size === this.pinned.length && this.pinned.every((own) => this.rows.has(own));
+    if (same) for (const row of this.rows.values()) row.fill(); // buttons stay, and so does who stands on one
+    else this.table();
     this.element.querySelector("#parallel").replaceChildren(...(this.pinned.length > 1 ? [this.parallel()] : []));
+  }
+
+  table() {
+    const heads = ["design", `cost [${this.currency}]`, "yield [%], 95 % interval", "units [-]", ...this.pinned[0].outputs.flatMap((own) => own.quantiles.map(({ share }) => `${own.name} [${own.unit}], ${number(100 * Math.max(share, 1 - share))} % of units ${share < 0.5 ? "above" : "below"}`)), "take or drop"];
+    this.rows = new Map(this.pinned.map((own) => [own, this.row(own)]));
+    const table = make("table", { class: "data" }, make("thead", {}, make("tr", {}, ...heads.map((text) => make("th", {}, text)))), make("tbody", {}, ...this.rows.values()));
+    this.element.querySelector("#pinned").replaceChildren(table);
+  }
+
+  row(own) {
+    const buttons = make("td", {}, make("button", { onclick: () => this.take(own), "aria-label": `take ${own.name}` }, "take"), make("button", { onclick: () => this.drop(own), "aria-label": `drop ${own.name}` }, "drop"));
+    const row = make("tr", {}, buttons), cell = (text) => make("td", { class: "number" }, text);
+    row.fill = () => {
+      while (row.firstChild !== buttons) row.firstChild.remove();
+      buttons.before(make("td", {}, make("i", { style: `background: ${own.colour}` }), own.name), cell(own.cost.toFixed(2)),
+        cell(`${(100 * own.yield[0]).toFixed(2)} (${(100 * own.yield[1]).toFixed(2)}…${(100 * own.yield[2]).toFixed(2)})`), cell(own.units.toLocaleString("en-US")),
+        ...own.outputs.flatMap((item) => item.quantiles.map(({ value }) => cell(number(value)))));
+    };
+    row.fill();
+    return row;
   }
 
   // Only what differs between the designs is an axis.

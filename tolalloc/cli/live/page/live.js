@@ -165,7 +165,7 @@ function showUnits(shown) {
   const [share, low, high] = judged.yield;
   at("yield").textContent = percent(share);
   at("yield").classList.toggle("bad", high < judged.target);
-  at("yield-interval").textContent = `${percent(low)} … ${percent(high)} (95 %)`;
+  at("yield-interval").textContent = `${(100 * low).toFixed(2)} … ${percent(high)} (95 %)`;
   at("counted").textContent = `${judged.units.toLocaleString("en-US")} random units${judged.lost ? `, ${judged.lost} without an answer` : ""}`;
   for (const own of at("numbers").querySelectorAll(".quantile")) own.remove();
   at("numbers").append(...judged.outputs.flatMap((own) => own.quantiles.map((item) => quantile(own, item))));
@@ -344,7 +344,7 @@ async function begin() {
     return swept ? { ...record, source: swept.source, share: swept.figure.series[0].x[at("effect-share").value] } : record;
   }, { onTurn: (angle) => cursor.mark(angle), errorAt: (angle) => cursor.valueAt(angle) });
   cursor = new Cursor({ turned: (angle) => picture.turnTo(angle), pointed: (angle) => picture.runs || picture.turnTo(angle) });
-  costChart = new CostChart(at("cost-choice"), () => ({ judged, cost: drawn?.cost, currency: study.currency, pins: designs.pinned, scaled: scaled?.designs, found }), (figure) => draw("costs", at("costs"), figure));
+  costChart = new CostChart(at("cost-choice"), () => ({ judged, cost: drawn?.cost, currency: study.currency, pins: designs.pinned, scaled: scaled?.designs, found, byProcess: study.sources.some((own) => own.processes.length) }), (figure) => draw("costs", at("costs"), figure));
   question = new Question({
     asked: () => ({ design: zones.design, locked: study.sources.filter((own) => zones.locked.has(own.group)).map((own) => own.name) }),
     answered: tookAnswer,

@@ -38,19 +38,6 @@ export function typed(text, unit = MICRO) {
   return (sign === "-" || sign === "−" ? -1 : 1) * Number(digits.replace(",", ".") + power) * factor;
 }
 
-// A row that says why a value was refused, until it takes another.
-function refusable(row, fields) {
-  const sentence = make("p", { class: "refusal", role: "alert", hidden: true });
-  row.append(sentence);
-  const mark = (text) => {
-    row.classList.toggle("refused", Boolean(text));
-    sentence.hidden = !text;
-    sentence.textContent = text;
-    for (const own of fields) own.setAttribute("aria-invalid", Boolean(text));
-  };
-  Object.assign(row, { refuse: mark, accept: () => row.classList.contains("refused") && mark("") });
-}
-
 // A mark at a share of a slider.
 function placed(mark, share) {
   mark.style.left = `calc(${THUMB / 2}px + (100% - ${THUMB}px) * ${Math.max(0, Math.min(1, share)).toFixed(4)})`;
@@ -104,7 +91,7 @@ export class Zones {
       held ??= members.map((own) => this.zone(own.name));
       members.forEach((own, k) => this.put(own.name, k ? fine((held[k] * zone) / held[0]) : zone));
       if (settled) held = null;
-      row.accept();
+      this.accept();
       this.show();
       this.changed(this.design, settled);
     };
@@ -138,7 +125,7 @@ export class Zones {
           const zone = read(e.target.value);
           if (zone === null) return this.show();
           this.put(own.name, zone);
-          row.accept();
+          this.accept();
           this.show();
           this.changed(this.design, true);
         } });
@@ -176,7 +163,7 @@ export class Zones {
         share.title = `${own.toFixed(1)} % of the sum of all total indices`;
       }
     } });
-    refusable(row, [field, ...(row.fields ?? []).map(([, own]) => own)]);
+    this.refusable(row, [field, ...(row.fields ?? []).map(([, own]) => own)]);
     this.rows.set(group, row);
     return row;
   }
@@ -185,7 +172,7 @@ export class Zones {
     const fixed = own.lower >= own.upper, unit = /\[([^\]]*)\]$/.exec(own.name)?.[1] ?? "";
     const set = (value, settled) => {
       this.design = { ...this.design, settings: { ...this.design.settings, [own.name]: value } };
-      row.accept();
+      this.accept();
       this.show();
       this.changed(this.design, settled);
     };
@@ -200,7 +187,7 @@ export class Zones {
       oninput: (e) => set(rounded(Number(e.target.value)), false), onchange: (e) => set(rounded(Number(e.target.value)), true) });
     const note = make("small", {}, fixed ? "as drawn: the study gives no bounds" : own.word);
     const row = make("div", { class: "row" }, make("span", { class: "title" }, own.name, make("br"), note), make("span", { class: "alone" }, field), delta, make("span", { class: "slide" }, make("span", { class: "track" }, slider, drawn)));
-    refusable(row, [field]);
+    this.refusable(row, [field]);
     row.update = () => {
       placed(drawn, (own.value - own.lower) / (own.upper - own.lower || 1));
       delta.textContent = fixed ? "" : change(this.setting(own.name), own.value, unit);
@@ -223,15 +210,34 @@ export class Zones {
     this.show();
   }
 
+  // A row says why a value was refused, it alone, until something else is accepted.
+  refusable(row, fields) {
+    const sentence = make("p", { class: "refusal", role: "alert", hidden: true });
+    row.append(sentence);
+    row.mark = (text) => {
+      row.classList.toggle("refused", Boolean(text));
+      sentence.hidden = !text;
+      sentence.textContent = text;
+      for (const own of fields) own.setAttribute("aria-invalid", Boolean(text));
+    };
+    row.refuse = (text) => {
+      this.accept();
+      row.mark(text);
+    };
+  }
+
+  // No row is marked any more: something else was accepted, or refused.
+  accept() {
+    for (const row of this.rows.values()) row.mark("");
+  }
+
   // Design and rows that a server refused: they alone are marked, and the last good values return.
   refuse(sentence) {
     const { design, good } = this;
-    for (const [key, row] of this.rows) {
-      const names = (this.groups.get(key) ?? []).map((own) => own.name);
-      const other = names.some((name) => design.zones[name] !== good.zones[name]);
-      const setting = key.startsWith("setting ") && design.settings[key.slice(8)] !== good.settings[key.slice(8)];
-      if (other || setting) row.refuse(sentence);
-    }
+    const changed = [...this.rows].filter(([key]) => (key.startsWith("setting ") ? design.settings[key.slice(8)] !== good.settings[key.slice(8)]
+      : this.groups.get(key).some(({ name }) => design.zones[name] !== good.zones[name])));
+    this.accept();
+    for (const [, row] of changed) row.mark(sentence);
     this.take(good);
   }
 
