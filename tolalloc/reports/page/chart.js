@@ -152,12 +152,12 @@ export class Chart {
 
   update(figure) {
     this.figure = figure;
-    this.draw();
+    this.draw(this.width); // its place says when it has another width: asking for it lays the page out once more
   }
 
   // Paper is as wide as it is, whatever the screen was: a chart that is only made smaller cannot be read.
-  draw(width = this.element.clientWidth) {
-    this.width = Math.max(width || 720, 240);
+  draw(width) {
+    this.width = Math.max((width ?? this.element.clientWidth) || 720, 240);
     const bars = this.figure.series?.some((item) => item.kind === "bars");
     const drawn = this.figure.values ? this.heat() : bars ? this.bars() : this.plane();
     drawn.setAttribute("role", "img");
