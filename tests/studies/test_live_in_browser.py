@@ -276,11 +276,15 @@ def test_the_keyboard_reaches_everything_and_everything_has_a_name(driver, study
         assert own.accessible_name, own.get_attribute("outerHTML")
     assert all(own.accessible_name for own in driver.find_elements("css selector", "svg[role=img]"))
     driver.execute_script("document.activeElement.blur(); scrollTo(0, 0)")
-    reached = set()
+    reached = {}
     for _ in range(2 * len(wanted)):
         ActionChains(driver).send_keys(Keys.TAB).perform()
-        reached.add(driver.switch_to.active_element.id)
-    assert wanted.keys() <= reached
+        own = driver.switch_to.active_element
+        reached.setdefault(own.id, own.get_attribute("id") or own.accessible_name)
+    assert wanted.keys() <= reached.keys()
+    # as the eye goes: the head, the zones on the left, the unit on the right, the pinned designs below both
+    places = [list(reached.values()).index(name) for name in ("save", "search", "ask-ranking", "unit", "take design 1")]
+    assert places == sorted(places)
     cost = by_id(driver, "cost").text
     driver.find_element("css selector", "#zones input[type=range]").send_keys(Keys.ARROW_LEFT * 20)
     until(lambda: by_id(driver, "cost").text != cost)
@@ -362,6 +366,7 @@ def test_a_page_goes_on_with_a_server_that_is_killed_and_started_again(driver, s
     study.kill()
     driver.find_element("css selector", "#zones input[type=range]").send_keys("\ue012" * 5)
     until(lambda: "does not answer" in by_id(driver, "trouble").text)
+    assert driver.execute_script("return document.body.classList.contains('away')")  # its numbers are grey
     cost, address = by_id(driver, "cost").text, study.address
     study.start()
     assert study.address == address
