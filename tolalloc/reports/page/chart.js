@@ -281,8 +281,12 @@ export class Chart {
       item.x.forEach((value, k) => {
         const dot = node("circle", { cx: x.at(value), cy: y.at(item.y[k]), r: 4.5, fill: paint });
         inside.append(dot);
-        const end = x.at(item.x[k]) > 0.7 * this.width;
-        if (item.note) inside.append(node("text", { class: "note", x: x.at(item.x[k]) + (end ? -9 : 9), y: y.at(item.y[k]) - 7, "text-anchor": end ? "end" : "start" }, item.note));
+        if (!item.note) return;
+        // A name beside its point, on the side where it meets no mark and no edge.
+        const at = x.at(item.x[k]), long = wide(item.note) + 16, marks = (this.figure.vertical ?? []).map(([mark]) => x.at(mark));
+        const meets = (low, high) => (low < x.from || high > x.to) + marks.filter((mark) => mark > low && mark < high).length;
+        const end = meets(at + 5, at + long) > meets(at - long, at - 5);
+        inside.append(node("text", { class: "note", x: x.at(item.x[k]) + (end ? -9 : 9), y: y.at(item.y[k]) - 7, "text-anchor": end ? "end" : "start" }, item.note));
       });
     } else {
       const drawn = this.figure.series.filter((own) => !own.ghost), count = drawn.length, histogram = item.kind === "histogram";
