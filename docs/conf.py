@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import re
 import shutil
 import subprocess
 import sys
@@ -10,17 +12,25 @@ from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+
+logging.getLogger("ezdxf").setLevel(logging.WARNING)  # what the drawings of the pages would tell
 
 project = "tolalloc"
 author = "tolalloc maintainers"
 release = version = installed("tolalloc")
 extensions = [
     "myst_parser",
+    "mathml",
+    "links",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["_build", "tutorials"]
+exclude_patterns = ["_build", "tutorials", "gallery"]
+myst_enable_extensions = ["attrs_block", "attrs_inline", "dollarmath"]
+html_math_renderer = "mathml"
+smartquotes_action = "q"  # two hyphens begin an option
 html_theme = "furo"
 html_static_path = ["static"]
 html_css_files = ["handbook.css"]
@@ -31,14 +41,29 @@ myst_heading_anchors = 3
 autodoc_member_order = "bysource"
 napoleon_use_rtype = False
 sphinx_gallery_conf = {
-    "examples_dirs": ["tutorials"],
-    "gallery_dirs": ["_made/tutorials"],
+    "examples_dirs": ["tutorials", "gallery"],
+    "gallery_dirs": ["_made/tutorials", "_made/gallery"],
+    "image_scrapers": ("pictures.of_answers", "matplotlib"),
+    "ignore_repr_types": r"matplotlib\.",
+    "thumbnail_size": (400, 250),
     "filename_pattern": r"\.py$",
     "within_subsection_order": "FileNameSortKey",
     "show_memory": False,
     "write_computation_times": False,
     "abort_on_example_error": True,
 }
+
+
+def whole(page: str) -> str:
+    """Return the page of commands with the first sentence of each in its list, which typer cuts, as a link to it."""
+    said = dict(re.findall(r"^## `tolalloc (\S+)`\n+(.+)", page, re.MULTILINE))
+    page = re.sub(r"^\* `(\w+)`: .*$", lambda found: _line(found, said), page, flags=re.MULTILINE)
+    return page.replace(", …", " and so on").replace("study = Study(...)", "`study = ta.Study(...)`")
+
+
+def _line(found: re.Match[str], said: dict[str, str]) -> str:
+    name = found[1]
+    return f"* [`{name}`](#tolalloc-{name}): {said[name]}" if name in said else found[0]
 
 
 def _write_commands(_: Any) -> None:
@@ -48,11 +73,11 @@ def _write_commands(_: Any) -> None:
     shutil.rmtree(page.parent, ignore_errors=True)
     page.parent.mkdir()
     subprocess.run([*typer, "--title", "Commands", "--output", str(page)], check=True, stdout=subprocess.DEVNULL)
+    page.write_text(whole(page.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 def _write_files(_: Any) -> None:
     """Write the page of files beside it, from the records that read them."""
-    sys.path.insert(0, str(HERE))
     from files_page import page
 
     (HERE / "_made" / "files.md").write_text(page(), encoding="utf-8")

@@ -5,6 +5,7 @@ TolallocError                 one sentence for a person; the command line prints
 ├── UnknownNameError          a name that nothing here carries; the nearest known names are offered
 ├── RunFolderError            the run folder cannot be used without losing what is in it
 ├── SolveError                too many samples of a batch failed to be trusted
+│   └── FailedUnitsError      the same of the random units of one drawing, beside which a search may try others
 └── StoppedError              a person stopped the work; exit code 130
 """
 
@@ -109,6 +110,10 @@ class SolveError(TolallocError):
 
 _MOST_FAULTS = 20
 """Most faults of one file that are said; the others are counted [-]."""
+
+
+class FailedUnitsError(SolveError):
+    """Too many random units of one drawing have no answer."""
 
 
 class Faults:

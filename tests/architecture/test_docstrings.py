@@ -110,7 +110,6 @@ COMPUTES_NOTHING = {
     "allocation.search.discrete.group_ladders": "orders",
     "allocation.search.discrete.group_options": "orders",
     "allocation.search.lagrange_dual.by_form": "orders",
-    "allocation.space.ladder.group_ladder": "orders",
     "capability.limit_state.run_of": "orders",
     "sensitivity.sobol.joined": "orders",
     # asks others one after the other and passes on what they say

@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import subprocess
 import time
 from pathlib import Path
 
 import pandas as pd
 import pytest
+from openpyxl import load_workbook
 
 from tests.studies.command import ROOT, command, process, refused, tolalloc
 from tolalloc.allocation.cost.process_costs import load_process_costs
@@ -125,6 +127,8 @@ def test_the_report_is_complete(allocated):
     }
     page = (folder / "report.html").read_text(encoding="utf-8")
     for heading in (
+        "As it is and as drawn",
+        "What can go wrong",
         "What to write on the drawing",
         "Requirements",
         "How far from optimal",
@@ -135,6 +139,10 @@ def test_the_report_is_complete(allocated):
     ):
         assert heading in page
     assert "<script src" not in page
+    book = load_workbook(folder / "results.xlsx")
+    assert book.sheetnames[:3] == ["answer", "contents", "charts"]
+    histogram, effects = book["charts"]._charts[:2]
+    assert len(histogram.series) == 2 and len(effects.series) == 1
     for stage in ("tolerances alone", "with modification", "grades", "modification trade", "fronts", "robustness"):
         assert stage in said
     assert "units/s" in said
@@ -146,11 +154,15 @@ def test_the_answer_reads_well(allocated):
     assert "Met: " in said
     assert "-0.0" not in said
     assert "nan" not in said
-    table = [line for line in said.splitlines() if line.startswith(("┏", "┃", "│"))]
-    assert all(len(line) <= 100 for line in table)
-    rows = [line.split("│")[1].strip() for line in table if line.startswith("│")]
+    lines = said.splitlines()
+    (top,) = (at for at, line in enumerate(lines) if line.startswith("drawing "))
+    rows = [re.split(r"  +", line)[0] for line in lines[top + 2 :]]
     assert rows[0].startswith("cost [")
-    assert "peak-to-peak [arcsec]" in rows
+    assert rows[1] == "peak-to-peak [arcsec]"
+    (first,) = (at for at, line in enumerate(lines) if line.startswith("Met: "))
+    last = next(at for at, line in enumerate(lines) if at > first and re.search(r": (done|so far), ", line))
+    assert last - first <= 24, "a screen holds all of it, and the path of the report"
+    assert lines[-1].startswith("Report: ")
     assert "disc run-out" not in said, "the drawing itself stands in the report"
 
 

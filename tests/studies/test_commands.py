@@ -229,7 +229,7 @@ def test_a_run_folder_with_something_in_it_is_refused(tmp_path):
         (set_cell(4, "plus [unit]", "900000"), ["row 6", "900000 µm", "must be 0 to 2000 µm"]),
         (set_cell(1, "max [unit]", "300"), ["disc1.bore2.position", "up to 200 µm", "zone 3.8, max 300 µm"]),
         (set_cell(2, "Cp [-]", "good"), ["row 4", "Cp", "good", "a number"]),
-        (set_cell(5, "distribution", "gauss"), ["row 7", "distribution", "gauss", "normal, uniform"]),
+        (set_cell(5, "distribution", "gausss"), ["row 7", "distribution", "gausss", "normal, uniform"]),
         (set_cell(6, "min [unit]", "7"), ["row 8", "min 7", "between min and max"]),
         (lambda frame: frame.drop(columns="cost [cost units]"), ["'cost'", "missing"]),
         (lambda frame: frame.rename(columns={"Cp [-]": "Cpk [-]"}), ["Cpk", "Cp"]),

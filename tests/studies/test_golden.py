@@ -32,7 +32,8 @@ def alike(one: str, other: str, relative: float, absolute: float = 1e-9) -> bool
 
 def laid_out(text: str) -> list[str]:
     """Return the lines without numbers, rules of tables and blanks, whose widths follow the digits of the numbers."""
-    return re.sub(r"[ ─━]+", " ", NUMBER.sub("#", text)).splitlines()
+    lines = re.sub(r"[ \u2500-\u257f]+", " ", NUMBER.sub("#", text)).splitlines()
+    return [line.strip() for line in lines if line.strip()]
 
 
 def require_alike(before: str, now: str, relative: float, absolute: float = 1e-9) -> None:

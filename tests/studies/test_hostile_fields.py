@@ -80,7 +80,7 @@ def test_output_that_is_not_utf_8_shows_a_question_mark(calculation):
 
 def test_a_full_disk_is_one_sentence(calculation):
     full = OSError(errno.ENOSPC, "No space left on device", "out.csv")
-    with mock.patch("typer.echo", side_effect=full):
+    with mock.patch("tolalloc.cli.studies.say", side_effect=full):
         refused(tolalloc("check", calculation), "out.csv: cannot be read or written (No space left on device).")
 
 

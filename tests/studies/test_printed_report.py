@@ -112,7 +112,9 @@ def test_a_page_is_sound_and_begins_with_answer_and_drawing(written):
     assert page.headings[:4] == ["Both", "Allocation", "Ranking", "What to write"]
     assert text.index("Allocation: sentence 0") < text.index("Ranking: sentence 0") < text.index("<nav>")
     assert text.index("Allocation drawing" if "Allocation drawing" in text else "⌀0.0047") < text.index("<nav>")
-    assert text.count("The answer in full") == 4
+    assert text.count("More on this answer") == 4
+    for title in ("Allocation", "Ranking"):
+        assert text.count(f"{title}: sentence 0") == 1 == text.count(f"{title}: sentence 4")  # none is said twice
     assert "display: table-header-group" in text
     assert "<dt>yield</dt>" in text and "<dt>preloaded</dt>" not in text
 

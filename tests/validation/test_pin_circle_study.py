@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tolalloc.allocation.space.ladder import grade_zones
 from tolalloc.drawings.drawing import Drawing
+from tolalloc.drawings.ladder import grade_zones
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models.model import Evaluation
 from tolalloc.reading.units import ARCSECOND, MICROMETRE, MILLIMETRE

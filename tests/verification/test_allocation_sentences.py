@@ -279,12 +279,13 @@ def test_a_trade_without_any_cost_is_said_in_words(results):
         assert "nan" not in " ".join(own.paragraphs)
 
 
-def test_the_front_says_how_sure_it_is_and_marks_its_knee(results):
+def test_the_front_says_how_sure_it_is_in_four_series_with_all_verified_designs(results):
     front = figures.front_figure(results, results.fronts, "cost units")
     assert says(front.title, "allocation.figure_front_others")
-    (knee,) = [series for series in front.series if series.label.startswith("knee")]
-    searched = results.fronts.searched
-    assert (knee.x, knee.y) == ([searched.quantile[searched.knee]], [searched.cost[searched.knee]])
+    designs = results.candidates.designs("tolerances and modification")
+    assert len(front.series) == 4
+    assert list(front.series[-1].y) == [own.cost for own in designs.values()]
+    assert all(name in front.series[-1].label for name in designs)
     assert (
         front.series[0].label == f"cheapest by the local models (±{results.chosen.constraints[0].standard_error:.2g}″)"
     )
@@ -297,6 +298,6 @@ def test_amounts_that_are_not_those_of_today_are_said_with_the_zones_on_the_firs
         drawn.by_setting @ results.chosen.settings, drawn.by_setting @ results.free.baseline.settings, strict=True
     ):
         assert f"{amount:.2f} µm (was {was:.2f})".replace("-", "−") in sentence
+    assert answer_of(results).sentences.index(sentence) < 4, "the first page has four sentences of the answer"
     (first, *_) = section(results, "What to write").paragraphs
-    assert first.startswith(sentence)
     assert "a positive equidistant amount and a negative shift remove material" in first

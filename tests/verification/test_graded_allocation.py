@@ -13,7 +13,7 @@ from tests import builders
 from tests.builders import prepared as baseline
 from tolalloc.allocation.search.discrete import allocate_grades, group_ladders, group_options, with_shared_zones
 from tolalloc.allocation.search.zone_allocation import kept_stacks
-from tolalloc.allocation.space.ladder import SERIES, ZONES, grade_zones
+from tolalloc.drawings.ladder import SERIES, ZONES, grade_zones
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 

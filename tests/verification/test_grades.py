@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tolalloc.allocation.space.ladder import GRADES, SIZE_STEPS, ZONES, Ladder, grade_zones, group_ladder
+from tolalloc.drawings.ladder import GRADES, SIZE_STEPS, ZONES, Ladder, fit_deviations, grade_zones, group_ladder
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.drawings.zones import Feature
@@ -123,3 +123,52 @@ def test_members_of_a_group_share_one_zone_inside_the_ranges_of_all():
     assert group_ladder(mixed).labels[0] == "R′10"
     with pytest.raises(InputError, match="group g"):
         group_ladder([source("a", maximum=4 * UM, group="g"), source("b", minimum=4.5 * UM, group="g")])
+
+
+PUBLISHED_FITS = {
+    ("h5", 25): (0, -9),
+    ("H7", 25): (21, 0),
+    ("g6", 25): (-7, -20),
+    ("f7", 60): (-30, -60),
+    ("e8", 10): (-25, -47),
+    ("d9", 100): (-120, -207),
+    ("k6", 50): (18, 2),
+    ("k8", 40): (39, 0),
+    ("m6", 30): (21, 8),
+    ("n6", 60): (39, 20),
+    ("p6", 18): (29, 18),
+    ("js6", 40): (8, -8),
+    ("JS7", 40): (12.5, -12.5),
+    ("IT6", 40): (8, -8),
+    ("G7", 30): (28, 7),
+    ("F8", 50): (64, 25),
+    ("E9", 20): (92, 40),
+    ("D10", 80): (220, 100),
+    ("K6", 3): (0, -6),
+    ("K7", 40): (7, -18),
+    ("K8", 200): (22, -50),
+    ("M6", 300): (-9, -41),
+    ("M7", 40): (0, -25),
+    ("M8", 60): (5, -41),
+    ("N6", 5): (-5, -13),
+    ("N7", 40): (-8, -33),
+    ("N9", 3): (-4, -29),
+    ("N9", 40): (0, -62),
+    ("P6", 8): (-12, -21),
+    ("P7", 40): (-17, -42),
+    ("P9", 40): (-26, -88),
+    ("H11", 400): (360, 0),
+}
+"""Fit and nominal size [mm] → upper and lower deviation [µm], as tables of ISO 286-2 print them."""
+
+
+@pytest.mark.parametrize(("fit", "size"), PUBLISHED_FITS)
+def test_deviations_of_a_fit_are_those_of_the_standard(fit, size):
+    found = [one * 1e6 for one in fit_deviations(fit, size * 1e-3)]
+    assert found == pytest.approx(PUBLISHED_FITS[fit, size], abs=1e-9)
+
+
+@pytest.mark.parametrize("fit", ["z6", "K9", "h19", "h", "ZC8"])
+def test_a_fit_that_is_not_known_is_refused(fit):
+    with pytest.raises(InputError, match=f"ISO 286-2: fit is '{fit}'; allowed is"):
+        fit_deviations(fit, 0.04)

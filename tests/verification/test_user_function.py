@@ -11,6 +11,7 @@ import textwrap
 
 import numpy as np
 import pytest
+from scipy.optimize import newton
 
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.user_function import UserFunction, identity
@@ -81,9 +82,75 @@ def test_what_a_function_raises_is_said():
     with pytest.raises(SolveError, match=r"each of 40 samples, first ValueError \(tooth too thin\) for \(0\.5\)"):
         returned(thin, 1, np.full((40, 1), 0.5))
     assert np.isnan(returned(thin, 1, np.full((3, 1), 0.5))).all()
-    with pytest.raises(InputError, match=r"the function has a fault: unsupported operand") as caught:
+    with pytest.raises(InputError, match=r"the function has a fault: TypeError \(unsupported operand") as caught:
         returned(lambda h: h + "a", 1, np.zeros((3, 1)))
     assert isinstance(caught.value.__cause__, TypeError)
+
+
+FAULTS = (
+    *(KeyError, IndexError, AttributeError, AssertionError, NameError, UnboundLocalError, LookupError, TypeError),
+    *(RecursionError, NotImplementedError, MemoryError, OSError, FileNotFoundError, TimeoutError, ImportError),
+    *(StopIteration, StopAsyncIteration, EOFError, BufferError, SystemError, SystemExit, Warning, Exception),
+)
+
+
+@pytest.mark.parametrize("kind", FAULTS, ids=lambda kind: kind.__name__)
+def test_whatever_else_a_function_raises_is_its_fault_said_with_its_line(kind):
+    def broken(height):
+        if height > 1.0:
+            raise kind("no such pin")
+        return height
+
+    line = broken.__code__.co_firstlineno + 2
+    with pytest.raises(InputError) as caught:
+        returned(broken, 1, np.array([[0.5], [2.0], [0.7]]))
+    said = str(caught.value)
+    assert f"the function has a fault: {kind.__name__} (" in said and "no such pin" in said
+    assert said.endswith(f" in test_user_function.py, line {line}.")
+
+
+NO_ANSWERS = (ValueError, ZeroDivisionError, OverflowError, FloatingPointError, RuntimeError, np.linalg.LinAlgError)
+
+
+@pytest.mark.parametrize("kind", NO_ANSWERS, ids=lambda kind: kind.__name__)
+def test_a_calculation_that_fails_leaves_one_unit_without_an_answer(kind):
+    def broken(height):
+        if height > 1.0:
+            raise kind("does not converge")
+        return height
+
+    assert returned(broken, 1, np.array([[0.5], [2.0], [0.7]]))[:, 0] == pytest.approx([0.5, np.nan, 0.7], nan_ok=True)
+
+
+def test_a_root_finder_that_does_not_converge_leaves_one_unit_without_an_answer():
+    def root(a):
+        return newton(lambda x: x**2 + a, 1.0, maxiter=30)
+
+    found = returned(root, 1, np.array([[-4.0], [4.0]]))
+    assert found[:, 0] == pytest.approx([2.0, np.nan], nan_ok=True)
+
+
+def deepest(a, b):
+    gap = a - b
+    gap[gap < 0.0] = 0.0
+    return gap
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda a, b: (a - b).astype(float).clip(0.0),
+        lambda a, b: np.where((a - b).round(12) < 0, 0.0, a - b)[:],
+        lambda a, b: (a - b).clip(min=0.0),
+        lambda a, b: np.array([max(x - y, 0.0) for x, y in zip(a, b, strict=True)]),
+        lambda a, b: np.zeros(len(a)) + np.maximum(a - b, 0.0),
+        deepest,
+    ],
+)
+@pytest.mark.parametrize("samples", [1, 2, 5])
+def test_a_function_of_arrays_alone_is_given_arrays(function, samples, generator):
+    given = generator.normal(size=(samples, 2))
+    assert returned(function, 1, given)[:, 0] == pytest.approx(np.maximum(given[:, 0] - given[:, 1], 0.0), abs=1e-12)
 
 
 def made(factor):

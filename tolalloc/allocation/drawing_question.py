@@ -45,7 +45,7 @@ from tolalloc.allocation.verify.acceptance import (
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, cheapest_met
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.exceptions import InputError
+from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.checkpoint import CachedResponse, Checkpoint
 from tolalloc.models.model import Model, is_fast
 from tolalloc.running.blas import one_blas_thread
@@ -368,6 +368,7 @@ def allocate_drawing(
     question.require_answerable()
     kept = Checkpoint(path=checkpoint, every=4, question=digest) if checkpoint else None
     fixed = graded = trade = fronts = robust = None
+    front_lacks = ""
     with one_blas_thread():
         if question.fixed_first and question.space.settings:
             with record.stage("tolerances alone"):
@@ -392,7 +393,10 @@ def allocate_drawing(
         before = record.counts
         if question.front and question.limits_one_side_above:
             with record.stage("fronts"):
-                fronts = question.fronts(graded or free, kept)
+                try:
+                    fronts = question.fronts(graded or free, kept)
+                except SolveError as error:  # the drawing is verified, and is an answer without it
+                    front_lacks = str(error)
         # What a checkpoint knew is not solved again: these units tell how the run went and not what was found.
         searched = {outcome: count - before[outcome] for outcome, count in record.counts.items()}
         if question.what_if:
@@ -416,6 +420,7 @@ def allocate_drawing(
         shares_of_dimensions=of_dimensions,
         trade=trade,
         fronts=fronts,
+        front_lacks=front_lacks,
         robustness=robust,
         prices=question.prices(free),
         loss=question.quality_loss,

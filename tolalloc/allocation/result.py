@@ -72,6 +72,8 @@ class AllocationResult:
         Cost of the cheapest zones over the settings, if asked for.
     fronts
         What can be had at which cost, if asked for.
+    front_lacks
+        Why it could not be found although it was asked for; empty otherwise.
     robustness
         Answers under changed assumptions, if asked for.
     prices
@@ -103,6 +105,7 @@ class AllocationResult:
     error: float
     examination: Mapping[str, float]
     statuses: Mapping[str, int]
+    front_lacks: str = ""
 
     @property
     def leading(self) -> str:

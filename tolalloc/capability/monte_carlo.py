@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
 from tolalloc.capability.indices import Limits
 from tolalloc.drawings.seeds import CHUNK, SamplingDesign, uniform_chunks
-from tolalloc.exceptions import SolveError
+from tolalloc.exceptions import FailedUnitsError
 from tolalloc.models.model import Evaluation, Response
 
 CONFIDENCE = 0.95
@@ -199,10 +199,10 @@ def monte_carlo(
 
 
 def require_few_failures(result: AnsweredUnits, name: str, largest_failed_share: float = LARGEST_FAILED_SHARE) -> None:
-    """Raise a `SolveError` if more units failed than a trustworthy figure admits."""
+    """Raise a `FailedUnitsError` if more units failed than a trustworthy figure admits."""
     units = result.evaluation.status.size
     if result.failed > largest_failed_share * units:
-        raise SolveError(
+        raise FailedUnitsError(
             f"Monte Carlo {name}: {result.failed} of {units} units have no usable answer; allowed is "
             f"{largest_failed_share:.4g} of them, because more would bias every figure."
         )

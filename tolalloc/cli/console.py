@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import sys
 import textwrap
@@ -13,7 +14,7 @@ from math import isnan
 from pathlib import Path
 from threading import Event, RLock, Thread
 from types import TracebackType
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 
@@ -144,14 +145,17 @@ class Bars:
     def __init__(self, counted: str) -> None:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+        from rich.table import Column
 
+        console = Console(stderr=True)
+        bar = (BarColumn(bar_width=24),) if console.width >= _ROOM_FOR_BARS else ()
         self._bar = Progress(
-            SpinnerColumn(),
-            TextColumn("{task.description:<24}", markup=False),
-            BarColumn(bar_width=24),
-            TimeElapsedColumn(),
-            TextColumn("{task.fields[solved]}", markup=False),
-            console=Console(stderr=True),
+            SpinnerColumn(table_column=Column(no_wrap=True, min_width=1)),
+            TextColumn("{task.description:<24}", markup=False, table_column=Column(no_wrap=True, min_width=24)),
+            *bar,
+            TimeElapsedColumn(table_column=Column(no_wrap=True, min_width=7)),
+            TextColumn("{task.fields[solved]}", markup=False, table_column=Column(overflow="fold")),
+            console=console,
         )
         self._counted = counted
         self._task: TaskID | None = None
@@ -179,7 +183,7 @@ class Bars:
             return
         self._stage.units += units
         if not self._stage.known:  # all that were expected are done, and it goes on: a full bar would say that it ends
-            self._bar.tasks[self._task].total = None
+            next(own for own in self._bar.tasks if own.id == self._task).total = None
         self._bar.update(self._task, completed=self._stage.units, solved=self._stage.solved())
 
     def tell(self, sentence: str) -> None:
@@ -204,15 +208,20 @@ class Bars:
 AsJson = Annotated[bool, typer.Option("--json", help="Print machine-readable output only.")]
 ReportFolder = Annotated[Path | None, typer.Option(help="Write a report into this folder, new or empty.")]
 
-_FRAME, _BETWEEN = 4, 3
+_BETWEEN = 3
+"""Blanks between two columns [characters]."""
+_ROOM_FOR_BARS = 110
+"""Characters of a line from which a moving bar leaves room for its numbers [-]."""
 _NARROWEST = 40
 """Characters of a line below which nothing is broken [-]."""
-"""What the frame takes around the first column, and around every other one [characters]."""
+_UNIT = re.compile(r"(?<=\d) (?=(?:%|µm|mm|N|N·m|s|units|arcmin|arcsec|K)(?![^\W\d_]))")
+_JOINED = "\u00a0"
+"""Blank between a number and its unit, which are not parted at the end of a line."""
 
 
 def note(sentence: str, *, dim: bool = False) -> None:
     """Tell something beside the answer, on standard error."""
-    typer.secho(sentence, dim=dim or None, err=True)
+    typer.secho(_broken(sentence, sys.stderr), dim=dim or None, err=True)
 
 
 def announce_compilation(room: str = "equivalent") -> None:
@@ -244,6 +253,7 @@ def print_table(frame: pd.DataFrame, title: str) -> None:
 
     Columns that do not stand beside the others follow in a table of their own, with the first column again.
     """
+    from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
@@ -254,13 +264,15 @@ def print_table(frame: pd.DataFrame, title: str) -> None:
     words = [word for text in (names[0], *cells[0]) for word in text.split()]
     first = max(map(len, words), default=1)
     widths = [max(map(len, (" ", *name.split(), *own))) for name, own in zip(names, cells, strict=True)]
-    for number, columns in enumerate(_side_by_side(widths[1:], console.width - first - _FRAME)):
-        table = Table(title=escape(title if number == 0 else f"{title}, continued"))
+    for number, columns in enumerate(_side_by_side(widths[1:], console.width - first)):
+        heading = escape(title if number == 0 else f"{title}, continued")
+        table = Table(title=heading, title_justify="left", box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
         shown = [0, *columns]
         least = [first, *(widths[column] for column in columns)]
         most = [max(map(len, (names[column], *cells[column]))) for column in shown]
-        room = console.width - _FRAME - _BETWEEN * len(columns)
-        for column, width in zip(shown, _widened(least, most, room), strict=True):
+        room = console.width - _BETWEEN * len(columns)
+        named = _widened(least, [most[0], *least[1:]], room)  # a head may have several lines, a name had better not
+        for column, width in zip(shown, _widened(named, most, room), strict=True):
             table.add_column(escape(names[column]), justify="right" if column else "left", width=width)
         for row in rows:
             table.add_row(escape(row[0]), *(escape(row[column]) for column in columns))
@@ -315,11 +327,30 @@ def tell(answer: Answer[Any], as_json: bool, *tables: tuple[pd.DataFrame, str]) 
 
 
 def say(sentence: str, *, warns: bool = False) -> None:
-    """Print a sentence, on a screen broken between words and never inside one."""
-    if sys.stdout.isatty():
-        width = max(shutil.get_terminal_size().columns, _NARROWEST)
-        sentence = textwrap.fill(sentence, width, break_long_words=False, break_on_hyphens=False)
-    typer.secho(sentence, fg="yellow" if warns else None)
+    """Print a sentence, or several lines, on a screen broken between words and never inside one."""
+    typer.secho(_broken(sentence, sys.stdout), fg="yellow" if warns else None)
+
+
+def _broken(text: str, stream: TextIO) -> str:
+    """Return lines that fit a screen, what follows of a line under its beginning; as they are where it is no screen."""
+    if not stream.isatty():
+        return text
+    width = max(shutil.get_terminal_size().columns, _NARROWEST)
+    return "\n".join(_filled(line, width) for line in text.splitlines())
+
+
+def _filled(line: str, width: int) -> str:
+    """Return a line in as many as it needs; a number and its unit stay together."""
+    indent = line[: len(line) - len(line.lstrip())]
+    filled = textwrap.fill(
+        _UNIT.sub(_JOINED, line.strip()),
+        width,
+        initial_indent=indent,
+        subsequent_indent=indent + indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return filled.replace(_JOINED, " ")
 
 
 def write_report(answer: Answer[Any], out: Path | None, progress: Progress) -> None:

@@ -6,9 +6,7 @@ import platform
 import time
 from pathlib import Path
 
-import typer
-
-from tolalloc.cli.console import AsJson, announce_compilation, print_json, shown_progress
+from tolalloc.cli.console import AsJson, announce_compilation, print_json, say, shown_progress
 from tolalloc.exceptions import SolveError
 
 _KNOWN = 96.629
@@ -46,14 +44,14 @@ def doctor(as_json: AsJson = False) -> None:
         for name, said in found.items():
             if isinstance(said, dict):
                 said = ", ".join(f"{library} {number}" for library, number in said.items())
-            typer.echo(f"{name}: {said}")
+            say(f"{name}: {said}")
     if not abs(value - _KNOWN) <= _AGREES:
         raise SolveError(
             f"self-test: the peak-to-peak of liu2020's Table 4 unit is {value:.4f}″ here and must be {_KNOWN}″; "
             "trust no answer of this installation."
         )
     if not as_json:
-        typer.echo("All is well: a published unit has the answer that it should have.")
+        say("All is well: a published unit has the answer that it should have.")
 
 
 def _peak_to_peak() -> float:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import note, print_json
+from tolalloc.cli.console import note, print_json, say
 from tolalloc.exceptions import InputError
 
 
@@ -39,11 +39,11 @@ def new(
     kinds = SAMPLES if samples == "all" else tuple(kind.strip() for kind in samples.split(",") if kind.strip())
     reducer, sources = NewFolder(place=name, like=chosen, samples=kinds).write()
     varied = sum(own.zone > 0 and not own.locked for own in sources)
-    typer.echo(
+    say(
         f"{name}: {reducer.name} with {reducer.crank_count} cranks and {reducer.disc_count} discs, like "
         f"{chosen.preset}; {len(sources)} sources, of which {varied} may change."
     )
-    typer.echo("Every zone and cost is assumed: open zones.xlsx and write your own.")
+    say("Every zone and cost is assumed: open zones.xlsx and write your own.")
     note(f"Next: cd {name} && tolalloc check study.py && tolalloc open study.py", dim=True)
 
 

@@ -201,7 +201,7 @@ class _Place:
                 asked = Compare(first=self.before, second=self.folder)
                 found = asked.solve(asked.prepare(), SILENT)
                 for sentence in ComparisonTeller(found.result, found.header).since:
-                    typer.echo(sentence)
+                    say(sentence)
 
 
 def _run(study: Study, kinds: tuple[str, ...], place: _Place, checkpoint: Path | None, way: _Way) -> None:
@@ -242,9 +242,11 @@ def _run(study: Study, kinds: tuple[str, ...], place: _Place, checkpoint: Path |
             else:
                 _show_headline(answer)
                 unsaid.update(answer.warnings)
-        for warning in found.document.warnings:
-            if warning in unsaid:
-                say(warning, warns=True)
+        warnings = [warning for warning in found.document.warnings if warning in unsaid]
+        for warning in warnings[:_WARNINGS]:
+            say(warning, warns=True)
+        if (more := len(warnings) - _WARNINGS) > 0:
+            say(f"{more} more {'note' if more == 1 else 'notes'} in the report, or with --verbose.", warns=True)
         place.tell_changes()
     note(f"Report: {folder / 'report.html'}")
 
@@ -256,6 +258,10 @@ def solvers(scheduler: str) -> AbstractContextManager[Mapper]:
     from tolalloc.running.workers import workers_at
 
     return workers_at(scheduler)
+
+
+_WARNINGS = 2
+"""Warnings of all answers together that are said where the report holds them all [-]."""
 
 
 def _show_headline(answer: Answer[Any]) -> None:

@@ -15,6 +15,7 @@ from tolalloc.cli.console import (
     announce_kernel,
     note,
     print_json,
+    say,
     shown_progress,
     tell,
     write_report,
@@ -44,7 +45,7 @@ def check(script: Script, timed: Timed = False, as_json: AsJson = False) -> None
     if as_json:
         print_json(answer.summary)
     else:
-        typer.echo("\n".join(answer.sentences))  # in one piece: a check that is stopped says nothing rather than half
+        say("\n".join(answer.sentences))  # in one piece: a check that is stopped says nothing rather than half
 
 
 def whatif(

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from tolalloc.drawings.correlation import Correlation, load_correlations
@@ -20,9 +21,17 @@ from tolalloc.drawings.table_file import (
     stated_currency,
     stated_settings,
 )
-from tolalloc.drawings.tolerance_table import doubts, load_tolerance_table, sources_of_rows, table_frame, table_text
+from tolalloc.drawings.tolerance_table import (
+    doubts,
+    heads_of,
+    load_tolerance_table,
+    own_heads,
+    sources_of_rows,
+    table_frame,
+    table_text,
+)
 from tolalloc.exceptions import InputError
-from tolalloc.reading.file_content import is_file
+from tolalloc.reading.file_content import is_file, other_encoding
 from tolalloc.reading.files import found_from_here, write_new
 from tolalloc.reading.units import COST_UNITS, currency_in
 
@@ -140,7 +149,7 @@ class Drawing:
             The file, row, field and value that are not allowed.
         """
         path = found_from_here(table)
-        notes, currency = _read_beside(path)
+        notes, currency = _read_beside(path, "", {})
         sources = load_tolerance_table(path)
         notes, changed = (*notes, *doubts(sources, path.name)), self.with_sources(sources, str(table))
         settings = {**self.settings, **_settings_of(path)}
@@ -184,6 +193,7 @@ def load_drawing(
     costs: Costs = "",
     folder: Path | None = None,
     sheet: str = "",
+    columns: Mapping[str, str] = MappingProxyType({}),
 ) -> Drawing:
     """Return a drawing from its files, each by shipped name or path.
 
@@ -202,6 +212,9 @@ def load_drawing(
         Folder that relative paths start from, such as that of a study; the current one unless given.
     sheet
         Sheet of a workbook that holds the tolerance table; the first unless given.
+    columns
+        Head of a table as an office writes it, without its unit → name of the column that it is, such as
+        ``{"Zeichn.-Nr.": "drawing"}``. Other heads that are no column's are kept with their cells.
 
     Raises
     ------
@@ -214,10 +227,10 @@ def load_drawing(
     >>> len(drawing.sources), f"{1e6 * drawing.sources[0].zone:.1f} µm", drawing.settings["flank clearance [µm]"]
     (50, '4.0 µm', 3.5)
     """
-    sources = load_tolerance_table(beside(folder, table), beside(folder, processes), sheet)
+    sources = load_tolerance_table(beside(folder, table), beside(folder, processes), sheet, columns)
     correlation = load_correlations(beside(folder, correlations), sources) if correlations else Correlation()
     path = found_from_here(beside(folder, table))
-    notes, currency = _read_beside(path, sheet)
+    notes, currency = _read_beside(path, sheet, columns)
     return Drawing(
         name=str(table),
         errors=ErrorModel(sources, correlation=correlation, table=str(table)),
@@ -234,19 +247,23 @@ def _settings_of(table: Path) -> dict[str, float]:
     return stated_settings(table if table.suffix else shipped)
 
 
-def _read_beside(table: Path, sheet: str = "") -> tuple[tuple[str, ...], str]:
+def _read_beside(table: Path, sheet: str, columns: Mapping[str, str]) -> tuple[tuple[str, ...], str]:
     """Return what a reader of a tolerance table must know, and the currency of its costs."""
     if not table.suffix:
         return (), ""  # a shipped one
-    header, names = read_table_file(table, header=("id",), sheet=sheet)[0]
+    header, names = read_table_file(table, heads_of(columns), sheet=sheet)[0]
     stated, units = [split_header(name) for name in names], {name: own.unit for name, own in COLUMNS.items()}
-    return _notes(table, header, sheet), stated_currency(table, stated, units)
+    own = own_heads(table, [name for name, _ in stated])
+    return _notes(table, header, sheet, own), stated_currency(table, stated, units)
 
 
-def _notes(table: Path, header: int, sheet: str) -> tuple[str, ...]:
-    """Return what of a tolerance table was left out, above the row of its header, and what is hidden in it."""
+def _notes(table: Path, header: int, sheet: str, own: Sequence[str]) -> tuple[str, ...]:
+    """Return what of a tolerance table was left out or only kept, how it was read, and what is hidden in it."""
     titles = f"{table.name}: the header stands in row {header}; what stands above it was left out"
-    left_out = (titles,) if header > 1 else ()
+    kept = f"{table.name}: kept as they are, and written again: {', '.join(own)}"
+    left_out = (*((titles,) if header > 1 else ()), *((kept,) if own else ()))
+    if table.suffix.lower() not in (".xlsx", ".xlsm") and (encoding := other_encoding(table)):
+        return (*left_out, f"{table.name}: read as {encoding}, since it is not UTF-8")
     if table.suffix.lower() not in (".xlsx", ".xlsm"):
         return left_out
     from tolalloc.drawings.table_file import hidden_cells

@@ -90,11 +90,13 @@ def neglected_columns(patterns: Sequence[str], columns: Sequence[str]) -> frozen
 
 
 def meant(pattern: str, sources: Iterable[Source]) -> list[str]:
-    """Return the names of the sources that a name, a user's own id or a pattern of either means, in their order."""
+    """Return the names of the sources that a name, a user's own id, a pattern of either or a dimension means."""
     return [
         own.name
         for own in sources
-        if fnmatchcase(own.name, pattern) or (own.own_id and fnmatchcase(own.own_id, pattern))
+        if fnmatchcase(own.name, pattern)
+        or (own.own_id and fnmatchcase(own.own_id, pattern))
+        or own.dimension == pattern
     ]
 
 
@@ -142,6 +144,8 @@ class Source:
         For an angle, the length over which the zone limits the deviation; 0 for everything else [m].
     own_id
         What the user's table calls it, if that is not its name.
+    own_cells
+        Head and cell of every column of the user's own that is none of a tolerance table; kept, and written again.
     part, feature, distribution, batches, measured, sorted, process, written_spectrum, group, locked, grade, drawing,
     label, note
         As `tolalloc.drawings.fields.ToleranceRow` says, the one list of what a table may state.
@@ -178,6 +182,7 @@ class Source:
     label: str = ""
     own_id: str = ""
     note: str = ""
+    own_cells: tuple[tuple[str, str], ...] = ()
 
     @cached_property
     def columns(self) -> tuple[str, ...]:

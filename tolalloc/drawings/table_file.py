@@ -9,7 +9,7 @@ import csv
 import re
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from io import BytesIO, StringIO
 from pathlib import Path
@@ -26,6 +26,8 @@ _LARGEST_CONTENT = 16 * 2**20
 """Largest content of a workbook when unpacked, all parts together [B]."""
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}([.,]\d{3})+")
 """Text that is a thousand times as large where its sign separates thousands."""
+_TRUE_MINUS = re.compile(r"\u2212\s*[\d.,]+(?:[eE][+-]?\d+)?")
+"""Number behind a true minus, as word processors write it."""
 _MOST_CELLS = 100_000
 """Most cells of the rectangle from the first cell to the last one [-]."""
 
@@ -136,7 +138,16 @@ def _text(path: Path, cell: Any, written: Any) -> str:
         return AmbiguousText(value.strip())
     if isinstance(value, float) and value.is_integer():
         value = int(value)
-    return "" if value is None else str(value).strip()
+    return "" if value is None else _minus(str(value).strip())
+
+
+def _minus(cell: str) -> str:
+    """Return a cell with the keyboard's minus where a number has a true one.
+
+    >>> _minus("\u22120.05"), _minus("10\u221220 mm")
+    ('-0.05', '10−20 mm')
+    """
+    return "-" + cell[1:].lstrip() if _TRUE_MINUS.fullmatch(cell) else cell
 
 
 DATA = Path(__file__).parent / "data"
@@ -158,12 +169,49 @@ _APOSTROPHE = re.compile(r"^'(?=[=+\-@])")
 """What `tolalloc.reading.files.no_formula` writes before a text."""
 
 
-def read_table_file(path: Path, header: Sequence[str] = (), sheet: str = "") -> tuple[NumberedRow, ...]:
+@dataclass(frozen=True, kw_only=True)
+class Heads:
+    """How a table's heads are read.
+
+    Parameters
+    ----------
+    needed
+        Names of columns: the header is the first row that has them all, and rows above it are titles.
+    known
+        Names of columns in the spelling that is meant; a head in other capitals is one of them.
+    called
+        Head as an office writes it, without its unit → the name of the column that it is.
+    """
+
+    needed: tuple[str, ...] = ()
+    known: tuple[str, ...] = ()
+    called: Mapping[str, str] = field(default_factory=dict)
+
+    def meant(self, head: str) -> str:
+        """Return a head as a column is named, with the unit that it states.
+
+        >>> heads = Heads(known=("id", "Cp"), called={"Merkmal": "id"})
+        >>> heads.meant("Merkmal"), heads.meant("CP [-]"), heads.meant("Bemerkung")
+        ('id', 'Cp [-]', 'Bemerkung')
+        """
+        name, unit = split_header(head)
+        spelt = {own.lower(): own for own in self.known}
+        found = self.called.get(name.strip()) or spelt.get(name.strip().lower(), name)
+        return f"{found} [{unit}]" if unit else found
+
+    def named(self, cells: Sequence[str]) -> set[str]:
+        """Return the names that a row would give to columns."""
+        return {split_header(self.meant(cell))[0] for cell in cells}
+
+
+_ANY = Heads()
+
+
+def read_table_file(path: Path, heads: Heads = _ANY, sheet: str = "") -> tuple[NumberedRow, ...]:
     """Return the cells of a CSV or XLSX file as text, the header first, blank rows left out.
 
-    Every row is filled up to the length of the first: Excel leaves out separators behind the last cell. Where names are
-    given, the header is the first row that has them all, and rows above it are titles, which are left out.
-    Of a workbook the named sheet is read, the first unless named.
+    Every row is filled up to the length of the first: Excel leaves out separators behind the last cell. A true minus
+    before a number is a minus. Of a workbook the named sheet is read, the first unless named.
 
     Raises
     ------
@@ -171,41 +219,39 @@ def read_table_file(path: Path, header: Sequence[str] = (), sheet: str = "") -> 
         The file is missing, no table, or without that sheet; or cells stand under no header.
     """
     if path.suffix.lower() in (".xlsx", ".xlsm"):
-        rows = _under_headers(path, _without_titles(sheet_texts(path, sheet), header), "each needs one")
-        texts = [split_header(name)[0] in _TEXTS for name in rows[0][1]] if rows else []
+        rows = _under_headers(path, _without_titles(sheet_texts(path, sheet), heads), "each needs one")
+        texts = [split_header(heads.meant(name))[0] in _TEXTS for name in rows[0][1]] if rows else []
         rows = rows[:1] + [_with_points(path, number, cells, texts) for number, cells in rows[1:]]
     elif sheet:
         raise InputError.at(path, "sheet", sheet, "none, since only a workbook (XLSX) has sheets")
     else:
-        rows = _records(path, header)
+        rows = _records(path, heads)
     if not rows:
         raise InputError(f"{path}: the table is empty; a header and rows are needed.")
     width = len(rows[0][1])
-    return tuple((number, (*cells, *[""] * width)[:width]) for number, cells in rows)
+    (first, header), *others = ((number, (*cells, *[""] * width)[:width]) for number, cells in rows)
+    return ((first, tuple(map(heads.meant, header))), *others)
 
 
-def _without_titles(rows: Sequence[tuple[str, ...]], header: Sequence[str]) -> list[tuple[str, ...]]:
+def _without_titles(rows: Sequence[tuple[str, ...]], heads: Heads) -> list[tuple[str, ...]]:
     """Return rows in which those above the first with all names are blank, so that the others keep their numbers."""
-    first = next((at for at, cells in enumerate(rows) if header and _names(cells).issuperset(header)), 0)
+    needed = heads.needed
+    first = next((at for at, cells in enumerate(rows) if needed and heads.named(cells).issuperset(needed)), 0)
     return [()] * first + list(rows[first:])
 
 
-def _names(cells: Sequence[str]) -> set[str]:
-    """Return the names that a row would give to columns."""
-    return {split_header(cell)[0] for cell in cells}
-
-
-def _records(path: Path, names: Sequence[str] = ()) -> list[NumberedRow]:
+def _records(path: Path, heads: Heads = _ANY) -> list[NumberedRow]:
     """Return the records of a CSV file; what separates them is seen from the header, # starts a comment."""
     text = read_text(path, "a table in CSV")
     lines = ["" if line.startswith("#") else line for line in StringIO(text)]
-    header = next((line for line in lines if names and _names(re.split(r"[;,\t]", line.strip())).issuperset(names)), "")
+    split = ((line, re.split(r"[;,\t]", line.strip())) for line in lines)
+    header = next((line for line, cells in split if heads.needed and heads.named(cells).issuperset(heads.needed)), "")
     header = header or next((line for line in lines if line.strip()), "")
     separator = next((mark for mark in ";\t" if mark in header), ",")
     rows, so_far = list[tuple[str, ...]](), 0
     try:
         for record in csv.reader(lines, delimiter=separator, strict=True):
-            rows.append(tuple(_APOSTROPHE.sub("", cell.strip()) for cell in record))
+            rows.append(tuple(_minus(_APOSTROPHE.sub("", cell.strip())) for cell in record))
             so_far += len(record)
             require_believable(path, len(rows), len(record), so_far)
     except csv.Error as error:
@@ -217,7 +263,7 @@ def _records(path: Path, names: Sequence[str] = ()) -> list[NumberedRow]:
             f"{path}, row {len(rows) + 1}: a quotation mark is not closed, or not doubled within a cell ({error})."
         ) from None
     hint = "numbers have a decimal point, and " if separator == "," else ""
-    kept = _under_headers(path, _without_titles(rows, names), f"{hint}cells are separated by {separator!r}")
+    kept = _under_headers(path, _without_titles(rows, heads), f"{hint}cells are separated by {separator!r}")
     if kept and len(kept[-1][1]) < len(kept[0][1]) and not text.endswith("\n"):
         number, cells = kept[-1]
         raise InputError(
@@ -477,6 +523,10 @@ def plain_number(text: str) -> float:
     return float(text)
 
 
+_ALSO = {"gauss": "normal", "gaussian": "normal", "rectangular": "uniform", "rectangle": "uniform"}
+"""Word of an office → the word of the field."""
+
+
 def _typed(annotation: object, header: str, value: str, place: str) -> object:
     """Return the text of a cell as the type of its field."""
     if annotation is int:
@@ -484,7 +534,7 @@ def _typed(annotation: object, header: str, value: str, place: str) -> object:
             raise InputError.at(place, header, value, "a whole number, 1 or more")
         return int(value)
     if annotation is bool:
-        answers = {"yes": True, "no": False, "true": True, "false": False}
+        answers = {"yes": True, "no": False, "true": True, "false": False, "ja": True, "nein": False}
         if value.lower() not in answers:
             raise InputError.at(place, header, value, "yes or no")
         return answers[value.lower()]
@@ -497,6 +547,8 @@ def _typed(annotation: object, header: str, value: str, place: str) -> object:
     if isinstance(annotation, type) and issubclass(annotation, StrEnum):
         words = tuple(annotation)
     if words:
+        spelt = {word.lower(): word for word in words}
+        value = spelt.get(_ALSO.get(value.lower(), value.lower()), value)
         if value not in words:
             more = "; a truncated one is written as its distribution with sorted = yes" if value == "truncated" else ""
             raise InputError.at(place, header, value, "one of " + ", ".join(words) + more)

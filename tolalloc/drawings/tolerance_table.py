@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import csv
 import os
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from difflib import get_close_matches
 from io import StringIO
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -15,9 +18,12 @@ from pydantic import Field, model_validator
 
 from tolalloc.drawings.distributions import Distribution, require_shape
 from tolalloc.drawings.fields import ALLOWED_UNITS, COLUMNS, UNITS, Cell, ToleranceRow, headers_in
+from tolalloc.drawings.ladder import RADII, fit_deviations, is_fit
 from tolalloc.drawings.sources import Source, known_as
 from tolalloc.drawings.table_file import (
     DATA,
+    Heads,
+    plain_number,
     read_rows,
     read_table_file,
     require_columns,
@@ -247,10 +253,52 @@ SMALLEST_KEPT = 0.01
 """Smallest share that sorting may leave of all parts [-]."""
 
 
-def load_tolerance_table(name: str | Path, capabilities: str | Path = "generic", sheet: str = "") -> tuple[Source, ...]:
+_NEAR = 0.75
+"""Likeness of a head to the name of a column from which on it is a slip rather than a column of the user's own [-]."""
+
+
+def heads_of(columns: Mapping[str, str] = MappingProxyType({})) -> Heads:
+    """Return how the heads of a tolerance table are read, some of them called as an office does.
+
+    Raises
+    ------
+    UnknownNameError
+        A head stands for what is no column.
+    """
+    for name in columns.values():
+        if name not in ToleranceRow.model_fields:
+            raise UnknownNameError.among("drawing, columns", "column", name, ToleranceRow.model_fields)
+    return Heads(needed=("id",), known=tuple(ToleranceRow.model_fields), called=columns)
+
+
+def own_heads(path: Path, names: Sequence[str]) -> tuple[str, ...]:
+    """Return the heads of columns of the user's own.
+
+    Raises
+    ------
+    InputError
+        All that are nearly the name of a column, each with the nearest.
+    """
+    spelt = {name.lower(): name for name in ToleranceRow.model_fields}
+    own = [name for name in names if name and name not in ToleranceRow.model_fields]
+    near = {name: get_close_matches(name.lower(), spelt, n=1, cutoff=_NEAR) for name in own}
+    if slips := [f"{name!r} ({spelt[found[0]]}?)" for name, found in near.items() if found]:
+        raise InputError(
+            f"{path}: no such column: {', '.join(slips)}; rename each, or say what it is by ta.drawing(columns=)."
+        )
+    return tuple(own)
+
+
+def load_tolerance_table(
+    name: str | Path,
+    capabilities: str | Path = "generic",
+    sheet: str = "",
+    columns: Mapping[str, str] = MappingProxyType({}),
+) -> tuple[Source, ...]:
     """Return the sources of a tolerance table and its processes, each by shipped name or from the user's file.
 
-    Of a workbook the named sheet is read, the first unless named.
+    Of a workbook the named sheet is read, the first unless named. Columns of the user's own are kept (`own_heads`); an
+    office's heads stand for names of columns. One cell "± 0.05" or "h6" is both deviations of a row.
 
     Raises
     ------
@@ -258,15 +306,69 @@ def load_tolerance_table(name: str | Path, capabilities: str | Path = "generic",
         The file, row, field and value that are not allowed.
     """
     path = shipped_or_path(name, DATA, ".tolerances.csv", "tolerance table")
-    (_, first), *others = read_table_file(path, header=("id",), sheet=sheet)
+    (_, first), *others = read_table_file(path, heads_of(columns), sheet=sheet)
     stated = [split_header(header) for header in first]
+    own = own_heads(path, [name for name, _ in stated])
     headers = tuple(name for name, _ in stated)
-    require_columns(path, headers, ToleranceRow)
+    plus = headers.index("plus") if "plus" in headers else 0
+    both = others and "minus" not in headers and all(_says_both(cells[plus]) for _, cells in others)
+    kept = tuple(name for name in headers if name not in own)
+    require_columns(path, (*kept, "minus") if both else kept, ToleranceRow)
+    if len(set(own)) < len(own):
+        twice = next(name for name in own if own.count(name) > 1)
+        raise InputError(f"{path}: the column {twice!r} is there twice; each has one.")
     if not others:
         raise InputError(f"{path}: the table has no rows; one row per source is needed.")
     rows = [(number, dict(zip(headers, cells, strict=True))) for number, cells in others]
-    _require_units(path, stated, rows)
-    return sources_of_rows(rows, capabilities, str(path), path.parent)
+    _require_units(path, [(name, unit) for name, unit in stated if name not in own], rows)
+    known = [
+        (number, _both_ways({name: row[name] for name in kept}, f"{path}, row {number} ({row['id'] or 'no id'})"))
+        for number, row in rows
+    ]
+    sources = sources_of_rows(known, capabilities, str(path), path.parent)
+    full = dict(zip((split_header(header)[0] for header in first), first, strict=True))
+    return tuple(
+        replace(source, own_cells=tuple((full[name], row[name]) for name in own))
+        for source, (_, row) in zip(sources, rows, strict=True)
+    )
+
+
+_BOTH = re.compile(r"(?:±|\+/-|\+-)\s*")
+"""What stands before a number that is both deviations."""
+
+
+def _says_both(plus: str) -> bool:
+    """Return whether a cell says both deviations: behind ±, or as a fit."""
+    return _BOTH.match(plus) is not None or is_fit(plus)
+
+
+def _both_ways(row: dict[str, str], place: str) -> dict[str, str]:
+    """Return a row with both deviations of one cell that says both, where it states no other.
+
+    Raises
+    ------
+    InputError
+        A fit of what has no nominal size, or is no size or a radius.
+    """
+    plus = row.get("plus", "")
+    if not _says_both(plus) or row.get("minus"):
+        return row
+    if sign := _BOTH.match(plus):
+        size = plus[sign.end() :].replace(",", ".")
+        return {**row, "plus": size, "minus": f"-{size}"}
+    nominal, feature = row.get("nominal", ""), row.get("feature", "") or Feature.SIZE
+    if feature != Feature.SIZE or row["id"].rsplit(".", 1)[-1] in RADII or not nominal:
+        allowed = "plus and minus, since a fit is that of a diameter or width with its nominal size"
+        raise InputError.at(place, "plus", plus, allowed)
+    unit = UNITS.get(usual_signs(row.get("unit", "")), 1.0) * MICROMETRE
+    try:
+        deviations = fit_deviations(plus, plain_number(nominal) * MILLIMETRE)
+    except ValueError:
+        raise InputError.at(place, "nominal", nominal, "a number with a decimal point") from None
+    except InputError as error:
+        raise InputError(f"{place}: {error}") from None
+    upper, lower = (f"{round(one / unit, 9):.9g}" for one in deviations)
+    return {**row, "plus": upper, "minus": lower}
 
 
 def _require_units(path: Path, stated: Sequence[tuple[str, str]], rows: Sequence[tuple[int, dict[str, str]]]) -> None:
@@ -321,12 +423,24 @@ def sources_of_rows(
 
 
 def table_rows(sources: Sequence[Source], folder: Path | None = None) -> list[list[str | int | float]]:
-    """Return the cells of the sources in the order of `COLUMNS`.
+    """Return the cells of the sources in the order of `COLUMNS`, the user's own behind them.
 
     Files of measured parts are named from the folder that the table is written to; without one in such a way that they
     are found from everywhere.
     """
-    return [[_written(column.cell(source), folder) for column in COLUMNS.values()] for source in sources]
+    own = own_heads_of(sources)
+    return [
+        [
+            *(_written(column.cell(source), folder) for column in COLUMNS.values()),
+            *(dict(source.own_cells).get(head, "") for head in own),
+        ]
+        for source in sources
+    ]
+
+
+def own_heads_of(sources: Sequence[Source]) -> tuple[str, ...]:
+    """Return the heads of the user's own columns, in their order."""
+    return tuple(dict.fromkeys(head for source in sources for head, _ in source.own_cells))
 
 
 def _written(cell: Cell, folder: Path | None) -> str | int | float:
@@ -344,7 +458,8 @@ def table_frame(sources: Sequence[Source], folder: Path | None = None, cost_unit
     """Return the sources as a tolerance table in the layout that `load_tolerance_table` reads."""
     import pandas as pd
 
-    return pd.DataFrame(table_rows(sources, folder), columns=list(headers_in(cost_unit).values()))
+    heads = [*headers_in(cost_unit).values(), *own_heads_of(sources)]
+    return pd.DataFrame(table_rows(sources, folder), columns=heads)
 
 
 def with_own_words(frame: pd.DataFrame, named: str, members: Mapping[str, Sequence[Source]]) -> pd.DataFrame:
@@ -373,7 +488,7 @@ def table_text(sources: Sequence[Source], folder: Path | None = None, currency: 
     """Return the sources as the CSV file that `load_tolerance_table` reads, costs in a currency if they are in one."""
     text = StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(headers_in(currency or COST_UNITS).values())
+    writer.writerow(map(no_formula, [*headers_in(currency or COST_UNITS).values(), *own_heads_of(sources)]))
     writer.writerows(map(no_formula, row) for row in table_rows(sources, folder))
     return text.getvalue()
 

@@ -6,7 +6,9 @@ import inspect
 import pickle
 import sys
 import sysconfig
+import traceback
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from hashlib import sha256
@@ -19,8 +21,10 @@ from jaxtyping import Float
 
 from tolalloc.exceptions import InputError, SolveError
 
-FAILURES = (ArithmeticError, ValueError)
-"""What a function may raise for a sample that has no answer."""
+FAILURES = (ArithmeticError, ValueError, RuntimeError)
+"""What a function may raise for a sample that has no answer, such as a root finder that does not converge."""
+_FAULTS = (RecursionError, NotImplementedError)
+"""What of these is the function's fault all the same; so is everything else that it raises."""
 _SAME = 1e-9
 """By how much a function of arrays may differ from itself called with numbers, over the largest value [-]."""
 
@@ -85,7 +89,7 @@ class UserFunction:
             found = self.function(*(column.copy() for column in arguments.T))
             single = self.values == 1 and np.shape(found) in ((), (samples,))
             columns = [np.broadcast_to(self._numbers(one), samples) for one in _flat([found] if single else found)]
-        except (TypeError, *FAILURES):
+        except (Exception, SystemExit):  # whatever it is, it is met again sample by sample, and said there
             return None
         if len(columns) != self.values:
             return None
@@ -118,14 +122,29 @@ class UserFunction:
         """Return the values of one sample, and what the function raised if it did."""
         nothing = np.full(self.values, np.nan)
         try:
-            found = self._numbers(self.function(*sample.tolist())).ravel()
+            said = self._said(sample)
+        except (Exception, SystemExit) as error:
+            if isinstance(error, FAILURES) and not isinstance(error, _FAULTS):
+                return nothing, f"{_named(error)} for ({_listed(sample)})"
+            raise InputError(f"{self.place}: the function has a fault: {_named(error)}{_line_of(error)}.") from error
+        try:
+            found = self._numbers(said).ravel()
         except FAILURES as reason:
-            return nothing, f"{type(reason).__name__} ({reason}) for ({_listed(sample)})"
+            return nothing, f"{_named(reason)} for ({_listed(sample)})"
         except TypeError as error:
             raise InputError(f"{self.place}: the function has a fault: {error}.") from error
         if found.size != self.values:
             raise InputError(f"{self.place}: the function returned {found.size} values; asked for are {self.values}.")
         return found, ""
+
+    def _said(self, sample: Float[np.ndarray, " argument"]) -> Any:
+        """Return what the function returns for numbers; for arrays of one, where only these have what it asks for."""
+        try:
+            return self.function(*sample.tolist())
+        except (AttributeError, TypeError, IndexError):
+            with suppress(Exception, SystemExit):
+                return self.function(*sample[:, np.newaxis].copy())
+            raise
 
     def _numbers(self, found: Any) -> Float[np.ndarray, "..."]:
         """Return what the function returned as numbers of its own, NaN where that is no answer.
@@ -163,6 +182,18 @@ class UserFunction:
             raise InputError(
                 f"{self.place}: the function cannot be called with {count} values, inputs and settings ({error})."
             ) from None
+
+
+def _named(error: BaseException) -> str:
+    """Return what was raised, and what it says if it says anything."""
+    words = " ".join(str(error).split())
+    return f"{type(error).__name__} ({words})" if words else type(error).__name__
+
+
+def _line_of(error: BaseException) -> str:
+    """Return where in the user's own files something was raised; nothing where that was in none."""
+    frames = [own for own in traceback.extract_tb(error.__traceback__)[1:] if _is_users_file(own.filename)]
+    return f" in {Path(frames[-1].filename).name}, line {frames[-1].lineno}" if frames else ""
 
 
 def _few(samples: int) -> list[int]:
@@ -266,8 +297,11 @@ def _tells(value: Any) -> bool:
 def is_users_module(module: str) -> bool:
     """Return whether a module is a script of the user's, rather than of Python, of this package or a library."""
     path = getattr(sys.modules.get(module), "__file__", None)
-    if path is None:
-        return module == "__main__"
+    return module == "__main__" if path is None else _is_users_file(path)
+
+
+def _is_users_file(path: str) -> bool:
+    """Return whether a file is neither of Python, nor of this package, nor of an installed library."""
     installed = [sysconfig.get_paths()[kind] for kind in ("stdlib", "platstdlib", "purelib", "platlib")]
     folders = [Path(__file__).resolve().parents[1], *(Path(folder).resolve() for folder in installed)]
     return not any(Path(path).resolve().is_relative_to(folder) for folder in folders)

@@ -55,7 +55,7 @@ def read_bytes(path: Path, what: str) -> bytes:
 
 
 def read_text(path: Path, what: str) -> str:
-    """Return the text of a file in UTF-8, its lines ended as Python ends them.
+    """Return the text of a file in UTF-8, its lines ended as Python ends them; a table also as offices save it.
 
     Raises
     ------
@@ -63,8 +63,9 @@ def read_text(path: Path, what: str) -> str:
         As of `read_bytes`; also text that is not UTF-8, or a control character.
     """
     content = read_bytes(path, f"{what} (UTF-8)")
+    encoding = _OFFICES.get(_encoding(content), "utf-8-sig") if what.endswith("CSV") else "utf-8-sig"
     try:
-        text = content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+        text = content.decode(encoding).replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
         other = "UTF-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "Windows-1252 (cp1252)"
         row = content[: error.start].count(b"\n") + 1
@@ -77,6 +78,26 @@ def read_text(path: Path, what: str) -> str:
         sign = f"the control character {found[0]!r}"
         raise InputError(f"{path}: cannot be read as {what} (UTF-8), row {row} holds {sign}; allowed is text.")
     return text
+
+
+_OFFICES = {"UTF-16": "utf-16", "Windows-1252": "cp1252"}
+"""How spreadsheets save a CSV file that is not UTF-8 → codec of Python."""
+
+
+def _encoding(content: bytes) -> str:
+    """Return how a text that is not UTF-8 is most likely written; nothing where it is UTF-8."""
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return "UTF-16"
+    try:
+        content.decode("utf-8")
+    except UnicodeDecodeError:
+        return "Windows-1252"
+    return ""
+
+
+def other_encoding(path: Path) -> str:
+    """Return the encoding in which a table that is not UTF-8 is read; nothing where it is."""
+    return _encoding(read_bytes(path, "a table in CSV"))
 
 
 def require_believable(path: Path, row: int, columns: int, cells: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -75,6 +76,8 @@ class Document:
         What else is needed to repeat the run and to trust it.
     answers
         Title and sentences of each report that this one joins; none of a report alone.
+    headlines
+        Title → what the first page says of a report behind another one; its first sentences where nothing stands here.
     title_block
         What the first page says beside study and date, as a drawing does: its number, revision and author.
     """
@@ -89,6 +92,7 @@ class Document:
     seed: int | None = None
     manifest: dict[str, Any] | None = None
     answers: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    headlines: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     title_block: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -155,14 +159,27 @@ def joined(title: str, subtitle: str, parts: Iterable[tuple[str, Document]], **m
         title=title,
         subtitle=subtitle,
         answer=tuple(sentence for _, document in leading_first for sentence in document.answer),
-        warnings=tuple(dict.fromkeys(warnings)),
+        warnings=_once(warnings),
         sections=tuple(sections),
         assumptions=tuple(dict.fromkeys(assumptions)),
         summary=summary,
         seed=manifest.get("seed"),
         manifest=manifest,
         answers=tuple((document.title, document.answer) for _, document in leading_first) if len(reports) > 1 else (),
+        headlines={title: said for _, document in reports for title, said in document.headlines.items()},
     )
+
+
+def _once(sentences: Iterable[str]) -> tuple[str, ...]:
+    """Return sentences without those that say an earlier one with other numbers.
+
+    >>> _once(["It twists by 0.1′.", "Two fail.", "It twists by 0.096′."])
+    ('It twists by 0.1′.', 'Two fail.')
+    """
+    first: dict[str, str] = {}
+    for sentence in sentences:
+        first.setdefault(re.sub(r"\d[\d.,]*", "#", sentence), sentence)
+    return tuple(first.values())
 
 
 def _same(earlier: pd.DataFrame | None, frame: pd.DataFrame) -> bool:

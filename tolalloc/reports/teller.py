@@ -108,6 +108,7 @@ class Teller(ABC, Generic[Result]):
             summary=self.summary,
             seed=self.header.seed,
             manifest={"statuses": dict(self.header.statuses), "stages": dict(self.header.stages)},
+            headlines={self.title: self.headline} if self.headline else {},
         )
 
 

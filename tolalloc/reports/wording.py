@@ -11,7 +11,7 @@ from typing import Any
 
 from tolalloc.reading.units import unit_of
 
-QUICK_RUN = "Quick run: small samples, wide intervals. Run without --quick before setting a drawing."
+QUICK_RUN = "Quick run: wide intervals; run without --quick before setting a drawing."
 """What every answer of a quick run warns of."""
 
 _SIGNS = {"arcsec": "″", "%": " %", "-": ""}

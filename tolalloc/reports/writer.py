@@ -10,6 +10,7 @@ from datetime import date
 from functools import singledispatch
 from importlib.metadata import version
 from io import BytesIO
+from math import floor
 from numbers import Integral
 from pathlib import Path
 from typing import Any
@@ -53,6 +54,8 @@ def html_table(frame: pd.DataFrame) -> Markup:
 
 
 _NUMBER = ' class="number"'
+_NEARLY_ALL = 99.0
+"""Share from which two decimals are written [%]."""
 
 
 def _is_number(value: object) -> bool:
@@ -63,11 +66,15 @@ def _is_number(value: object) -> bool:
 def written(value: float, unit: str) -> str:
     """Return a number as a report writes it, with a true minus.
 
-    >>> written(41.6543, "cost units"), written(-12.345678, "µm"), written(123456.7, "-")
-    ('41.65', '−12.35', '123457')
+    A share just below all is not rounded up to all.
+
+    >>> written(41.6543, "cost units"), written(-12.345678, "µm"), written(123456.7, "-"), written(99.967, "%")
+    ('41.65', '−12.35', '123457', '99.96')
     """
     if pd.isna(value):
         return ""
+    if unit == "%" and _NEARLY_ALL < value < 100.0:
+        return f"{floor(100 * value) / 100:.2f}"
     if unit in _DECIMALS and (value == 0.0 or 0.05 <= abs(value) < 1e6):
         return signed(f"{value:.{_DECIMALS[unit]}f}")
     return signed(f"{value:.0f}" if 1e4 <= abs(value) < 1e15 else f"{value:.4g}")
@@ -97,7 +104,7 @@ def _(value: Integral, unit: str) -> str:  # noqa: ARG001
 _LARGE = (24, 15)
 """Rows and columns beyond which a table is folded [-]."""
 _SENTENCES = 4
-"""Sentences of each answer on a first page that shows more than one answer [-]."""
+"""Sentences of the first answer on a first page that shows more than sentences [-]."""
 _MOVING = "moving"
 _LISTED = 6
 """Sections beyond which a page begins with a list of them [-]."""
@@ -140,7 +147,7 @@ def write_document(document: Document, folder: Path) -> None:
     (folder / "tables").mkdir()
     for name, frame in document.tables.items():
         write_csv(frame, folder / "tables" / f"{name}.csv")
-    write_sheets(_sheets(document), folder / "results.xlsx")
+    write_sheets(_sheets(document), folder / "results.xlsx", document.figures.values())
     for name, figure in document.figures.items():
         save_png(figure, figures / f"{name}.png")
     write_json(document.summary, folder / "summary.json")
@@ -181,7 +188,10 @@ def _is_shortened(document: Document) -> bool:
 def _told(document: Document) -> list[tuple[str, tuple[str, ...]]]:
     """Return what the box of the first page says."""
     most = _SENTENCES if _is_shortened(document) else None
-    return [(title, sentences[:most]) for title, sentences in _answers(document)]
+    return [
+        (title, (number and document.headlines.get(title)) or sentences[:most])
+        for number, (title, sentences) in enumerate(_answers(document))
+    ]
 
 
 def _block(document: Document) -> list[tuple[str, str]]:
@@ -192,18 +202,18 @@ def _block(document: Document) -> list[tuple[str, str]]:
 
 
 def _in_full(document: Document) -> list[dict[str, Any]]:
-    """Return the answers in full where the first page has only their first sentences, but for the first one folded."""
+    """Return what the first page leaves out of the answers, but for the first one folded."""
     return [
         {
             "part": title,
-            "heading": "The answer in full",
-            "paragraphs": sentences,
+            "heading": "More on this answer",
+            "paragraphs": [sentence for sentence in sentences if sentence not in told],
             "figures": (),
             "tables": (),
             "folded": number > 0,
         }
-        for number, (title, sentences) in enumerate(_answers(document))
-        if _is_shortened(document) and len(sentences) > _SENTENCES
+        for number, ((title, sentences), (_, told)) in enumerate(zip(_answers(document), _told(document), strict=True))
+        if sentences != told
     ]
 
 
@@ -245,13 +255,15 @@ def _write_page(document: Document, path: Path) -> None:
         style=style(moving=moving),
         scripts=scripts(moving=moving),
         answers=_told(document),
+        answer_stands=any(section.first for section in document.sections),
         block=_block(document),
         footer=document.title.replace("\\", "").replace('"', "”"),
         sections=sections,
         is_long=len(sections) > _LISTED,
         glossary=words_in(texts) if len(sections) > _LISTED else (),
     )
-    path.write_text(content, encoding="utf-8")
+    # A number and its % are not parted at the end of a line.
+    path.write_text(re.sub(r"(?<=\d) %", "\u00a0%", content), encoding="utf-8")
 
 
 def write_json(content: dict[str, Any], path: Path) -> None:

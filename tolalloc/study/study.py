@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 
-from tolalloc.exceptions import InputError
+from tolalloc.exceptions import InputError, SolveError, TolallocError
 from tolalloc.reading.named_fields import Rule
 from tolalloc.reports.document import Document, joined
 from tolalloc.reports.folder import RUNS, claimed, numbered
@@ -231,7 +231,9 @@ def run(
     fresh: bool = False,
     solved_by: Mapper = map,
 ) -> Run:
-    """Ask all or some of a study's questions and write one new or empty folder; on any error nothing stays behind.
+    """Ask all or some of a study's questions and write one new or empty folder.
+
+    On an error nothing stays behind, but for what earlier questions answered, whose report says what is missing.
 
     Progress and checkpoint are as of `Study.ask`. Solved units are kept beside the folder, in `cache_beside`, and a
     run that was stopped takes them from there, unless it is to begin afresh. All others are solved by a mapper: this
@@ -246,31 +248,43 @@ def run(
     kept = replace(cache_beside(folder), solved_by=solved_by).pruned()
     prepared = Prepared(study=study, mapper=solved_by if fresh else kept)
     with claimed(folder) as beside:
-        answers = _answers(prepared, asked, progress, checkpoint)
+        answers, fault = _answers(prepared, asked, progress, checkpoint)
         from tolalloc.reports.writer import write_document
 
         if progress:
             progress.begin("report")
         document = _document(prepared, answers)
+        if fault:
+            document = replace(document, warnings=(str(fault), *document.warnings))
         if study.model is not None:
             prepared.model.release()  # drawing the figures takes as much memory
         for answer in answers.values():
             answer.add_files(beside)
         write_document(document, beside)
+    if fault:
+        raise type(fault)(f"{fault} What was answered before, {' and '.join(answers)}, stands in {folder}.") from fault
     return Run(answers=answers, folder=folder, document=document)
 
 
 def _answers(
     prepared: Prepared, asked: tuple[Question, ...], progress: Progress | None, checkpoint: Path | None
-) -> dict[str, Answer[Any]]:
-    """Return the answer to every question; the first of the limits begins with how the drawing stands as it is."""
+) -> tuple[dict[str, Answer[Any]], TolallocError | None]:
+    """Return the answer to every question, and what ended one if an earlier one is answered.
+
+    The first of the limits begins with how the drawing stands as it is.
+    """
     answers, opening = dict[str, Answer[Any]](), partial(_tell_today, prepared, progress) if progress else None
     for question in asked:
         record = _record(prepared, question, progress)
         if "limits" in question.reads:
             record.opening, opening = opening, None
-        answers[question.kind] = question.answer(prepared, record, checkpoint)
-    return answers
+        try:
+            answers[question.kind] = question.answer(prepared, record, checkpoint)
+        except (InputError, SolveError) as fault:
+            if not answers:
+                raise
+            return answers, fault
+    return answers, None
 
 
 def _tell_today(prepared: Prepared, progress: Progress) -> None:

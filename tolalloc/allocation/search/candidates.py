@@ -12,6 +12,7 @@ from tolalloc.allocation.search.zone_allocation import ZoneAllocation, step_from
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.verify.acceptance import Acceptance, AcceptanceTest, AlphaSpending
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, cheapest_met
+from tolalloc.exceptions import FailedUnitsError
 from tolalloc.models.settings import DrawnAmounts
 
 _ROUNDING = 1e-9
@@ -166,7 +167,10 @@ class NextCandidate:
         if design is None or tested.space.cost(design) > worth:
             return None
         space = self.space if kind == FREE else tested.space
-        return kind, self.verifier(space).dividing_as(tested).verify(design, f"attempt {spending.number}")
+        try:
+            return kind, self.verifier(space).dividing_as(tested).verify(design, f"attempt {spending.number}")
+        except FailedUnitsError:  # too many of its units have no answer
+            return None
 
     def _errors_inside(self, tested: VerifiedDesign, spending: AlphaSpending, worth: float) -> float:
         """Return how far inside what must be shown the next design is aimed [standard errors of both samples]."""

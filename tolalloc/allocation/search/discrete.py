@@ -14,9 +14,9 @@ from tolalloc.allocation.search.lower_bound import least_cost
 from tolalloc.allocation.search.multiple_choice import MultipleChoice, ProvenChoice, best_choice
 from tolalloc.allocation.search.zone_allocation import aimed, kept_stacks
 from tolalloc.allocation.space.design_space import DesignSpace
-from tolalloc.allocation.space.ladder import Ladder, group_ladder
 from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Shared, Stack
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, cheapest_met
+from tolalloc.drawings.ladder import Ladder, group_ladder
 from tolalloc.drawings.tolerance_table import with_zones
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.settings import DrawnAmounts

@@ -16,7 +16,7 @@ from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import SearchEffort
 from tolalloc.allocation.space.problem import Solution, Stack
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, cheapest_met
-from tolalloc.exceptions import InputError, SolveError
+from tolalloc.exceptions import FailedUnitsError, InputError, SolveError
 
 SETTLED = 0.01
 """Relative gain of cost that the next step must promise for a search to go on from a met design [-]."""
@@ -116,7 +116,7 @@ def scale_in_proportion(verifier: Verifier, steps: int) -> tuple[VerifiedDesign,
     nothing left to gain.
 
     sₖ₊₁ = sₖ·clip(1 + left/rise, 0.4, 2.5) (own derivation); exact in one step where a quantile is in
-    proportion to the zones.
+    proportion to the zones. Where too many units of a scale have no answer, half of the way to it is gone.
 
     Examples
     --------
@@ -127,13 +127,20 @@ def scale_in_proportion(verifier: Verifier, steps: int) -> tuple[VerifiedDesign,
     >>> [design.scales.tolist() for design in scale_in_proportion(verifier, 3)]
     [[1.0, 1.0], [0.5, 0.5]]
     """
-    space, scale = verifier.space, 1.0
+    space, scale, factor = verifier.space, 1.0, 1.0
     tried: list[VerifiedDesign] = []
     for step in range(steps):
-        # The stream of random units keeps the name that it had.
-        tried.append(verifier.verify(space.uniform(scale), f"by hand {step + 1}").evenly_divided())
-        factor = _factor(tried[-1])
-        if tried[-1].met and factor < 1 + SETTLED:
+        try:  # the stream of random units keeps the name that it had
+            verified = verifier.verify(space.uniform(scale), f"by hand {step + 1}").evenly_divided()
+        except FailedUnitsError:
+            if not tried:
+                raise
+            factor = float(np.sqrt(factor))  # half of the way, where fewer units are without an answer
+            scale /= factor
+            continue
+        tried.append(verified)
+        factor = _factor(verified)
+        if verified.met and factor < 1 + SETTLED:
             break
         scale *= factor
     return tuple(tried)
@@ -161,6 +168,8 @@ _REPAIRS = 3
 """Steps more where the last design does not quite keep the limits and is cheaper than any that does [-]."""
 _DIVIDING_STEPS, _DIVISIONS = 2, 4
 """Steps that divide the failures of a joint yield anew, and how many divisions each of them tries [-]."""
+_LEAST_REACH = 1.05
+"""Ratio of zones below which a step does not fall back where units have no answer [-]."""
 _EXPLAINED = 2.0
 """Standard errors by which a verified value may be off its prediction for the region to keep its size [-]."""
 
@@ -339,7 +348,8 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
     each of the first two steps.
 
     Where the units of a step are further from the prediction than chance explains, by more than two standard errors of
-    both, the next step reaches less: the square root of the factor, 1.25 at least.
+    both, the next step reaches less: the square root of the factor, 1.25 at least. So it does, 1.05 at least, where
+    too many of its units have no answer.
 
     References
     ----------
@@ -370,7 +380,11 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
         settled = space.cost(found) > (1 - SETTLED) * last.cost if last.met else np.allclose(found, last.design)
         if step > 0 and settled:
             break
-        tried.append(verifier.verify(found, f"convex {step + 1}"))
+        try:
+            tried.append(verifier.verify(found, f"convex {step + 1}"))
+        except FailedUnitsError:
+            reach = max(_LEAST_REACH, float(np.sqrt(reach)))
+            continue
         if not _explains(last, tried[-1]):
             reach = max(1.25, float(np.sqrt(reach)))
     return tuple(tried[1:])
@@ -562,8 +576,8 @@ def allocate(
     first, space = start or cheapest_met(proportional_tried), verifier.space
     # Proportional scaling has no bounds; a start that keeps them is an answer like any other.
     stepped = step_to_optimum(verifier, first, effort.steps, effort.reach)
-    tried = ((first,) if space.allows(first.design) else ()) + stepped
-    tried = tuple(own.divided(stepped[-1].parts) for own in tried)
+    tried = ((first,) if space.allows(first.design) or not stepped else ()) + stepped
+    tried = tuple(own.divided(tried[-1].parts) for own in tried)
     chosen = cheapest_met(tried)
     return ZoneAllocation(
         limit=verifier.limit,

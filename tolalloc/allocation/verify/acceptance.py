@@ -19,6 +19,7 @@ from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.capability.monte_carlo import AnsweredUnits, RedrawnUnits, require_few_failures
 from tolalloc.capability.near_limit import Drawn
 from tolalloc.drawings.seeds import SeedTree
+from tolalloc.exceptions import FailedUnitsError
 from tolalloc.models.model import Model, is_fast
 from tolalloc.running.blas import one_blas_thread
 
@@ -127,7 +128,7 @@ def accept_cheapest(
     Notes
     -----
     The cheapest design that was not yet tested is tested next, those last that what was tested speaks against. After
-    one that is accepted only cheaper ones are.
+    one that is accepted only cheaper ones are. One of which too many units have no answer is none.
 
     A design may err by α·¾·¼ᵐ, m of those before it not accepted; Σ ≤ α: Bretz et al. 2009, as `AlphaSpending`.
 
@@ -154,7 +155,12 @@ def accept_cheapest(
         stated = as_drawn(kind, waiting.pop(kind))
         if drawn and stated.cost >= drawn[1].cost:
             continue
-        found = test.run(stated, spending)
+        try:
+            found = test.run(stated, spending)
+        except FailedUnitsError:
+            if not waiting and not tested:
+                raise
+            continue
         tested.append((kind, found))
         if found.accepted:
             drawn = (kind, found)
@@ -251,7 +257,7 @@ class AcceptanceTest:
             solved.append(solver.solved(seeds.child(f"look {look}"), _more(wanted, solved)))
             together = SolvedPart.joined(solved)
             plain = AnsweredUnits(evaluation=together.plain)
-            require_few_failures(plain, f"{design.name}, confirmation", self.largest_failed_share)
+            require_few_failures(plain, "of a drawing that was tried", self.largest_failed_share)
             confidence = confidence_of_fewer(1 - spending.error(self.error), wanted.whatever, final.whatever)
             looks = tuple(own.units.drawn.whatever for own in solved)
             redraw = partial(_plain_units, design.space, design.design, seeds, looks)

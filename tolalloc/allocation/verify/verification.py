@@ -226,7 +226,7 @@ class Verifier:
             seeds=seeds,
         )
         for own in sample.samples:
-            require_few_failures(own, name, self.largest_failed_share)
+            require_few_failures(own, "of a drawing that was tried", self.largest_failed_share)
         read = tuple(requirement.sample(sample, self.confidence) for requirement in requirements)
         checks = tightened(
             tuple(requirement.check(own) for requirement, own in zip(requirements, read, strict=True)),

@@ -8,7 +8,7 @@ pen.font = '12px system-ui, "Segoe UI", sans-serif';
 const wide = (text) => pen.measureText(text).width;
 const TURNED = 0.755, TURNED_DARK = 0.62; // shares of a cell's colour from which its number is light, or dark on a dark page
 const ROW = 15; // height of a line of names above a chart
-const NARROW = 520; // below, the names of bars stand above them
+const NARROW = 520; // below, names of bars that take more than two fifths stand above them
 
 export const colour = (number) => `var(--series-${number % COLOURS.length}, ${COLOURS[number % COLOURS.length]})`;
 
@@ -198,7 +198,7 @@ export class Chart {
   }
 
   plane() {
-    const { figure } = this, height = figure.height ?? Math.max(220, Math.min(380, 0.55 * this.width));
+    const { figure } = this, height = figure.height ?? Math.max(180, Math.min(380, 0.55 * this.width));
     const svg = this.canvas(height);
     let [xl, xh] = this.zoom ?? padded(range(extent(figure, "x")), 0.02, figure.logarithmic_x);
     const positive = (values, logarithmic) => (logarithmic ? values.filter((value) => value > 0) : values);
@@ -241,7 +241,7 @@ export class Chart {
       svg.append(node("line", { class: "grid", x1: x.at(value), x2: x.at(value), y1: top, y2: height - bottom }));
       svg.append(node("text", { class: "tick", x: x.at(value), y: height - bottom + 16, "text-anchor": "middle" }, number(value)));
     }
-    this.below(svg, (left + this.width - right) / 2, height - 8, figure.x_label);
+    this.below(svg, (left + this.width - right) / 2, height - 8, figure.x_label ?? "");
     svg.append(node("text", { class: "label", x: 4, y: 12 }, figure.y_label ?? "")); // above its axis, where it is read without turning
   }
 
@@ -328,8 +328,9 @@ export class Chart {
 
   bars() {
     const { figure } = this, items = figure.series.filter((item) => item.kind === "bars");
-    const names = items[0].x, narrow = this.width < NARROW;
+    const names = items[0].x;
     const longest = Math.max(...names.map((name) => String(name).length), 4);
+    const narrow = this.width < NARROW && 16 + LETTER * longest > 0.4 * this.width;
     const left = narrow ? 12 : Math.min(16 + LETTER * longest, 0.45 * this.width), right = 16;
     const row = (narrow ? 16 : 4) + 14 * items.length + 4;
     const values = items.flatMap((item) => [0, ...item.y, ...(item.low ?? []), ...(item.high ?? [])]);
@@ -343,7 +344,7 @@ export class Chart {
       svg.append(node("line", { class: "grid", x1: x.at(value), x2: x.at(value), y1: top, y2: height - 44 }));
       svg.append(node("text", { class: "tick", x: x.at(value), y: height - 28, "text-anchor": "middle" }, number(value)));
     }
-    this.below(svg, (left + this.width - right) / 2, height - 8, figure.x_label);
+    this.below(svg, (left + this.width - right) / 2, height - 8, figure.x_label ?? "");
     const zero = x.at(figure.logarithmic_x ? low : Math.max(low, Math.min(0, high)));
     names.forEach((name, place) => {
       const from = top + row * place + (narrow ? 16 : 2);

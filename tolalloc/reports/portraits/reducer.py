@@ -14,7 +14,7 @@ from tolalloc.allocation.space.requirement import USUAL_YIELD
 from tolalloc.exceptions import InputError
 from tolalloc.models.model import Units
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE
-from tolalloc.reducers import PEAK_TO_PEAK, PRELOAD
+from tolalloc.reducers import FRICTION_TORQUE, PEAK_TO_PEAK, PRELOAD, RADIAL_CLEARANCE
 from tolalloc.reducers.contact import contact_of
 from tolalloc.reducers.cycloid.clearance import LARGE, is_large
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
@@ -37,8 +37,16 @@ if TYPE_CHECKING:
 
     from tolalloc.drawings.error_model import ErrorModel
 
+_PHASES = 24
+"""Angles of a turn of the crankshafts at which its turns are compared [-]."""
 _ORDERS = 130
 """Orders of the output turn that a report lists [-]."""
+_SPOKEN = {
+    PRELOAD: "pin force without torque",
+    FRICTION_TORQUE: "no-load friction torque",
+    RADIAL_CLEARANCE: "least radial clearance",
+}
+"""Output → what a sentence and the first table call it, shorter than its name."""
 _COARSE = 8
 """Angles per turn of the cranks in a report, which stays small [-]."""
 _COUNTED = (
@@ -110,8 +118,8 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
         )
 
     def display_name(self, output: str) -> str:
-        """Return what a sentence calls an output; there is one peak-to-peak."""
-        return super().display_name(output).removesuffix(" transmission error")
+        """Return what a sentence calls an output; there is one peak-to-peak, and one friction without load."""
+        return _SPOKEN.get(output, super().display_name(output).removesuffix(" transmission error"))
 
     def amounts(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, float]:
         """Return the amounts that a grinder sets, and the clearances that they leave [µm]."""
@@ -273,8 +281,8 @@ def _examination(portrait: ReducerPortrait, figures: Mapping[str, float]) -> Exa
     half, least = figures["median pin force without torque [N]"], figures["least radial clearance [µm]"]
     sentences = (
         *model.mismatches,
-        f"Nominal clearance {flank:.3g} µm on the flank and {radial:.3g} µm at tip and root, which leave "
-        f"{2 * flank * MICROMETRE / stage.disc_pitch_radius / ARCMINUTE:.2g}′ of free rotation.",
+        f"Nominal clearance {number(flank, '.3g')} µm on the flank and {number(radial, '.3g')} µm at tip and root, "
+        f"which leave {number(2 * flank * MICROMETRE / stage.disc_pitch_radius / ARCMINUTE, '.2g')}′ of free rotation.",
         f"Of {count:,} simulated reducers {number(figures['share preloaded [-]'], '.1%')} are preloaded"
         f"{unsolved}: without torque their pins press with more than "
         f"the {model.rated_pin_force:,.0f} N of the rated torque; half of all press with "
@@ -351,7 +359,7 @@ def _advice(model: ReducerModel) -> str:
         else "flank_clearance=(smallest, largest) of ta.reducer(...) would let the allocation open it"
     )
     return (
-        f"a tooth modification that leaves more than the present {flank:.3g} µm on the flank frees them; "
+        f"a tooth modification that leaves more than the present {number(flank, '.3g')} µm on the flank frees them; "
         f"`tolalloc modify` proposes one, and {freely}"
     )
 
@@ -364,7 +372,11 @@ def _illustrated(model: ReducerModel, units: Units) -> tuple[Section, ...]:
     return (
         Section(
             heading="Single units over one output turn",
-            figures=(_curve_figure(curves, model.kernel.torque), _order_figure(curves, model.reducer)),
+            figures=(
+                _curve_figure(curves, model.kernel.torque),
+                _crank_turn_figure(curves, model.reducer),
+                _order_figure(curves, model.reducer),
+            ),
             tables=(("orders of units", _order_table(curves)),),
         ),
         Section(
@@ -406,6 +418,30 @@ def _curve_figure(curves: Mapping[str, Equilibria], torque: float) -> Figure:
             for label, curve in curves.items()
         ),
     )
+
+
+def _crank_turn_figure(curves: Mapping[str, Equilibria], reducer: Reducer) -> Figure:
+    """Return the same over one turn of the crankshafts: the mean of all their turns, and between which they lie."""
+    return Figure(
+        name="crank_turn",
+        title="The same over one turn of the crankshafts: mean of all turns, the band holds every one",
+        x_label="crank angle [°]",
+        y_label="transmission error, output side [arcsec]",
+        series=tuple(_crank_turn(label, curve, reducer.cycloid_stage.disc_teeth) for label, curve in curves.items()),
+    )
+
+
+def _crank_turn(label: str, curve: Equilibria, disc_teeth: int) -> Series:
+    """Return the curve of a unit folded onto one turn of the crankshafts."""
+    phase = (curve.carrier_angle * disc_teeth / (2 * np.pi)) % 1.0
+    place = np.minimum((phase * _PHASES + 0.5).astype(int) % _PHASES, _PHASES - 1)
+    errors = curve.transmission_error[0] / ARCSECOND
+    parts = [errors[place == at] for at in range(_PHASES)]
+    known = [at for at, own in enumerate(parts) if own.size]
+    low, mean, high = zip(
+        *((float(own.min()), float(own.mean()), float(own.max())) for own in parts if own.size), strict=True
+    )
+    return Series(label=label, kind="line", x=[360.0 / _PHASES * at for at in known], y=mean, low=low, high=high)
 
 
 def _amplitudes(curve: Equilibria) -> Float[np.ndarray, " order"]:

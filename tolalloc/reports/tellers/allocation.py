@@ -21,6 +21,7 @@ from tolalloc.reports.tellers import allocation_tables as tables
 from tolalloc.reports.tellers.allocation_drawing import (
     dimensions_table,
     effects_figure,
+    risks,
     sources_table,
     tolerances_frame,
     write_drawing,
@@ -92,6 +93,7 @@ class AllocationTeller(Teller[AllocationResult]):
         )
         return (
             self._today,
+            Section(heading=_say("heading_risks"), paragraphs=risks(result), first=True),
             self._dimensions,
             Section(
                 heading=_say("heading_sources"),
@@ -131,6 +133,7 @@ class AllocationTeller(Teller[AllocationResult]):
             heading=_say("heading_today"),
             figures=(figures.units_figure(result), *effects_figure(result)),
             tables=((table.name, table.frame(unit)),),
+            paragraphs=(texts.capability_change(result),),
             first=True,
         )
 

@@ -38,7 +38,10 @@ _say = Sentences("allocation")
 _STEP = 0.1
 """Share of a zone by which the figure of effects opens it [-]."""
 
-_EFFECTS = 8
+_NOTICED = 10.0
+"""Tightening from which a shop is asked whether it holds a zone [%]."""
+
+_EFFECTS = 6
 """Dimensions whose effect is drawn, the largest first [-]."""
 
 _Source = tuple[Source, Source]
@@ -94,7 +97,7 @@ def dimensions_table(result: AllocationResult) -> Table[_Dimension]:
         Column(header="process before", value=lambda row: before.value(row[1][0]), nothing="as today"),
         Column(header="process", value=lambda row: after.value(row[1][0]), nothing="as today", terminal=6),
         Column(
-            header="total-effect index [%]",
+            header="index as drawn [%]",
             value=lambda row: parts.get(row[1][0][0].dimension, np.nan),
             terminal=3,
         ),
@@ -177,31 +180,70 @@ def tolerances_frame(result: AllocationResult, cost_unit: str = COST_UNITS) -> p
     return frame
 
 
-def effects_figure(result: AllocationResult) -> tuple[Figure, ...]:
+def effects(result: AllocationResult) -> dict[str, float]:
     """Return what opening each dimension does to what is kept of the leading output, largest effect first.
 
-    Nothing where the model of the drawing knows no derivatives by zones.
+    Nothing where the model of the drawing knows no derivatives by zones [unit of the leading output].
     """
     if result.chosen.by_zone is None:
-        return ()
+        return {}
     names = [source.name for source in result.drawn.errors.active]
     slope = dict(zip(names, result.chosen.by_zone.tolist(), strict=True))
-    effects = {
+    found = {
         name: sum(_STEP * source.zone * slope.get(source.name, 0.0) for source in members)
         for name, members in result.dimensions.items()
     }
-    order = sorted(effects, key=lambda name: -abs(effects[name]))[:_EFFECTS]
+    return dict(sorted(found.items(), key=lambda own: -abs(own[1])))
+
+
+def effects_figure(result: AllocationResult) -> tuple[Figure, ...]:
+    """Return the largest of these effects; nothing where there are none."""
+    largest = dict(list(effects(result).items())[:_EFFECTS])
+    if not largest:
+        return ()
     kept, guarantee = with_unit(f"{result.chosen.quantile_bound:.4g}", result.leading), result.requirements[0].guarantee
     key = "figure_effects" if isinstance(guarantee, AtYield) else "figure_effects_other"
-    label, lengths = "effect with its sign, to first order", [effects[name] for name in order]
+    label = "effect with its sign, to first order"
     figure = Figure(
         name="effects",
         title=_say(key, step=_STEP, output=short(result.leading), kept=kept, target=getattr(guarantee, "target", None)),
         x_label=f"change of {result.leading}",
-        series=(Series(label=label, kind="bars", x=order, y=lengths),),
+        series=(Series(label=label, kind="bars", x=list(largest), y=list(largest.values())),),
         vertical=((0.0, ""),),
     )
     return (figure,)
+
+
+def risks(result: AllocationResult) -> tuple[str, ...]:
+    """Return what can go wrong with the drawing: in the shop, with its first driver, and beyond what was computed."""
+    found = []
+    name, members = min(
+        ((result.line_name(own), own[1]) for own in result.lines),
+        key=lambda line: _change(_paired(result, line[1][0])),
+    )
+    before, after = _paired(result, members[0])
+    if (change := _change((before, after))) < -_NOTICED:
+        zones = {"before": before.zone / MICROMETRE, "after": after.zone / MICROMETRE}
+        found.append(_say("risk_tightest", name=name, change=-change / 100, **zones))
+    left = -result.chosen.checks[0].tightest.excess
+    for name, effect in list(effects(result).items())[:1]:
+        moved = {"effect": with_unit(f"{abs(effect):.2g}", result.leading), "output": short(result.leading)}
+        if result.met and effect > 0:
+            found.append(_say("risk_driver", name=name, step=_STEP, left=_left(left, result.leading), **moved))
+    if not any(value for name, value in result.model.conditions.items() if "warmer" in name or "temperature" in name):
+        found.append(_say("risk_not_included"))
+    return tuple(found)
+
+
+def _left(distance: float, output: str) -> str:
+    """Return a distance to a limit, none below 0."""
+    return with_unit(f"{max(distance, 0.0):.2g}", output)
+
+
+def _paired(result: AllocationResult, member: Source) -> _Source:
+    """Return a source before and after."""
+    known = {own.name: own for own in result.space.errors.sources}
+    return known[member.name], member
 
 
 def zones_figure(rows: Sequence[_Source]) -> Figure:

@@ -46,12 +46,9 @@ def front_figure(result: AllocationResult, fronts: Fronts, cost_unit: str) -> Fi
     error = with_unit(f"{result.chosen.constraints[0].standard_error:.2g}", leading)
     by = f" by {number(guarantee.target, '.2%')} of units" if isinstance(guarantee, AtYield) else ""
     searched, exact = fronts.searched, fronts.exact
-    checked, knee = ~np.isnan(searched.on_kernel), searched.knee
+    checked = ~np.isnan(searched.on_kernel)
     others = _say("figure_front_others") if len(result.requirements) > 1 else ""
-    compared = tuple(
-        Series(label=label, kind="points", x=[design.quantile_bound], y=[design.cost])
-        for label, design in designs(result).items()
-    )
+    compared = designs(result)
     return Figure(
         name="front",
         title=_say("figure_front", limit=with_unit(f"{limit:g}", leading), others=others),
@@ -63,13 +60,17 @@ def front_figure(result: AllocationResult, fronts: Fronts, cost_unit: str) -> Fi
             ),
             Series(label="NSGA-II, by its surrogate", kind="line", x=list(searched.quantile), y=list(searched.cost)),
             Series(
-                label="NSGA-II, solved on the kernel",
+                label="NSGA-II, solved with the full model",
                 kind="points",
                 x=list(searched.on_kernel[checked]),
                 y=list(searched.cost[checked]),
             ),
-            *compared,
-            Series(label="knee of NSGA-II", kind="points", x=[searched.quantile[knee]], y=[searched.cost[knee]]),
+            Series(
+                label=_say("figure_front_designs", names=", ".join(compared)),
+                kind="points",
+                x=[design.quantile_bound for design in compared.values()],
+                y=[design.cost for design in compared.values()],
+            ),
         ),
         vertical=((limit, ""),),  # a label would stand among the legend's
     )

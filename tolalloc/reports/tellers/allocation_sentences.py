@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from tolalloc.allocation.front.what_if import COST_CHANGE, SAME
@@ -11,6 +13,7 @@ from tolalloc.allocation.search.zone_allocation import ZoneAllocation
 from tolalloc.allocation.space.joint_yield import JointRequirement
 from tolalloc.allocation.space.requirement import AtYield, Guarantee
 from tolalloc.allocation.verify.verification import VerifiedDesign
+from tolalloc.capability.indices import capability
 from tolalloc.capability.monte_carlo import Yield
 from tolalloc.reports.feature_frame import callout_assumptions
 from tolalloc.reports.header import Header
@@ -177,6 +180,22 @@ def _cost(result: AllocationResult, cost_unit: str) -> str:
     return _say("cost_same" if same else "cost", before=before, cost=chosen.cost, cost_unit=cost_unit, alike=said)
 
 
+def capability_change(result: AllocationResult) -> str:
+    """Return mean, standard deviation, Cpk and share beyond the limit of the leading output, as it is and as drawn."""
+    limits, leading = result.requirements[0].limits, result.leading
+    gaps: dict[str, Any] = {"output": short(leading).capitalize(), "simulated": portrait_of(result.model).simulated}
+    for after, design in (("_before", result.free.baseline), ("", result.chosen)):
+        values = design.sample.values
+        found = capability(values[np.isfinite(values)], limits)
+        gaps |= {
+            f"mean{after}": with_unit(f"{found.mean:.3g}", leading),
+            f"sigma{after}": with_unit(f"{found.deviation_overall:.3g}", leading),
+            f"cpk{after}": found.ppk,
+            f"beyond{after}": 1 - design.achieved.estimate,
+        }
+    return _say("capability", **gaps)
+
+
 def _solved(design: VerifiedDesign) -> tuple[str, ...]:
     """Return which of the verifying units were solved, where that were not all of them."""
     units = design.independent.units if design.independent else None
@@ -336,7 +355,10 @@ def warnings(result: AllocationResult, header: Header) -> tuple[str, ...]:
         what = result.model.uncertain[0].name.split(" (")[0]
         found.append(_say("uncertain", lost=lost, count=len(uncertain), what=what))
     found += [f"{own.sentence}." for own in result.space.settings if own.out_of_bounds]
-    found += portrait_of(result.model).cautions(chosen.settings)
+    fault = examined(result).fault or ""
+    found += [own for own in portrait_of(result.model).cautions(chosen.settings) if own not in fault]
+    if result.front_lacks:
+        found.append(_say("front_lacks", why=result.front_lacks))
     if result.fronts and not result.fronts.score.q2 >= NEEDED_Q2:
         found.append(_say("surrogate"))
     if result.fronts and (lost := result.fronts.searched.failed):

@@ -19,6 +19,7 @@ from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.columns import Column, Table
 from tolalloc.reports.header import Header
+from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.tellers.allocation_sentences import designs, searches
 from tolalloc.reports.wording import quantity, short
 
@@ -89,7 +90,7 @@ def today_table(result: AllocationResult, cost_unit: str) -> Table[_Compared]:
 
     Beside a limit stands what was shown to be kept, which is compared with it, as in the workbook of the drawing.
     """
-    before, after = result.free.baseline, result.chosen
+    before, after, portrait = result.free.baseline, result.chosen, portrait_of(result.model)
     rows = [_Compared(name=f"cost [{cost_unit}]", before=before.cost, after=after.cost)]
     sides = zip(before.limited_sides, after.limited_sides, strict=True)
     for (check, side), (own, drawn) in sides:
@@ -99,7 +100,7 @@ def today_table(result: AllocationResult, cost_unit: str) -> Table[_Compared]:
         price = result.free.prices.get(drawn.stack.name, 0.0)
         rows.append(
             _Compared(
-                name=f"{short(asked.output)} [{unit_of(asked.output)}]",
+                name=f"{portrait.display_name(asked.output)} [{unit_of(asked.output)}]",
                 shown="" if after.jointly else asked.guarantee.words,
                 limit=f"{'≤' if drawn.sign > 0 else '≥'} {drawn.limit:.4g}",
                 before=side.value,
@@ -126,8 +127,8 @@ def today_table(result: AllocationResult, cost_unit: str) -> Table[_Compared]:
         Column(header="limit", value=lambda row: row.limit, nothing="", terminal=2),
         Column(header="as it is", value=lambda row: row.before, terminal=3),
         Column(header="as drawn", value=lambda row: row.after, terminal=4),
-        Column(header="as it is [% kept]", value=lambda row: row.kept_before, terminal=5),
-        Column(header="as drawn [% kept]", value=lambda row: row.kept_after, terminal=6),
+        Column(header="yield [%]", value=lambda row: row.kept_before, terminal=5),
+        Column(header="yield as drawn [%]", value=lambda row: row.kept_after, terminal=6),
         Column(header="binds", value=lambda row: row.binds, nothing=""),
     ]
     return Table(name="today and as drawn", columns=columns, rows=rows)

@@ -93,8 +93,8 @@ class RankingTeller(Teller[RankingResult]):
 
     @property
     def headline(self) -> tuple[str, ...]:
-        """The first drivers."""
-        return tuple(_drivers(self.result.dimensions or self.result.indices))
+        """The first drivers, in one sentence."""
+        return (_named_drivers(self.result.dimensions or self.result.indices, self._output),)
 
     @cached_property
     def _portrait(self) -> Portrait[Any]:
@@ -419,7 +419,6 @@ class RankingTeller(Teller[RankingResult]):
             ),
             Section(
                 heading=_say("surrogates_heading"),
-                paragraphs=(chosen_surrogate(result.choice),),
                 tables=(("surrogates", tables.surrogate_table(result.choice)),),
             ),
             Section(
@@ -634,6 +633,18 @@ def _drivers(sobol: SobolIndices) -> Iterator[str]:
             high=high[at],
             before=f" {_before(following[at], sobol.sources)}" if at in following else "",
         )
+
+
+def _named_drivers(sobol: SobolIndices, output: str) -> str:
+    """Return the same of all of them in one sentence, without the places."""
+    low, high = np.clip(sobol.total_interval, 0.0, 1.0)
+    named = (
+        _say(
+            "driver_short", source=sobol.sources[at], total=min(sobol.total[at], 1.0), low=100 * low[at], high=high[at]
+        )
+        for at in sobol.order[:_NAMED]
+    )
+    return _say("drivers_short", output=output, names=", ".join(named))
 
 
 def _before(pair: Neighbours, sources: Sequence[str]) -> str:

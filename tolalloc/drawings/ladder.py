@@ -1,4 +1,4 @@
-"""The ladder of a source: the zones that its drawing may carry, standard grades or preferred numbers, tightest first.
+"""Standard tolerances: the zones that a drawing may carry, grades or preferred numbers, and the deviations of a fit.
 
 Notes
 -----
@@ -26,6 +26,7 @@ ISO 3, Preferred numbers: Series of preferred numbers; ISO 497, more rounded val
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -94,6 +95,76 @@ def grade_zones(nominal: float) -> dict[str, float]:
         zones[f"IT{number}"] = 10 * zones[f"IT{number - 5}"]
     too_small = nominal <= MILLIMETRE * (1 + _ROUNDING)
     return {grade: zone for grade, zone in zones.items() if not (too_small and grade in _COARSE)}
+
+
+SHAFTS = {
+    "d": (-20, -30, -40, -50, -65, -80, -100, -120, -145, -170, -190, -210, -230),
+    "e": (-14, -20, -25, -32, -40, -50, -60, -72, -85, -100, -110, -125, -135),
+    "f": (-6, -10, -13, -16, -20, -25, -30, -36, -43, -50, -56, -62, -68),
+    "g": (-2, -4, -5, -6, -7, -9, -10, -12, -14, -15, -17, -18, -20),
+    "h": (0,) * 13,
+    "k": (0, 1, 1, 1, 2, 2, 2, 3, 3, 4, 4, 4, 5),
+    "m": (2, 4, 6, 7, 8, 9, 11, 13, 15, 17, 20, 21, 23),
+    "n": (4, 8, 10, 12, 15, 17, 20, 23, 27, 31, 34, 37, 40),
+    "p": (6, 12, 15, 18, 22, 26, 32, 37, 43, 50, 56, 62, 68),
+}
+"""Fundamental deviation of a shaft in every size step, of d to h the upper one, of the others the lower one; of k from
+IT4 to IT7, 0 in other grades [µm]."""
+_FIT = re.compile(r"(js|JS|[A-Za-z])\s?(\d{1,2})|IT\s?(\d{1,2})")
+_CORRECTED = {"K": 8, "M": 8, "N": 8, "P": 7}
+"""Holes of these letters are a step of grades tighter than the shafts that they mirror, up to this grade."""
+_OF_K = range(4, 8)
+FITS = "d to h, js, k, m, n and p, the same of holes in capitals, or IT, with a grade, such as h5, H7 or IT6"
+"""Fits that are known."""
+
+
+def is_fit(text: str) -> bool:
+    """Return whether a cell is written as a fit of ISO 286, a letter and a grade.
+
+    >>> is_fit("h5"), is_fit("IT6"), is_fit("0.05")
+    (True, True, False)
+    """
+    return _FIT.fullmatch(text) is not None
+
+
+def fit_deviations(fit: str, nominal: float) -> tuple[float, float]:
+    """Return the upper and the lower deviation of a fit at a nominal size in metres [m]; ISO 286-2.
+
+    A grade alone is taken to both sides alike. Of holes K, M, N and P the mirrored deviation is raised by the grade
+    less the one below it; M6 from 250 to 315 mm is the standard's exception.
+
+    Raises
+    ------
+    InputError
+        A letter or grade that is not known, or a nominal size outside 0 to 500 mm.
+
+    Examples
+    --------
+    >>> [[round(one * 1e6, 1) for one in fit_deviations(fit, 0.040)] for fit in ("h6", "H7", "g6", "K7", "js9")]
+    [[0.0, -16.0], [25.0, 0.0], [-9.0, -25.0], [7.0, -18.0], [31.0, -31.0]]
+    """
+    found = _FIT.fullmatch(fit)
+    letter, number = (found[1] or "js", int(found[2] or found[3])) if found else ("", 0)
+    step, zones = _size_step(nominal), grade_zones(nominal)
+    width, small = zones.get(f"IT{number}", 0.0), letter.lower()
+    if not width or small not in (*SHAFTS, "js"):
+        raise InputError.at("ISO 286-2", "fit", fit, FITS)
+    if small == "js":
+        return width / 2, -width / 2
+    own = SHAFTS[small][step] if small != "k" or number in _OF_K or letter == "K" else 0
+    size = own * MICROMETRE
+    if letter == small:
+        return (size, size - width) if small <= "h" else (size + width, size)
+    if letter <= "H":
+        return width - size, 0.0 - size
+    if number <= _CORRECTED[letter]:
+        raised = width - zones[f"IT{number - 1}"] if step else 0.0
+        size -= raised if (fit, SIZE_STEPS[step]) != ("M6", 315) else raised + 2 * MICROMETRE
+    elif letter == "K":
+        raise InputError.at("ISO 286-2", "fit", fit, "K up to grade 8")
+    elif letter == "N":
+        size = 0.0 if step else size
+    return 0.0 - size, 0.0 - size - width
 
 
 SERIES = "R′10"
