@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import statistics
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -21,6 +23,16 @@ pytestmark = [
         reason="no browser is installed that a test can drive: apt install chromium chromium-driver",
     ),
 ]
+LEAVES = """
+const leaving = new Event("beforeunload", { cancelable: true });
+return !dispatchEvent(leaving);
+"""
+"""Returns whether the page asks somebody who leaves it."""
+LATE = """
+const charts = [...document.querySelectorAll(".chart")];
+return charts.filter((own) => own.scrollWidth > own.clientWidth && own.tabIndex < 0);
+"""
+"""Returns the charts that did not follow the width of the page yet."""
 ALLOWANCE = 5
 """How much slower than alone the page may be beside the tests on the other core [-]."""
 
@@ -79,7 +91,8 @@ def by_id(driver, name: str):
 
 def silent(driver) -> bool:
     """Return whether the console has no error."""
-    return not [entry for entry in driver.get_log("browser") if entry["level"] == "SEVERE"]
+    said = [entry for entry in driver.get_log("browser") if entry["level"] == "SEVERE"]
+    return all(entry["source"] == "intervention" for entry in said)  # it did not ask a driver that leaves a design
 
 
 @pytest.mark.parametrize("opened", ["study", "reducer"])
@@ -91,7 +104,8 @@ def test_the_page_stands_without_a_network(driver, request, opened):
     until(lambda: by_id(driver, "yield").text.endswith("%"))
     assert "limits are not kept" in by_id(driver, "verdict").text
     assert driver.execute_script("return document.querySelectorAll('#histograms svg').length") == 1
-    assert driver.execute_script("return document.querySelectorAll('#curves svg').length") == 2 * (opened == "reducer")
+    curves = driver.execute_script("return document.querySelectorAll('#curves svg, #orders svg').length")
+    assert curves == 2 * (opened == "reducer")
     assert silent(driver)
 
 
@@ -121,6 +135,107 @@ def test_the_curve_follows_the_torque_and_the_picture_a_swept_error(driver, redu
     by_id(driver, "effect-share").send_keys("\ue014" * 4)
     until(lambda: driver.execute_script(picture) != still)
     assert silent(driver)
+
+
+def test_one_angle_ties_the_curve_to_the_moving_picture(driver, reducer):
+    from selenium.webdriver import ActionChains
+
+    shown(driver, reducer, 1024)
+    stated = "return document.querySelector('#mechanism .mechanism-stated')?.textContent ?? ''"
+    until(lambda: driver.execute_script(stated))
+    curve = driver.find_element("css selector", "#curves svg")
+    driver.execute_script("arguments[0].scrollIntoView({ block: 'center' })", curve)
+    ActionChains(driver).move_to_element(curve).perform()
+    angle, value = re.match(
+        r"carrier angle ([\d.]+)°: .* ([−\d.]+) arcsec", by_id(driver, "cursor-value").text
+    ).groups()
+    assert 120 < float(angle) < 240
+    picture = driver.execute_script(stated)
+    assert float(re.search(r"Carrier at ([\d.]+)°", picture)[1]) == pytest.approx(float(angle), abs=0.06)
+    assert f"transmission error {value}″" in picture
+    turned = "const own = document.querySelector('.mechanism-angle input'); own.value = 0.25;"
+    driver.execute_script(f"{turned} own.dispatchEvent(new Event('input'))")
+    assert by_id(driver, "cursor-value").text.startswith("carrier angle 90.0°")
+    marks = driver.execute_script(
+        "return [...document.querySelectorAll('#curves text.mark')].map((own) => own.textContent)"
+    )
+    assert marks and all(text.endswith("peak to peak") for text in filter(None, marks))
+    assert silent(driver)
+
+
+def test_a_group_moves_by_the_ratio_of_its_members_and_says_how_far_from_the_drawing(driver, reducer):
+    from selenium.webdriver.common.keys import Keys
+
+    shown(driver, reducer)
+    row = next(
+        own for own in driver.find_elements("css selector", "#zones .row") if own.find_elements("tag name", "details")
+    )
+    assert row.find_element("css selector", ".delta").text == "as drawn"
+    row.find_element("tag name", "summary").click()
+    group, *members = row.find_elements("css selector", "input[inputmode=decimal]")
+    drawn = float(group.get_attribute("value"))
+    members[1].send_keys(Keys.CONTROL + "a" + Keys.NULL, str(1.5 * drawn), Keys.TAB)
+    row.find_element("css selector", "input[type=range]").send_keys(Keys.ARROW_LEFT * 30)
+    now = [float(own.get_attribute("value")) for own in members]
+    assert now[0] < 0.9 * drawn
+    assert now[1] / now[0] == pytest.approx(1.5, rel=1e-3)
+    assert row.find_element("css selector", ".delta").text == "members differ"
+    torque = driver.find_element("css selector", "input[inputmode=decimal][aria-label^='torque']")
+    torque.send_keys(Keys.CONTROL + "a" + Keys.NULL, "20", Keys.TAB)
+    assert by_id(driver, "conditions").text.startswith("torque 20 N·m")
+    driver.execute_script("sessionStorage.clear()")
+
+
+def test_a_refused_value_marks_its_row_alone_and_numbers_are_grey_until_theirs_are_there(driver, study):
+    from selenium.webdriver.common.keys import Keys
+
+    shown(driver, study)
+    cost = by_id(driver, "cost").text
+    for selector, typed, good in (("#zones", "3000", "40"), ("#zones", "abc", "40"), ("#settings", "9", "0.01")):
+        field = driver.find_element("css selector", f"{selector} input[inputmode=decimal]")
+        field.send_keys(Keys.CONTROL + "a" + Keys.NULL, typed, Keys.TAB)
+        until(lambda own=field: own.get_attribute("aria-invalid") == "true")
+        assert field.get_attribute("value") == good
+        assert len(driver.find_elements("css selector", ".row.refused")) == 1
+        assert not by_id(driver, "trouble").is_displayed()
+        assert by_id(driver, "cost").text == cost
+    slider = "const own = document.querySelector('#zones input[type=range]'); own.value = 30;"
+    grey = driver.execute_script(f"{slider} own.dispatchEvent(new Event('input')); return document.body.className")
+    assert {"moving", "counting"} <= {*grey.split()}
+    counted(driver, 1024)
+    until(lambda: not by_id(driver, "answer").get_attribute("class").count("stale"))
+    assert driver.execute_script("return document.body.className") == ""
+    assert not driver.find_elements("css selector", ".row.refused")
+    driver.get_log("browser")  # a refusal is an error of the network there
+
+
+@pytest.mark.skipif(
+    not find_spec("axe_core_python"), reason="the checker of pages is missing: pip install axe-core-python"
+)
+def test_live_page_and_report_have_no_serious_barrier(driver, study, script, tmp_path):
+    from axe_core_python.selenium import Axe
+
+    def barriers() -> list[str]:
+        found = Axe().run(driver)["violations"]
+        return [
+            f"{own['id']}: {own['nodes'][0]['target']}" for own in found if own["impact"] in ("serious", "critical")
+        ]
+
+    fit = load_study(script)
+    replace(fit, questions=(ta.Ranking(),)).run(tmp_path / "run", "quick")
+    try:
+        for page in (study.address, (tmp_path / "run" / "report.html").as_uri()):
+            driver.get(page)
+            if page == study.address:
+                counted(driver, 1024)
+                by_id(driver, "pin").click()
+            driver.execute_script("for (const own of document.querySelectorAll('details')) own.open = true")
+            for pixels, dark in ((360, True), (1400, False)):
+                width(driver, pixels, dark)
+                until(lambda: driver.execute_script(LATE) == [])
+                assert barriers() == []
+    finally:
+        width(driver, 1400)
 
 
 def test_a_thousand_moves_and_fifty_steps_back_leave_no_error_and_no_rubbish(driver, study):
@@ -161,11 +276,15 @@ def test_the_keyboard_reaches_everything_and_everything_has_a_name(driver, study
         assert own.accessible_name, own.get_attribute("outerHTML")
     assert all(own.accessible_name for own in driver.find_elements("css selector", "svg[role=img]"))
     driver.execute_script("document.activeElement.blur(); scrollTo(0, 0)")
-    reached = set()
+    reached = {}
     for _ in range(2 * len(wanted)):
         ActionChains(driver).send_keys(Keys.TAB).perform()
-        reached.add(driver.switch_to.active_element.id)
-    assert wanted.keys() <= reached
+        own = driver.switch_to.active_element
+        reached.setdefault(own.id, own.get_attribute("id") or own.accessible_name)
+    assert wanted.keys() <= reached.keys()
+    # as the eye goes: the head, the zones on the left, the unit on the right, the pinned designs below both
+    places = [list(reached.values()).index(name) for name in ("save", "search", "ask-ranking", "unit", "take design 1")]
+    assert places == sorted(places)
     cost = by_id(driver, "cost").text
     driver.find_element("css selector", "#zones input[type=range]").send_keys(Keys.ARROW_LEFT * 20)
     until(lambda: by_id(driver, "cost").text != cost)
@@ -218,16 +337,20 @@ def test_a_saved_design_is_confirmed_by_the_command(driver, study, script):
 
     shown(driver, study)
     field = driver.find_element("css selector", "#zones input[inputmode=decimal]")
+    assert not driver.execute_script(LEAVES)
     field.send_keys(Keys.CONTROL + "a" + Keys.NULL, "21.5", Keys.TAB)
+    assert driver.execute_script(LEAVES)  # a design that is not saved yet
     until(lambda: "to the drawing" in by_id(driver, "cost-change").text)
     counted(driver, 1024)
-    until(lambda: by_id(driver, "counted").text.startswith("6144"))
+    until(lambda: by_id(driver, "counted").text.startswith("6,144"))
     said = by_id(driver, "yield").text
     by_id(driver, "save").click()
     name = by_id(driver, "saving-name")
     name.clear()
     name.send_keys("narrow", Keys.ENTER)
     until(lambda: "Saved as narrow.py" in by_id(driver, "saved").text)
+    assert by_id(driver, "saved").text.endswith(f"tolalloc run {script.parent / 'narrow.py'}")
+    assert not driver.execute_script(LEAVES)
     saved = load_study(script.parent / "narrow.py")
     found = saved.ask(ta.Difference(zones={"housing": 21.5}, units=6144)).tables["changes"].set_index("what")
     assert said == f"{found.loc['yield, all limits', 'after [unit]']:.2f} %"
@@ -243,6 +366,7 @@ def test_a_page_goes_on_with_a_server_that_is_killed_and_started_again(driver, s
     study.kill()
     driver.find_element("css selector", "#zones input[type=range]").send_keys("\ue012" * 5)
     until(lambda: "does not answer" in by_id(driver, "trouble").text)
+    assert driver.execute_script("return document.body.classList.contains('away')")  # its numbers are grey
     cost, address = by_id(driver, "cost").text, study.address
     study.start()
     assert study.address == address

@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.client
 import json
 import resource
+import shlex
 import shutil
 import signal
 import socket
@@ -18,7 +19,7 @@ import pytest
 import tolalloc as ta
 from tests.studies.command import ROOT, command, tolalloc
 from tests.studies.live_page import STUDY
-from tolalloc.cli.live.desk import Desk
+from tolalloc.cli.live.desk import Desk, Job
 from tolalloc.cli.live.server import LARGEST, MOST_CONNECTIONS, Address, LiveServer
 from tolalloc.cli.live.session import LiveDesign, Session
 from tolalloc.exceptions import InputError, UnknownNameError
@@ -95,6 +96,67 @@ def test_another_torque_says_the_digits_of_a_study_at_that_torque(tmp_path):
     for torque, allowed in ((0.0, "but not 0"), (400.0, "-334 to 334")):
         with pytest.raises(InputError, match=allowed):
             ask(desk, "design", design={"settings": {TORQUE: torque}})
+
+
+def test_the_limit_of_the_peak_to_peak_stands_around_the_middle_of_the_curve():
+    desk = desk_of(ROOT / "studies" / "liu2020_allocation.py")
+    first, *others = ask(desk, "design", unit=2)["figures"]
+    (low, _), (high, name) = first["horizontal"]
+    curve = first["series"][-1]["y"]
+    limit = desk.session.requirements[0].limits.upper
+    assert high - low == pytest.approx(limit)
+    assert high + low == pytest.approx(min(curve) + max(curve), abs=1e-3)
+    assert name == f"limit {limit:g} arcsec peak to peak"
+    assert not any(own["horizontal"] for own in others)
+
+
+def test_zones_scaled_alike_stay_in_their_ranges_and_cost_less_the_wider_they_are(tmp_path):
+    script = tmp_path / "fit.py"
+    script.write_text(
+        STUDY.replace('"shaft", "nominal": 30.0, ', '"shaft", "nominal": 30.0, "locked": True, '), encoding="utf-8"
+    )
+    desk = desk_of(script)
+    designs = ask(desk, "scaled", design={"settings": {"shim [mm]": 0.02}})["designs"]
+    costs = [own["cost"] for own in designs]
+    assert costs == sorted(costs, reverse=True)
+    factors = [own["factor"] for own in designs]
+    assert costs[factors.index(1.0)] == ask(desk, "design", design={})["cost"]
+    widest = {"zones": {"housing": 40.0 * factors[-1]}, "settings": {"shim [mm]": 0.02}}  # 88 of at most 100 µm
+    assert costs[-1] == pytest.approx(ask(desk, "design", design=widest)["cost"])
+    told = [item["value"] for item in ask(desk, "units", design=widest, units=256)["outputs"][0]["quantiles"]]
+    assert designs[-1]["quantiles"][0] == told
+    ask(desk, "design", turn=5, design={})
+    assert ask(desk, "scaled", turn=4, design={"settings": {"shim [mm]": 0.03}}) == {"called off": True}
+
+
+def test_a_question_says_its_stage_and_what_is_done_and_left(desk, monkeypatch):
+    monkeypatch.setattr(Job, "_run", lambda _: None)
+    ask(desk, "ask", question="ranking", design={})
+    job = desk._jobs["tab"]
+    job.begin("first")
+    job.advance(7)
+    job.begin("second", 10, "blocks")
+    job.advance(3)
+    job.tell("half of it is known")
+    state = ask(desk, "state")
+    assert {key: state[key] for key in ("stage", "units", "expected", "counted", "solved", "told")} == {
+        "stage": "second",
+        "units": 3,
+        "expected": 10,
+        "counted": "blocks",
+        "solved": 10,
+        "told": "half of it is known",
+    }
+
+
+def test_the_command_after_saving_runs_from_any_folder(tmp_path):
+    folder = tmp_path / "my studies"
+    folder.mkdir()
+    (folder / "fit.py").write_text(STUDY, encoding="utf-8")
+    said = ask(desk_of(folder / "fit.py"), "save", design={"zones": {"shaft": 41.7}}, name="tighter")
+    program, word, script = shlex.split(said["command"])
+    assert (program, word) == ("tolalloc", "run")
+    assert load_study(Path(script)).drawing.sources[1].zone == pytest.approx(41.7e-6)
 
 
 def test_the_picture_follows_a_swept_error():
@@ -223,6 +285,7 @@ def test_an_allocation_leaves_locked_sources_alone_and_can_be_stopped(desk):
     while not (state["answer"] or state["error"]):
         state = ask(desk, "state")
     assert state["error"] == ""
+    assert state["most"] > 0
     assert state["answer"]["zones"].get("shaft", 16.0) == pytest.approx(16.0)
     assert state["answer"]["zones"]["housing"] != pytest.approx(16.0)
     state = ask(desk, "ask", question="ranking", design=start)

@@ -76,6 +76,8 @@ class Portrait(Generic[Own]):
     """What a sentence calls all settings together."""
     uncertain_name: ClassVar[str] = "not known of the model"
     """What a summary calls what is uncertain of the model."""
+    curve_height: ClassVar[str] = ""
+    """Output that is the height of the first picture's curve; empty unless a model has one."""
 
     def __init__(self, model: Own) -> None:
         self.model = model

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shlex
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -17,7 +19,9 @@ from tolalloc.drawings.tolerance_table import table_text
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
 from tolalloc.reading.files import write_new
 from tolalloc.reading.units import MICROMETRE
+from tolalloc.study.duration import durations
 from tolalloc.study.prepared import Prepared
+from tolalloc.study.questions import questions_of
 from tolalloc.study.study import Study
 
 KINDS = ("ranking", "allocation")
@@ -36,6 +40,11 @@ class Job:
     settings: tuple[str, ...]  # Names of the settings that an answer may choose
     stage: str = "begins"
     units: int = 0
+    expected: int = 0  # Units of the whole stage; 0 where nobody knows [-]
+    counted: str = "units"
+    told: str = ""  # What is known already
+    solved: int = 0  # Units of all stages [-]
+    most: int = 0  # About how many units it solves at most; 0 until that is known [-]
     answer: dict[str, Any] | None = None
     error: str = ""
     began: float = field(default_factory=time.monotonic)
@@ -60,24 +69,28 @@ class Job:
         """Stop it as soon as the next units are solved."""
         self._stop.set()
 
-    def begin(self, stage: str, units: int = 0, counted: str = "") -> None:  # noqa: ARG002
-        """Begin a stage."""
+    def begin(self, stage: str, units: int = 0, counted: str = "") -> None:
+        """Begin a stage of so many units, or of what is counted."""
         self._look()
-        self.stage, self.units = stage, 0
+        self.stage, self.units, self.expected, self.counted = stage, 0, units, counted or "units"
 
     def advance(self, units: int) -> None:
         """So many more units are solved."""
         self._look()
         self.units += units
+        self.solved += units
 
     def tell(self, sentence: str) -> None:
-        """Nothing is said before the answer."""
+        """Say what is known already."""
+        self.told = sentence
 
     @property
     def state(self) -> dict[str, Any]:
         """How far it has come, and its answer once there is one."""
         seconds = round(time.monotonic() - self.began, 1)
         told = {"kind": self.kind, "stage": self.stage, "units": self.units, "seconds": seconds}
+        told |= {"expected": self.expected, "counted": self.counted, "told": self.told}
+        told |= {"solved": self.solved, "most": self.most}
         return {**told, "answer": self.answer, "error": self.error}
 
     def _look(self) -> None:
@@ -86,6 +99,7 @@ class Job:
 
     def _run(self) -> None:
         try:
+            self.most = _most_units(self.kind, self.study)
             answer = self.study.ask(self.kind, "quick", self)
             said = {"sentences": list(answer.sentences), "warnings": list(answer.warnings)}
             self.answer = said | _found(answer, self.settings)
@@ -98,9 +112,16 @@ class Job:
             raise
 
 
+def _most_units(kind: str, study: Study) -> int:
+    """Return about how many units a question solves at most, at the quick effort [-]."""
+    asked = questions_of((kind,), tuple(study.questions), study.place)
+    quick = replace(study.with_effort("quick"), questions=asked)
+    return max((own.units[1] for own in durations(Prepared(study=quick))), default=0)
+
+
 def _found(answer: Any, settings: tuple[str, ...]) -> dict[str, Any]:
     """Return what the page takes over of an answer: shares of the sources, or the zones of the cheapest drawing."""
-    from tolalloc.reports.figure import chart
+    from tolalloc.reports.figure import chart, numbers
 
     first = next(iter(answer.figures.values()), None)
     drawn = {"figure": chart(first)} if first else {}
@@ -110,7 +131,11 @@ def _found(answer: Any, settings: tuple[str, ...]) -> dict[str, Any]:
     result = answer.result
     zones = {own.name: own.zone / MICROMETRE for own in result.drawn_sources if own.zone > 0}
     chosen = {name: float(answer.summary[name]) for name in settings if answer.summary.get(name) is not None}
-    return {**drawn, "met": bool(result.met), "cost": float(result.cost), "zones": zones, "settings": chosen}
+    found = {"met": bool(result.met), "cost": float(result.cost), "zones": zones, "settings": chosen}
+    if result.fronts:  # Cost against the leading output's limit, as far as the question asked for it
+        exact = result.fronts.exact
+        found["front"] = {"x": numbers(exact.limits), "y": numbers(exact.cost)}
+    return {**drawn, **found}
 
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,59}")
@@ -169,7 +194,7 @@ class Saving:
         values = self._settings(design)
         text = _SCRIPT.format(before=before, module=self.script.stem, table=table.name, settings=values, name=name)
         write_new(script, text)
-        return {"table": table.name, "script": script.name, "folder": str(self.script.parent)}
+        return {"table": table.name, "script": script.name, "command": f"tolalloc run {_quoted(script)}"}
 
     def _require_readable(self, table: Path, design: LiveDesign) -> None:
         """Take a table back that no study would read, such as one with a zone that the model does not believe."""
@@ -194,6 +219,11 @@ def _with_range(source: Source) -> Source:
     return replace(source, minimum=smallest, maximum=largest)
 
 
+def _quoted(path: Path) -> str:
+    """Return a path as it may be pasted into a command line, from whatever folder."""
+    return f'"{path}"' if os.name == "nt" else shlex.quote(str(path))
+
+
 _TABS = 64
 """Tabs whose latest request is known [-]."""
 
@@ -215,6 +245,7 @@ class Desk:
             "design": self._design,
             "units": self._units,
             "examined": self._examined,
+            "scaled": self._scaled,
             "scene": self._scene,
             "sweep": self._sweep,
             "save": self._save,
@@ -255,6 +286,11 @@ class Desk:
 
     def _examined(self, sent: dict[str, Any]) -> dict[str, Any]:
         return {"sentences": self.session.examined(self._read(sent))}
+
+    def _scaled(self, sent: dict[str, Any]) -> dict[str, Any]:
+        wanted = self._newest(sent)
+        found = self.session.scaled(self._read(sent), wanted)
+        return {"called off": True} if found is None else {"designs": found}
 
     def _scene(self, sent: dict[str, Any]) -> dict[str, Any]:
         swept = (str(sent["source"]), sent.get("share", 0.0)) if "source" in sent else None

@@ -74,7 +74,10 @@ PATIENCE = 10.0
 """Time that a connection may take to say what it wants [s]."""
 _KINDS = {"js": "text/javascript", "css": "text/css", "html": "text/html"}
 _OWN, _SHARED = (
-    ("live.html", "live.css", "live.js", "zones.js", "designs.js", "picture.js", "requests.js", "verdict.js"),
+    (
+        *("live.html", "live.css", "live.js", "zones.js", "designs.js", "picture.js", "requests.js", "verdict.js"),
+        *("cost.js", "cursor.js", "ghosts.js", "question.js"),
+    ),
     ("page.css", "chart.js", "mechanism.css", "mechanism.js"),
 )
 _POLICY = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'"

@@ -181,6 +181,8 @@ def _quantile(values: Float[np.ndarray, " known"], share: float) -> dict[str, An
 
 FIRST = 256
 """Units that are judged at once [-]."""
+_FACTORS = (0.4, 0.55, 0.75, 1.0, 1.3, 1.7, 2.2)
+"""What all zones of a drawing are multiplied by to show what its limits cost [-]."""
 _LOOK = 128
 """Units that are solved between two looks whether somebody still wants them [-]."""
 MOST = 6144
@@ -305,6 +307,35 @@ class Session:
             while len(self._known) > _MOST_CACHED:
                 self._known.pop(next(iter(self._known)))
 
+    def scaled(self, design: LiveDesign, wanted: Callable[[], bool]) -> list[dict[str, Any]] | None:
+        """Return cost and limited quantiles of the drawing with all zones scaled alike, at the settings of a design.
+
+        Every zone stays within its range or that of a process, and one that is locked stays as drawn. Nothing if it is
+        not wanted any more.
+        """
+        found: list[dict[str, Any]] = []
+        for factor in _FACTORS:
+            zones = {own.name: zone for own in self.prepared.errors.active if (zone := self._scaled(own, factor))}
+            as_drawn = factor == 1.0 and not self.prepared.space.processes  # else what its cheapest processes make it
+            scaled = replace(design, zones=() if as_drawn else tuple(sorted(zones.items())))
+            values = self._solved(scaled, FIRST, wanted)
+            if values is None:
+                return None
+            outputs = judged(self.prepared, self.outputs, values[:FIRST])["outputs"]
+            cost = sum(own.cost for own in self.sources(scaled))
+            quantiles = [[item["value"] for item in own["quantiles"]] for own in outputs]
+            found.append({"factor": factor, "cost": cost, "quantiles": quantiles})
+        return found
+
+    def _scaled(self, source: Source, factor: float) -> float | None:
+        """Return the zone of a source times a factor, within its range; nothing where it stays as drawn [m]."""
+        processes = self.prepared.space.processes.get(source.name, ())
+        held = [(own.minimum, own.maximum) for own in processes] or [_range(source, ())]
+        if source.locked or not max(high for _, high in held) > min(low for low, _ in held):
+            return None
+        wanted = source.zone * factor
+        return min((min(max(wanted, low), high) for low, high in held), key=lambda zone: abs(np.log(zone / wanted)))
+
     def examined(self, design: LiveDesign) -> list[str]:
         """Return what a check says of the settings and the first random units, such as how many are preloaded."""
         model, known = self.model(design), self.prepared.model.settings
@@ -346,9 +377,14 @@ def _setting(own: Setting, word: str, steps: int = _STEPS) -> dict[str, Any]:
     return {"name": own.name, "value": own.value, "lower": own.lower, "upper": own.upper, "step": step, "word": word}
 
 
-def _described(source: Source, processes: tuple[Process, ...]) -> dict[str, Any]:
+def _range(source: Source, processes: tuple[Process, ...]) -> tuple[float, float]:
+    """Return the smallest and the largest zone of a source, by its processes where it has any [m]."""
     smallest = min((own.minimum for own in processes), default=source.minimum)
-    largest = max((own.maximum for own in processes), default=source.maximum)
+    return smallest, max((own.maximum for own in processes), default=source.maximum)
+
+
+def _described(source: Source, processes: tuple[Process, ...]) -> dict[str, Any]:
+    smallest, largest = _range(source, processes)
     return {
         "name": source.name,
         "part": source.part,
@@ -386,7 +422,7 @@ class LiveUnits:
         x = self._columns(design, number)
         values = self._values(design, x[np.newaxis])[0]
         label = f"unit {number}" if number else "exact parts"
-        figures = portrait_of(self.session.model(design)).pictured({label: (np.array(design.settings), x)})
+        figures = self._pictured(design, label, x)
         return {
             "unit": number,
             "values": [
@@ -395,6 +431,19 @@ class LiveUnits:
             ],
             "figures": [chart(figure) for figure in figures],
         }
+
+    def _pictured(self, design: LiveDesign, label: str, x: Float[np.ndarray, " column"]) -> tuple[Figure, ...]:
+        """Return the pictures of a unit, with the limit of the curve's height around the middle of the curve."""
+        portrait = portrait_of(self.session.model(design))
+        figures = portrait.pictured({label: (np.array(design.settings), x)})
+        limits = {own.output: own.limits.upper for own in self.session.requirements}
+        limit, values = limits.get(portrait.curve_height), [item for own in figures[:1] for item in own.series[-1].y]
+        if limit is None or not np.isfinite(values).any():
+            return figures
+        middle = (np.nanmin(values) + np.nanmax(values)) / 2
+        name = f"limit {limit:g} {unit_of(portrait.curve_height)} peak to peak"
+        ends = ((float(middle - limit / 2), ""), (float(middle + limit / 2), name))
+        return replace(figures[0], horizontal=ends), *figures[1:]
 
     def scene(self, design: LiveDesign, number: int, swept: tuple[str, float] | None = None) -> dict[str, Any]:
         """Return a unit as a moving picture needs it; nothing where the model has none.
@@ -435,9 +484,8 @@ class LiveUnits:
         shares = np.linspace(-1.0, 1.0, _SWEPT)
         tried = self._at_shares(design, number, source, shares)
         values = self._values(design, tried)[:, 0]
-        portrait, settings = portrait_of(self.session.model(design)), np.array(design.settings)
         labels = [f"{source} at {100 * share:.0f} % of its zone" for share in shares]
-        curves = [portrait.pictured({label: (settings, row)}) for label, row in zip(labels, tried, strict=True)]
+        curves = [self._pictured(design, label, row) for label, row in zip(labels, tried, strict=True)]
         leading = self.session.outputs[0]
         figure = Figure(
             name="sweep",

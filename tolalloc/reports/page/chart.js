@@ -3,6 +3,11 @@
 const SVG = "http://www.w3.org/2000/svg";
 const COLOURS = ["#1f4e79", "#d9822b", "#3a8f5c", "#8c3b7a", "#7f7f7f", "#b8a100", "#17a2b8", "#c0392b", "#6a4fc3"];
 const LETTER = 6.6; // width of a letter at 12 px, on average
+const pen = document.createElement("canvas").getContext("2d");
+pen.font = '12px system-ui, "Segoe UI", sans-serif';
+const wide = (text) => pen.measureText(text).width;
+const TURNED = 0.755, TURNED_DARK = 0.62; // shares of a cell's colour from which its number is light, or dark on a dark page
+const ROW = 15; // height of a line of names above a chart
 const NARROW = 520; // below, names of bars that take more than two fifths stand above them
 
 export const colour = (number) => `var(--series-${number % COLOURS.length}, ${COLOURS[number % COLOURS.length]})`;
@@ -19,6 +24,14 @@ export function number(value) {
   if (value === null || !Number.isFinite(value)) return "–";
   const text = Math.abs(value) >= 1e4 ? value.toFixed(0) : String(Number(value.toPrecision(5)));
   return text.replace(/^-/, "−");
+}
+
+// The value of a line at a place between its points, straight from one to the next.
+export function valueAt({ x, y }, at) {
+  const after = x.findIndex((value) => value >= at), k = Math.max(after < 0 ? x.length - 1 : after, 1);
+  if (x.length < 2 || y[k] === null || y[k - 1] === null) return null;
+  const share = Math.max(0, Math.min(1, (at - x[k - 1]) / (x[k] - x[k - 1] || 1)));
+  return y[k - 1] + share * (y[k] - y[k - 1]);
 }
 
 function range(values) {
@@ -89,33 +102,69 @@ function padded([low, high], share, logarithmic) {
   return [low === 0 ? 0 : low - pad, high === 0 ? 0 : high + pad];
 }
 
+// Rows above a chart in which the names of its vertical marks stand, so that no name meets a bar, an axis or the line of
+// another mark: of all orders and sides the one with the fewest crossings, then the fewest rows.
+function named(marks, x, from, to) {
+  const shown = marks.filter(([value, name]) => name && value >= x.low && value <= x.high).map(([value, name]) => ({ name, at: x.at(value), wide: wide(name) + 6 }));
+  if (shown.length > 4) return { labels: [], rows: 0 };
+  const orders = (items) => (items.length < 2 ? [items] : items.flatMap((own, k) => orders(items.filter((_, other) => other !== k)).map((rest) => [own, ...rest])));
+  let best = { worth: Infinity, labels: [], rows: 0 };
+  for (const order of orders(shown))
+    for (let sides = 0; sides < 3 ** order.length; sides++) {
+      const labels = [];
+      let worth = 0;
+      for (let k = 0; k < order.length && worth < best.worth; k++) {
+        const own = order[k];
+        const side = ["start", "end", "middle"][Math.floor(sides / 3 ** k) % 3], middle = side === "middle"; // over its mark where neither side has room
+        const low = middle ? Math.max(from, Math.min(to - own.wide, own.at - own.wide / 2)) : side === "end" ? own.at - own.wide : own.at, high = low + own.wide;
+        if (middle) worth += 0.5;
+        if (low < from) worth += from - low;
+        if (high > to) worth += high - to;
+        const meets = (other) => low < other.high + 8 && other.low < high + 8;
+        let row = 0;
+        for (const other of labels) if (meets(other)) row = Math.max(row, other.row + 1);
+        for (const other of labels) if (other.row < row && own.at > other.low - 3 && own.at < other.high + 3 && own.at !== other.at) worth += 30;
+        labels.push({ ...own, side, low, high, row });
+      }
+      if (labels.length < order.length) continue;
+      const rows = Math.max(0, ...labels.map((own) => own.row + 1));
+      if (worth + rows < best.worth) best = { worth: worth + rows, labels, rows };
+    }
+  return best;
+}
+
 export class Chart {
   // The figure is a record of `tolalloc.reports.charts.chart`.
   constructor(element, figure) {
     this.element = element;
     element.classList.add("chart");
     this.zoom = null;
+    this.cursor = null; // a value of x that is marked
+    this.onCursor = null; // called with the value of x under the pointer
     this.tip = document.createElement("div");
     this.tip.className = "tip";
     this.tip.hidden = true;
     this.update(figure);
     new ResizeObserver(() => {
-      if (!this.onPaper && Math.abs(element.clientWidth - this.width) > 2) this.draw();
+      if (!this.onPaper && Math.abs(element.clientWidth - this.width) >= 1) this.draw();
     }).observe(element);
   }
 
   update(figure) {
     this.figure = figure;
-    this.draw();
+    this.draw(this.width); // its place says when it has another width: asking for it lays the page out once more
   }
 
   // Paper is as wide as it is, whatever the screen was: a chart that is only made smaller cannot be read.
-  draw(width = this.element.clientWidth) {
-    this.width = Math.max(width || 720, 240);
+  draw(width) {
+    this.width = Math.max((width ?? this.element.clientWidth) || 720, 240);
     const bars = this.figure.series?.some((item) => item.kind === "bars");
     const drawn = this.figure.values ? this.heat() : bars ? this.bars() : this.plane();
     drawn.setAttribute("role", "img");
     drawn.setAttribute("aria-label", this.figure.title);
+    // A chart that is wider than its place is scrolled, by the keyboard too.
+    if (Number(drawn.getAttribute("width")) > this.width) this.element.tabIndex = 0;
+    else this.element.removeAttribute("tabindex");
     this.element.replaceChildren(this.legend(), drawn, this.tip);
   }
 
@@ -144,11 +193,6 @@ export class Chart {
     return list;
   }
 
-  middle(left, right, label) { // of a label below the plot, which may be wider than that
-    const half = LETTER * String(label ?? "").length / 2;
-    return Math.max(half, Math.min((left + this.width - right) / 2, this.width - half));
-  }
-
   canvas(height, width = this.width) {
     return node("svg", { viewBox: `0 0 ${width} ${height}`, width, height });
   }
@@ -160,7 +204,8 @@ export class Chart {
     const positive = (values, logarithmic) => (logarithmic ? values.filter((value) => value > 0) : values);
     let [yl, yh] = padded(range(positive(extent(figure, "y"), figure.logarithmic)), 0.05, figure.logarithmic);
     const left = LETTER * Math.max(...new Axis(yl, yh, 1, 0, figure.logarithmic).ticks(5).map((v) => number(v).length), 3) + 16;
-    const right = 12, top = 24, bottom = 44;
+    const right = 12, bottom = 44, above = named(figure.vertical ?? [], new Axis(xl, xh, left, this.width - right, figure.logarithmic_x), 2, this.width - 2);
+    const top = 24 + ROW * above.rows;
     if (figure.equal) {
       const per = Math.max((xh - xl) / (this.width - left - right), (yh - yl) / (height - top - bottom));
       const wide = (per * (this.width - left - right) - (xh - xl)) / 2, tall = (per * (height - top - bottom) - (yh - yl)) / 2;
@@ -175,7 +220,11 @@ export class Chart {
     const inside = node("g", { "clip-path": `url(#${clip})` });
     svg.append(area, inside);
     figure.series.forEach((item, place) => this.series(inside, item, place, x, y));
-    this.marks(svg, x, y, { left, right, top, bottom, height });
+    this.marks(svg, x, y, { left, right, top, bottom, height, above });
+    this.marker = node("g", { class: "cursor" });
+    this.axes = { x, y, top, bottom: height - bottom };
+    svg.append(this.marker);
+    this.mark(this.cursor);
     if (figure.series.some((item) => item.kind === "line")) this.zooming(svg, x, top, height - bottom);
     svg.addEventListener("pointermove", (event) => this.point(event, svg, x, y));
     svg.addEventListener("pointerleave", () => (this.tip.hidden = true));
@@ -192,8 +241,16 @@ export class Chart {
       svg.append(node("line", { class: "grid", x1: x.at(value), x2: x.at(value), y1: top, y2: height - bottom }));
       svg.append(node("text", { class: "tick", x: x.at(value), y: height - bottom + 16, "text-anchor": "middle" }, number(value)));
     }
-    svg.append(node("text", { class: "label", x: this.middle(left, right, figure.x_label), y: height - 8, "text-anchor": "middle" }, figure.x_label));
+    this.below(svg, (left + this.width - right) / 2, height - 8, figure.x_label ?? "");
     svg.append(node("text", { class: "label", x: 4, y: 12 }, figure.y_label ?? "")); // above its axis, where it is read without turning
+  }
+
+  // The name of an axis, no farther out than the chart, and a little smaller where it is longer.
+  below(svg, middle, y, text) {
+    const half = Math.min(wide(text), this.width - 4) / 2, x = Math.max(half + 2, Math.min(this.width - half - 2, middle));
+    const label = node("text", { class: "label", x, y, "text-anchor": "middle" }, text);
+    if (wide(text) > this.width - 4) Object.entries({ textLength: this.width - 4, lengthAdjust: "spacingAndGlyphs" }).forEach(([key, value]) => label.setAttribute(key, value));
+    svg.append(label);
   }
 
   series(inside, item, place, x, y) {
@@ -207,7 +264,13 @@ export class Chart {
       });
       return text;
     };
-    if (item.kind === "line") {
+    if (item.ghost && item.kind === "stems") {
+      const wide = Math.max(3, Math.min(6, 1.1 * (x.at(1) - x.at(0))));
+      item.x.forEach((value, k) => {
+        const tall = zero - y.at(item.y[k]);
+        if (tall > 0) inside.append(node("rect", { class: "ghost", x: x.at(value) - wide / 2, y: zero - tall, width: wide, height: tall, fill: paint, opacity: 0.45 }));
+      });
+    } else if (item.kind === "line") {
       if (item.low?.length)
         inside.append(node("path", {
           d: `${path(item.x, item.high)}${path([...item.x].reverse(), [...item.low].reverse()).replace("M", "L")}Z`,
@@ -218,25 +281,32 @@ export class Chart {
       item.x.forEach((value, k) => {
         const dot = node("circle", { cx: x.at(value), cy: y.at(item.y[k]), r: 4.5, fill: paint });
         inside.append(dot);
+        if (!item.note) return;
+        // A name beside its point, on the side where it meets no mark and no edge.
+        const at = x.at(item.x[k]), long = wide(item.note) + 16, marks = (this.figure.vertical ?? []).map(([mark]) => x.at(mark));
+        const meets = (low, high) => (low < x.from || high > x.to) + marks.filter((mark) => mark > low && mark < high).length;
+        const end = meets(at + 5, at + long) > meets(at - long, at - 5);
+        inside.append(node("text", { class: "note", x: x.at(item.x[k]) + (end ? -9 : 9), y: y.at(item.y[k]) - 7, "text-anchor": end ? "end" : "start" }, item.note));
       });
     } else {
-      const count = this.figure.series.length, histogram = item.kind === "histogram";
+      const drawn = this.figure.series.filter((own) => !own.ghost), count = drawn.length, histogram = item.kind === "histogram";
       const wide = histogram ? Math.max(x.at(item.x[0] + item.width) - x.at(item.x[0]) - 0.6, 0.6) : Math.max(2, Math.min(10, 0.28 * (x.at(1) - x.at(0))));
       item.x.forEach((value, k) => {
         const tall = zero - y.at(item.y[k]);
-        const shift = histogram ? 0 : (place - (count - 1) / 2) * wide - wide / 2;
+        const shift = histogram ? 0 : (drawn.indexOf(item) - (count - 1) / 2) * wide - wide / 2;
         if (tall > 0) inside.append(node("rect", { x: x.at(value) + shift, y: zero - tall, width: wide, height: tall, fill: paint, opacity: histogram ? 0.55 : 1 }));
       });
     }
   }
 
-  marks(svg, x, y, { left, right, top, bottom, height }) {
-    (this.figure.vertical ?? []).forEach(([value, name], row) => {
-      if (value < x.low || value > x.high) return;
-      const at = x.at(value), end = at > 0.7 * this.width;
-      svg.append(node("line", { class: "mark", x1: at, x2: at, y1: top, y2: height - bottom }));
-      svg.append(node("text", { class: "mark", x: at + (end ? -5 : 5), y: top + 12 + 15 * row, "text-anchor": end ? "end" : "start" }, name));
-    });
+  marks(svg, x, y, { left, right, top, bottom, height, above }) {
+    for (const [value] of this.figure.vertical ?? [])
+      if (value >= x.low && value <= x.high) svg.append(node("line", { class: "mark", x1: x.at(value), x2: x.at(value), y1: top, y2: height - bottom }));
+    for (const { name, at, side, low, high, row } of above.labels) {
+      svg.append(node("line", { class: "mark", x1: at, x2: at, y1: top - ROW * row - (side === "middle" ? 0 : 12), y2: top }));
+      const place = { start: at + 5, end: at - 5, middle: (low + high) / 2 }[side];
+      svg.append(node("text", { class: "mark", x: place, y: top - ROW * row - 3, "text-anchor": side }, name));
+    }
     (this.figure.horizontal ?? []).forEach(([value, name]) => {
       if (value < y.low || value > y.high) return;
       svg.append(node("line", { class: "mark", x1: left, x2: this.width - right, y1: y.at(value), y2: y.at(value) }));
@@ -244,24 +314,37 @@ export class Chart {
     });
   }
 
+  // Mark a value of x, as far as the chart shows it, on the line that is no ghost.
+  mark(value) {
+    this.cursor = value;
+    if (!this.marker) return;
+    const { x, y, top, bottom } = this.axes, own = this.figure.series.findLast((item) => !item.ghost && item.kind === "line");
+    this.marker.replaceChildren();
+    if (value === null || !own || value < x.low || value > x.high) return;
+    const at = x.at(value), here = valueAt(own, value);
+    this.marker.append(node("line", { x1: at, x2: at, y1: top, y2: bottom }));
+    if (here !== null && here >= y.low && here <= y.high) this.marker.append(node("circle", { cx: at, cy: y.at(here), r: 4 }));
+  }
+
   bars() {
     const { figure } = this, items = figure.series.filter((item) => item.kind === "bars");
     const names = items[0].x;
     const longest = Math.max(...names.map((name) => String(name).length), 4);
     const narrow = this.width < NARROW && 16 + LETTER * longest > 0.4 * this.width;
-    const left = narrow ? 12 : Math.min(16 + LETTER * longest, 0.45 * this.width), right = 16, top = 8;
-    const row = (narrow ? 16 : 4) + 14 * items.length + 4, height = top + row * names.length + 44;
-    const svg = this.canvas(height);
+    const left = narrow ? 12 : Math.min(16 + LETTER * longest, 0.45 * this.width), right = 16;
+    const row = (narrow ? 16 : 4) + 14 * items.length + 4;
     const values = items.flatMap((item) => [0, ...item.y, ...(item.low ?? []), ...(item.high ?? [])]);
     const marked = (figure.vertical ?? []).map(([value]) => value);
     const positive = figure.logarithmic_x ? values.filter((value) => value > 0) : [...values, ...marked];
     const [low, high] = padded(range(positive), 0.03, figure.logarithmic_x);
     const x = new Axis(low, high, left, this.width - right, figure.logarithmic_x);
+    const above = named(figure.vertical ?? [], x, 2, this.width - 2), top = 8 + ROW * above.rows, height = top + row * names.length + 44;
+    const svg = this.canvas(height);
     for (const value of x.ticks(Math.max(3, (this.width - left) / 110))) {
       svg.append(node("line", { class: "grid", x1: x.at(value), x2: x.at(value), y1: top, y2: height - 44 }));
       svg.append(node("text", { class: "tick", x: x.at(value), y: height - 28, "text-anchor": "middle" }, number(value)));
     }
-    svg.append(node("text", { class: "label", x: this.middle(left, right, figure.x_label), y: height - 8, "text-anchor": "middle" }, figure.x_label));
+    this.below(svg, (left + this.width - right) / 2, height - 8, figure.x_label ?? "");
     const zero = x.at(figure.logarithmic_x ? low : Math.max(low, Math.min(0, high)));
     names.forEach((name, place) => {
       const from = top + row * place + (narrow ? 16 : 2);
@@ -275,7 +358,7 @@ export class Chart {
         if (item.low?.length) svg.append(node("path", { class: "interval", d: `M${x.at(item.low[place])} ${at + 7}H${x.at(item.high[place])}M${x.at(item.low[place])} ${at + 4}v6M${x.at(item.high[place])} ${at + 4}v6` }));
       });
     });
-    this.marks(svg, x, new Axis(0, 1, height, 0), { left, right, top, bottom: 44, height });
+    this.marks(svg, x, new Axis(0, 1, height, 0), { left, right, top, bottom: 44, height, above });
     return svg;
   }
 
@@ -294,7 +377,7 @@ export class Chart {
         const box = node("rect", { class: "cell", x: left + cell * place, y: tall * row, width: cell - 1, height: tall - 1, "fill-opacity": share.toFixed(3) });
         this.tell(box, `${name}, ${figure.x_label} ${String(column).replace("\n", " ")}: ${number(value)} ${figure.label}`);
         svg.append(box);
-        svg.append(node("text", { class: share > 0.55 ? "cell strong" : "cell", x: left + cell * (place + 0.5), y: tall * row + 15, "text-anchor": "middle" }, figure.texts[row][place]));
+        svg.append(node("text", { class: `cell${share > TURNED ? " turned" : ""}${share > TURNED_DARK ? " turned-dark" : ""}`, x: left + cell * (place + 0.5), y: tall * row + 15, "text-anchor": "middle" }, figure.texts[row][place]));
       });
     });
     const below = tall * figure.rows.length + 15;
@@ -315,6 +398,7 @@ export class Chart {
     const box = svg.getBoundingClientRect(), scale = this.width / box.width;
     const at = (event.clientX - box.left) * scale;
     if (at < x.from || at > x.to) return void (this.tip.hidden = true);
+    this.onCursor?.(x.value(at));
     const rows = [], names = [];
     this.figure.series.forEach((item) => {
       if (!item.x.length) return;

@@ -152,9 +152,10 @@ export function follow(mechanism, root = document) {
 }
 
 export class Mechanism {
-  constructor(element, scene, { onPoint = () => {}, onChoose = () => {}, controls = true } = {}) {
+  constructor(element, scene, { onPoint = () => {}, onChoose = () => {}, onTurn = () => {}, errorAt = null, controls = true } = {}) {
     this.element = element;
-    this.handlers = { onPoint, onChoose };
+    this.handlers = { onPoint, onChoose, onTurn };
+    this.errorAt = errorAt; // a finer curve of the forward turn: its error [arcsec] at an angle of the carrier [°]
     this.withControls = controls;
     this.phase = 0;
     this.sense = 1;
@@ -195,6 +196,12 @@ export class Mechanism {
   turn(phase) {
     this.phase = ((phase % 1) + 1) % 1;
     this.draw();
+  }
+
+  /** Turn to an angle of the carrier [°], in the turn that is shown. */
+  turnTo(angle) {
+    const turns = this.scene.output_turns, whole = Math.floor(this.phase * turns + 1e-9);
+    this.turn((whole + Math.min(Math.max(angle / 360, 0), 1 - 1e-9)) / turns);
   }
 
   /** Run; for readers who asked for less motion one step of a crank's turn instead. */
@@ -546,10 +553,12 @@ export class Mechanism {
     const pose = this.pose;
     for (const paint of this.painters) paint(pose);
     this.tell(pose);
+    this.handlers.onTurn(degrees(this.carrierAngle) % 360);
   }
 
   tell(pose) {
-    const turn = degrees(this.carrierAngle), seconds = degrees(pose.state.error) * 3600;
+    const turn = degrees(this.carrierAngle), own = degrees(pose.state.error) * 3600;
+    const seconds = (this.sense > 0 ? this.errorAt?.(turn % 360) : null) ?? own;
     const touching = pose.contacts.map((own) => own.filter(({ force }) => force > 0).length).join(" and ");
     this.stated.textContent =
       `Errors, gaps and displacements are drawn ${short(pose.magnification)} times larger. Carrier at ${turn.toFixed(2)}°, ` +

@@ -14,7 +14,7 @@ from tolalloc.allocation.space.requirement import USUAL_YIELD
 from tolalloc.exceptions import InputError
 from tolalloc.models.model import Units
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE
-from tolalloc.reducers import FRICTION_TORQUE, PRELOAD, RADIAL_CLEARANCE
+from tolalloc.reducers import FRICTION_TORQUE, PEAK_TO_PEAK, PRELOAD, RADIAL_CLEARANCE
 from tolalloc.reducers.contact import contact_of
 from tolalloc.reducers.cycloid.clearance import LARGE, is_large
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
@@ -73,6 +73,7 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
     simulated = "simulated reducers"
     settings_word = "modification"
     uncertain_name = "identified stiffness"
+    curve_height = PEAK_TO_PEAK
 
     @property
     def outcomes(self) -> Mapping[int, str]:

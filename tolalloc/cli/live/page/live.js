@@ -1,8 +1,12 @@
 // The live page: what a hand does becomes a design, a design becomes answers, a newer design calls off older ones.
 
 import { Chart, colour, number } from "./chart.js";
+import { CostChart } from "./cost.js";
+import { Cursor } from "./cursor.js";
 import { Designs } from "./designs.js";
+import { Ghosts } from "./ghosts.js";
 import { Picture } from "./picture.js";
+import { Question } from "./question.js";
 import { Refusal, ask, refusable, trouble } from "./requests.js";
 import { named, percent, quantile, verdict } from "./verdict.js";
 import { Zones, make } from "./zones.js";
@@ -10,9 +14,14 @@ import { Zones, make } from "./zones.js";
 const at = (id) => document.getElementById(id);
 const REST = 350; // ms after which a hand rests and more units are asked for
 
-let turn = 0, study, zones, designs, picture, drawn = null, judged = null, busy = false, waiting = false, resting = null, swept = null;
+let turn = 0, study, zones, designs, picture, question, cursor, costChart, drawn = null, judged = null, busy = false, waiting = false, resting = null, swept = null;
+let shownState = "", judgedDesign = "", ranked = "", savedDesign = null, scaled = null, found = null, goodUnit = 1;
 const history = { past: [], future: [], now: null };
-const charts = new Map();
+const charts = new Map(), ghosts = new Ghosts();
+const same = (one, other) => JSON.stringify(one) === JSON.stringify(other);
+const unit = () => Number(at("unit").value);
+const state = (record = { design: zones.design, unit: unit() }) => JSON.stringify([record.design, record.unit]);
+const TODAY = { name: "as drawn", design: { zones: {}, settings: {} }, colour: "var(--faint)" };
 
 function draw(key, element, figure) {
   if (!charts.has(key)) {
@@ -24,90 +33,154 @@ function draw(key, element, figure) {
   caption.textContent = `${figure.title}.`;
 }
 
+// Numbers that do not belong to the design and the unit that are set are greyed at once, and until theirs are there.
+function belongs() {
+  document.body.classList.toggle("moving", shownState !== state());
+  const counting = judgedDesign !== JSON.stringify(zones.design);
+  document.body.classList.toggle("counting", counting);
+  at("answer").classList.toggle("stale", counting);
+  question.belongs(zones.design);
+  at("zones").classList.toggle("older", ranked !== "" && ranked !== JSON.stringify(zones.design));
+  picture.belongs();
+  const values = study.conditions.map(([name, value]) => [name, typeof value === "number" && name in zones.chosen ? zones.setting(name) : value]);
+  at("conditions").textContent = [...values.map(([name, value]) => (name.endsWith("]") ? name.replace(/ ?\[(.*)\]$/, ` ${number(value)} $1`) : `${name} ${value}`)), `seed ${study.seed}`, ...study.limits].join(" · ");
+}
+
 // Price and curve at once; while one request is under way the newest design waits, and what older ones count is called off.
 async function look() {
+  belongs();
   if (busy) return void (waiting = true);
   busy = true;
   clearTimeout(resting);
-  let record;
+  let record, refusal;
   try {
     do {
       waiting = false;
-      record = { design: zones.design, unit: Number(at("unit").value), turn: ++turn };
-      drawn = await ask("design", record);
-      trouble("");
-      showDesign(record.turn);
+      record = { design: zones.design, unit: unit(), turn: ++turn };
+      refusal = await answered(record);
     } while (waiting);
-  } catch (error) {
-    if (!(error instanceof Refusal)) throw error;
-    return;
   } finally {
     busy = false;
   }
+  if (refusal) return refused(record.design, refusal);
   if (await count(study.first, record)) resting = setTimeout(() => more(record), REST);
+}
+
+// Show what a design costs; where it is refused, return why.
+async function answered(record) {
+  try {
+    drawn = await ask("design", record, true);
+  } catch (error) {
+    if (!(error instanceof Refusal)) throw error;
+    return error.message;
+  }
+  trouble("");
+  zones.good = record.design;
+  showDesign(record);
+  return "";
+}
+
+// The row whose value was refused says why, and the last good design returns.
+function refused(design, sentence) {
+  if (!zones.good || same(zones.good, design)) return void trouble(sentence);
+  if (same(history.past.at(-1), zones.good)) history.past.pop();
+  history.now = zones.good;
+  sessionStorage.setItem(kept(), JSON.stringify(zones.good));
+  zones.refuse(sentence);
+  buttons();
+  return look();
 }
 
 // Return whether the units were counted and are still those of the design that is shown.
 async function count(units, record) {
-  try {
-    const found = await ask("units", { ...record, units });
-    if (found["called off"] || record.turn !== turn) return false;
-    judged = found;
-    showUnits(record.turn);
-    return true;
-  } catch (error) {
-    if (!(error instanceof Refusal)) throw error;
-    return false;
-  }
+  const told = await refusable(ask("units", { ...record, units }));
+  if (!told || told["called off"] || record.turn !== turn) return false;
+  judged = told;
+  judgedDesign = JSON.stringify(record.design);
+  showUnits(record.turn);
+  return true;
 }
 
-// More and more of the same units while the hand rests.
+// More and more of the same units while the hand rests, then what stands behind them: ghosts, other limits, pinned designs.
 async function more(record) {
   if (!(await count(Math.min(1024, study.most), record))) return;
   const said = await refusable(ask("examined", record));
   if (said && record.turn === turn) at("cautions").replaceChildren(...said.sentences.map((text) => make("p", {}, text)));
   await picture.follow();
-  await count(study.most, record);
+  await haunt(record);
+  if (!(await count(study.most, record))) return;
+  await scale(record);
+  for (const own of designs.pinned) {
+    if (own.units >= study.most || record.turn !== turn) continue;
+    const told = await refusable(ask("units", { turn: record.turn, design: own.design, units: study.most }));
+    if (!told || told["called off"]) return;
+    designs.refine(own, told);
+  }
 }
 
-function showDesign(shown) {
+// What stands behind curve and orders: the pinned designs, or the drawing.
+const behind = () => (designs.pinned.length ? designs.pinned : zones.isDrawn ? [] : [TODAY]);
+
+async function haunt(record) {
+  const asked = async (design, own) => (record.turn === turn ? (await refusable(ask("design", { turn: record.turn, design, unit: own })))?.figures : null);
+  if ((await ghosts.follow(behind(), record.unit, asked)) && record.turn === turn && !swept) curves(drawn.figures);
+}
+
+// What the drawing costs at other limits, at the settings that are shown.
+async function scale(record) {
+  const settings = JSON.stringify(record.design.settings);
+  if (scaled?.settings === settings || record.turn !== turn) return;
+  scaled = null;
+  const told = await refusable(ask("scaled", { turn: record.turn, design: { zones: {}, settings: record.design.settings } }));
+  if (!told?.designs) return;
+  scaled = { settings, designs: told.designs };
+  costChart.update();
+}
+
+function showDesign(record) {
   const change = drawn.cost - drawn.before;
   at("cost").textContent = drawn.cost.toFixed(2);
   at("cost-change").textContent = Math.abs(change) < 5e-4 ? `${study.currency}, as drawn` : `${study.currency}, ${change > 0 ? "+" : "−"}${Math.abs(change).toFixed(2)} to the drawing's ${drawn.before.toFixed(2)}`;
-  at("answer").classList.add("stale");
   zones.show(drawn);
   at("values").textContent = drawn.values.map((own) => `${own.name} ${own.value === null ? "without an answer" : `${number(own.value)} ${own.unit}`}`).join(" · ");
   unsweep();
+  shownState = state(record);
   curves(drawn.figures);
-  at("answer").dataset.drawn = shown;
+  at("answer").classList.add("stale");
+  belongs();
+  at("answer").dataset.drawn = record.turn;
 }
 
-// Curve and orders, the curves of pinned designs behind the first.
+// Curve and orders, those of other designs behind them.
 function curves(figures) {
   figures.forEach((figure, place) => {
-    const ghosts = place === 0 ? designs.ghosts : [];
-    draw(`curve ${place}`, at("curves"), { ...figure, height: place ? 200 : 260, series: [...ghosts, ...figure.series.map((own, k) => ({ ...own, colour: colour(k) }))] });
+    const series = [...ghosts.of(behind(), unit(), place), ...figure.series.map((own, k) => ({ ...own, colour: colour(k) }))];
+    const shown = { ...figure, height: place ? 200 : 260, series };
+    draw(`curve ${place}`, at(place ? "orders" : "curves"), shown);
+    if (!place) cursor.show(charts.get("curve 0"), shown);
   });
 }
 
 function showUnits(shown) {
-  at("answer").classList.remove("stale");
   const [share, low, high] = judged.yield;
   at("yield").textContent = percent(share);
   at("yield").classList.toggle("bad", high < judged.target);
-  at("yield-interval").textContent = `${percent(low)} … ${percent(high)} (95 %)`;
-  at("counted").textContent = `${judged.units} random units${judged.lost ? `, ${judged.lost} without an answer` : ""}`;
-  at("quantiles").replaceChildren(...judged.outputs.flatMap((own) => own.quantiles.map((item) => quantile(own, item))));
+  at("yield-interval").textContent = `${(100 * low).toFixed(2)} … ${percent(high)} (95 %)`;
+  at("counted").textContent = `${judged.units.toLocaleString("en-US")} random units${judged.lost ? `, ${judged.lost} without an answer` : ""}`;
+  for (const own of at("numbers").querySelectorAll(".quantile")) own.remove();
+  at("numbers").append(...judged.outputs.flatMap((own) => own.quantiles.map((item) => quantile(own, item))));
   at("verdict").textContent = verdict(judged);
-  at("verdict").className = high < judged.target ? "bad" : "";
+  at("verdict").className = `of-units${high < judged.target ? " bad" : ""}`;
   judged.outputs.forEach((own, place) => {
     const marks = [[own.upper, "limit"], [own.lower, "limit"], ...own.quantiles.map(({ share, value }) => [value, named(share)])].filter(([value]) => value !== null);
     draw(`units ${place}`, at("histograms"), {
-      title: `${own.name} of ${judged.units} random units`, x_label: own.output, y_label: "share of the units [%]", height: 210,
+      title: `${own.name} of ${judged.units.toLocaleString("en-US")} random units`, x_label: own.output, y_label: "share of the units [%]", height: 210,
       series: [{ label: "random units", kind: "histogram", ...own.histogram }], vertical: marks.map(([value, name]) => [value, `${name} ${number(Number(value.toPrecision(4)))} ${own.unit}`]), horizontal: [],
     });
   });
   for (const button of document.querySelectorAll("[data-unit]")) button.disabled = button.dataset.unit === "reject" && judged.outputs[0].reject === null;
+  costChart.update();
+  belongs();
   at("answer").dataset.judged = shown;
   at("answer").dataset.units = judged.units;
 }
@@ -151,9 +224,8 @@ async function pin() {
   if (!judged || dataset.judged !== dataset.drawn) return;
   const values = Object.fromEntries([...zones.groups].map(([group, members]) => [`${group} [µm]`, zones.zone(members[0].name)]));
   for (const own of study.settings) values[own.name] = zones.setting(own.name);
-  const own = drawn.figures[0]?.series.at(-1);
-  designs.pin({ units: judged.units, design: zones.design, cost: drawn.cost, yield: judged.yield, outputs: judged.outputs, values, curve: own ?? {} });
-  curves(drawn.figures);
+  ghosts.known.set(ghosts.key(zones, unit()), drawn.figures);
+  designs.pin({ units: judged.units, design: zones.design, cost: drawn.cost, yield: judged.yield, outputs: judged.outputs, values });
 }
 
 // One error of the unit goes over its zone; curve and orders follow a slider.
@@ -190,33 +262,47 @@ function unlocked(found) {
   return Object.fromEntries(Object.entries(kept).filter(([name, zone]) => zone !== zones.drawn[name]));
 }
 
-async function question(kind) {
-  const said = at("asked"), held = [...zones.locked];
-  at("stop").hidden = false;
-  at("found").replaceChildren();
-  charts.delete("found");
-  const names = study.sources.filter((own) => held.includes(own.group)).map((own) => own.name);
-  let state = await refusable(ask("ask", { question: kind, design: zones.design, locked: names }));
-  while (state && !state.answer && !state.error) {
-    said.textContent = `${kind}: ${state.stage}, ${state.units} units, ${state.seconds} s`;
-    await new Promise((done) => setTimeout(done, 500));
-    state = await ask("state");
-    if (!state.kind) state.error = "The server was started again: ask once more.";
-  }
-  at("stop").hidden = true;
-  if (!state) return;
-  if (state.error) return void (said.textContent = state.error === "stopped" ? "Stopped." : state.error);
-  said.textContent = `${kind}, asked at the quick effort, took ${state.seconds} s.`;
-  const told = state.answer.sentences.map((text) => make("p", {}, text)), rest = told.splice(3);
-  at("found").replaceChildren(...told, ...(rest.length ? [make("details", {}, make("summary", {}, "what else it says"), ...rest)] : []),
-    ...state.answer.warnings.map((text) => make("p", { class: "warning" }, text)));
-  if (state.answer.figure) draw("found", at("found"), state.answer.figure);
-  if (state.answer.shares) {
-    zones.show(null, state.answer.shares);
+// What a question found of a design: what drives it shades rows and picture, a cheapest drawing stands in the chart of cost.
+function tookAnswer(answer, design) {
+  if (answer.shares) {
+    ranked = JSON.stringify(design);
+    zones.show(null, answer.shares);
     picture.shade();
   }
-  if (state.answer.zones) at("found").prepend(make("button", { onclick: () => take({ zones: unlocked(state.answer.zones), settings: { ...zones.design.settings, ...state.answer.settings } }) }, "Take this drawing"));
+  if (answer.front) found = { front: answer.front };
+  costChart.update();
+  belongs();
 }
+
+function refuseUnit(sentence) {
+  at("unit").setAttribute("aria-invalid", Boolean(sentence));
+  at("unit-refused").hidden = !sentence;
+  at("unit-refused").textContent = sentence;
+}
+
+// Pinned designs are kept for a page that is loaded again; ghosts and the chart of cost follow them.
+function pinsChanged() {
+  sessionStorage.setItem(`pinned ${kept()}`, JSON.stringify(designs.pinned));
+  costChart.update();
+  if (drawn && !swept) curves(drawn.figures);
+}
+
+// Those that the drawing still knows, at what they cost now.
+async function restorePins() {
+  const known = [];
+  for (const own of JSON.parse(sessionStorage.getItem(`pinned ${kept()}`) ?? "[]")) {
+    try {
+      const { cost } = await ask("design", { turn, design: own.design }, true);
+      known.push({ ...own, cost, units: 0 });
+    } catch (error) {
+      if (!(error instanceof Refusal)) throw error;
+    }
+  }
+  if (known.length) designs.restore(known);
+}
+
+// A design that was neither drawn nor saved is lost with the page.
+const unsaved = () => !zones.isDrawn && JSON.stringify(zones.design) !== savedDesign;
 
 async function save() {
   at("saving-error").hidden = true;
@@ -227,10 +313,13 @@ async function save() {
 async function saved(event) {
   event.preventDefault();
   try {
-    const found = await ask("save", { design: zones.design, name: at("saving-name").value });
+    const { design } = zones, told = await ask("save", { design, name: at("saving-name").value }, true);
     at("saving").close();
-    at("saved").textContent = `Saved as ${found.script} with ${found.table}. tolalloc run ${found.script} confirms it.`;
+    savedDesign = JSON.stringify(design);
+    sessionStorage.setItem(`saved ${kept()}`, savedDesign);
+    at("saved").replaceChildren(`Saved as ${told.script} with ${told.table}. To confirm it, paste into a terminal: `, make("code", {}, told.command));
   } catch (error) {
+    if (!(error instanceof Refusal)) throw error;
     at("saving-error").hidden = false;
     at("saving-error").textContent = error.message;
   }
@@ -240,9 +329,8 @@ async function begin() {
   study = await ask("study");
   document.title = `${study.name}, live`;
   at("name").textContent = `${study.model}: ${study.name}`;
-  at("conditions").textContent = [...study.conditions.map(([name, value]) => (name.endsWith("]") ? name.replace(/ ?\[(.*)\]$/, ` ${number(value)} $1`) : `${name} ${value}`)), `seed ${study.seed}`, ...study.limits].join(" · ");
   at("currency").textContent = study.currency;
-  designs = new Designs(at("designs"), { currency: study.currency, take: (own) => take(own.design) });
+  designs = new Designs(at("designs"), { currency: study.currency, take: (own) => take(own.design), changed: pinsChanged });
   zones = new Zones(study, at("zones"), at("settings"), {
     changed: (design, settled) => {
       if (settled) remember(design);
@@ -252,15 +340,38 @@ async function begin() {
     point: (names) => picture.light(names),
   });
   picture = new Picture(study, zones, () => {
-    const record = { design: zones.design, unit: Number(at("unit").value) };
+    const record = { design: zones.design, unit: unit() };
     return swept ? { ...record, source: swept.source, share: swept.figure.series[0].x[at("effect-share").value] } : record;
+  }, { onTurn: (angle) => cursor.mark(angle), errorAt: (angle) => cursor.valueAt(angle) });
+  cursor = new Cursor({ turned: (angle) => picture.turnTo(angle), pointed: (angle) => picture.runs || picture.turnTo(angle) });
+  costChart = new CostChart(at("cost-choice"), () => ({ judged, cost: drawn?.cost, currency: study.currency, pins: designs.pinned, scaled: scaled?.designs, found, byProcess: study.sources.some((own) => own.processes.length) }), (figure) => draw("costs", at("costs"), figure));
+  question = new Question({
+    asked: () => ({ design: zones.design, locked: study.sources.filter((own) => zones.locked.has(own.group)).map((own) => own.name) }),
+    answered: tookAnswer,
+    draw: (figure) => {
+      charts.delete("found");
+      draw("found", at("found"), figure);
+    },
+    take: (zoned, settings) => {
+      const design = { zones: unlocked(zoned), settings: { ...zones.design.settings, ...settings } };
+      take(design);
+      return design;
+    },
   });
   history.now = zones.design;
   at("unit").max = study.most;
-  at("unit").addEventListener("change", look);
+  at("unit").addEventListener("change", () => {
+    const wanted = at("unit").value, good = /^\d+$/.test(wanted) && Number(wanted) <= study.most;
+    refuseUnit(good ? "" : `“${wanted}” is no unit: write a whole number up to ${number(study.most)}, 0 for exact parts.`);
+    at("unit").value = good ? wanted : goodUnit;
+    goodUnit = unit();
+    if (good) look();
+  });
   for (const button of document.querySelectorAll("[data-unit]"))
     button.addEventListener("click", () => {
       at("unit").value = button.dataset.unit === "exact" ? 0 : judged?.outputs[0][button.dataset.unit] ?? 1;
+      goodUnit = unit();
+      refuseUnit("");
       look();
     });
   at("search").addEventListener("input", (event) => zones.find(event.target.value));
@@ -271,11 +382,13 @@ async function begin() {
   at("save").addEventListener("click", save);
   at("saving").addEventListener("submit", saved);
   at("saving-cancel").addEventListener("click", () => at("saving").close());
-  at("ask-ranking").addEventListener("click", () => question("ranking"));
-  at("ask-allocation").addEventListener("click", () => question("allocation"));
-  at("stop").addEventListener("click", () => ask("stop"));
   at("effect-share").addEventListener("input", follow);
-  if (innerWidth <= 900) at("moving").open = false; // zones would stand far below it
+  const narrow = matchMedia("(max-width: 900px)");
+  at("moving").open = !narrow.matches; // zones would stand far below it
+  const place = () => (narrow.matches ? at("zones-panel").before(at("pictures")) : at("zones-panel").after(at("pictures"))); // tabs go as the eye does
+  narrow.addEventListener("change", place);
+  place();
+  addEventListener("beforeunload", (event) => unsaved() && event.preventDefault());
   at("moving").addEventListener("toggle", () => judged && picture.follow());
   at("effect-close").addEventListener("click", () => {
     unsweep();
@@ -291,6 +404,8 @@ async function begin() {
   });
   const last = JSON.parse(sessionStorage.getItem(kept()) ?? "null");
   if (last && study.sources.length) history.now = last;
+  savedDesign = sessionStorage.getItem(`saved ${kept()}`);
+  await restorePins();
   zones.take(history.now);
   buttons();
   await look();

@@ -7,8 +7,25 @@ const at = (id) => document.getElementById(id);
 
 export class Picture {
   // asked() returns the record of the scene to show.
-  constructor(study, zones, asked) {
-    Object.assign(this, { study, zones, asked, mechanism: null, shown: "", busy: false });
+  // onTurn(angle) is called when it turns; errorAt(angle) is the error of the curve [arcsec] at an angle of the carrier [°].
+  constructor(study, zones, asked, { onTurn, errorAt }) {
+    Object.assign(this, { study, zones, asked, onTurn, errorAt, mechanism: null, shown: "", pictured: "", busy: false, angle: 0 });
+  }
+
+  // The picture is that of an earlier design or unit until it has followed.
+  belongs() {
+    at("moving").classList.toggle("older", Boolean(this.mechanism) && JSON.stringify(this.asked()) !== this.pictured);
+  }
+
+  get runs() {
+    return Boolean(this.mechanism) && this.mechanism.running !== null;
+  }
+
+  // Stand at an angle of the carrier [°].
+  turnTo(angle) {
+    this.angle = angle;
+    if (this.runs) this.mechanism.pause();
+    if (at("moving").open) this.mechanism?.turnTo(angle);
   }
 
   get places() {
@@ -21,17 +38,30 @@ export class Picture {
     this.busy = true;
     for (let key; at("moving").open && (key = JSON.stringify(this.asked())) !== this.shown; this.shown = key) {
       const found = await refusable(ask("scene", JSON.parse(key)));
-      if (found) this.show(found.scene);
+      if (!found) continue;
+      this.show(found.scene);
+      this.pictured = key;
     }
     this.busy = false;
+    this.belongs();
   }
 
   show(scene) {
     at("moving").hidden = !scene;
     if (!scene) return void (at("moving").dataset.none = "yes");
     if (this.mechanism) this.mechanism.update(scene);
-    else this.mechanism = new Mechanism(at("mechanism"), scene, { onPoint: (id) => this.zones.light(this.sourcesAt(id)), onChoose: (id) => this.goTo(this.sourcesAt(id)) });
+    else this.begin(scene);
     this.shade();
+  }
+
+  begin(scene) {
+    const { angle } = this, onPoint = (id) => this.zones.light(this.sourcesAt(id)), onChoose = (id) => this.goTo(this.sourcesAt(id));
+    const onTurn = (now) => {
+      this.angle = now;
+      this.onTurn(now);
+    };
+    this.mechanism = new Mechanism(at("mechanism"), scene, { onPoint, onChoose, onTurn, errorAt: this.errorAt });
+    this.mechanism.turnTo(angle);
   }
 
   sourcesAt(id) {

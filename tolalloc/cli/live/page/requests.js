@@ -9,7 +9,8 @@ let away = false;
 // The server refused a request, in one sentence.
 export class Refusal extends Error {}
 
-export async function ask(name, record = {}) {
+// A refusal is said at the top of the page, unless it is silent because a row says it.
+export async function ask(name, record = {}, silent = false) {
   for (;;) {
     let answer, found;
     try {
@@ -17,16 +18,18 @@ export async function ask(name, record = {}) {
       found = await answer.json();
     } catch {
       away = true;
+      document.body.classList.add("away");
       trouble("The server does not answer. Start tolalloc open again on the same study: the page then goes on with this design.");
       await new Promise((done) => setTimeout(done, AGAIN));
       continue;
     }
     if (away) {
       away = false;
+      document.body.classList.remove("away");
       trouble("");
     }
     if (answer.ok) return found;
-    trouble(found.error);
+    if (!silent) trouble(found.error);
     throw new Refusal(found.error);
   }
 }

@@ -10,7 +10,7 @@ export const percent = (share) => `${(100 * share).toFixed(2)} %`;
 export function quantile(own, { share, value, interval }) {
   const limit = share < 0.5 ? own.lower : own.upper, beyond = value !== null && (share < 0.5 ? value < limit : value > limit);
   const end = (known) => (known === null ? "more units needed" : number(Number(known.toPrecision(4))));
-  return make("div", {}, make("dt", {}, `${own.name}, ${named(share)}`),
+  return make("div", { class: "of-units quantile" }, make("dt", {}, `${own.name}, ${named(share)}`),
     make("dd", { class: beyond ? "bad" : "" }, `${value === null ? "–" : number(Number(value.toPrecision(4)))} ${own.unit}`),
     make("dd", { class: "small" }, `${end(interval[0])} … ${end(interval[1])} (95 %)`));
 }

@@ -1,5 +1,7 @@
 // The list of zones and settings: a slider, a field and a lock for every group of sources.
 
+import { number } from "./chart.js";
+
 export const MICRO = "µm";
 
 function make(name, attributes = {}, ...children) {
@@ -14,7 +16,17 @@ function make(name, attributes = {}, ...children) {
 export { make };
 
 const STEPS = 400; // of a slider
+const THUMB = 16; // width of the handle of a slider [px]
 const rounded = (value) => Number(value.toPrecision(4));
+const fine = (value) => Number(value.toPrecision(7)); // of what follows by a ratio, which many moves shall not wear off
+
+// A change as a reader writes it: its sign, its amount, and its share of what is drawn.
+export function change(now, drawn, unit) {
+  const by = rounded(now) - rounded(drawn), sign = by < 0 ? "−" : "+";
+  if (!by) return "as drawn";
+  const share = drawn > 0 ? ` (${sign}${number(rounded(Math.abs(100 * (now / drawn - 1))).toPrecision(3) * 1)} %)` : "";
+  return `${sign}${number(rounded(Math.abs(by)))} ${unit}${share}`;
+}
 
 // What somebody typed, in a unit: decimal comma or point, a true minus, a unit behind it. Nothing where it may mean two
 // numbers, as 1,000 may, or where its unit is not one of lengths and neither is the one that is asked for.
@@ -24,6 +36,11 @@ export function typed(text, unit = MICRO) {
   const [, sign, digits, power = "", stated] = found, lengths = { [MICRO]: 1, mm: 1000 };
   const factor = stated ? (stated.toLowerCase() === "mm" ? lengths.mm : 1) / (lengths[unit] ?? NaN) : 1;
   return (sign === "-" || sign === "−" ? -1 : 1) * Number(digits.replace(",", ".") + power) * factor;
+}
+
+// A mark at a share of a slider.
+function placed(mark, share) {
+  mark.style.left = `calc(${THUMB / 2}px + (100% - ${THUMB}px) * ${Math.max(0, Math.min(1, share)).toFixed(4)})`;
 }
 
 export class Zones {
@@ -37,7 +54,12 @@ export class Zones {
     this.groups = new Map();
     for (const own of study.sources) this.groups.set(own.group, [...(this.groups.get(own.group) ?? []), own]);
     this.rows = new Map();
+    this.good = null; // the last design that the server accepted
     this.build();
+  }
+
+  get isDrawn() {
+    return !Object.keys(this.design.zones).length && Object.entries(this.design.settings).every(([name, value]) => value === this.chosen[name]);
   }
 
   zone(name) {
@@ -55,36 +77,55 @@ export class Zones {
 
   row(group, members) {
     const [first] = members, many = members.length > 1;
-    const lower = Math.max(...members.map((own) => (own.lower / own.zone) * first.zone));
-    const upper = Math.min(...members.map((own) => (own.upper / own.zone) * first.zone));
+    // The ends of the slider: as far as all members go at the ratio in which they stand, or else the first one alone.
+    const ends = () => {
+      const shares = members.map((own) => this.zone(first.name) / this.zone(own.name));
+      const low = Math.max(...members.map((own, k) => own.lower * shares[k])), high = Math.min(...members.map((own, k) => own.upper * shares[k]));
+      return low < high ? [low, high] : [first.lower, first.upper];
+    };
+    let [lower, upper] = ends(), held = null; // zones of all members when the hand took hold of the slider
     const at = (place) => lower * (upper / lower) ** (place / STEPS);
     const place = (zone) => (STEPS * Math.log(zone / lower)) / Math.log(upper / lower);
     const name = many ? group : first.name;
     const set = (zone, settled) => {
-      if (!(zone > 0) || !Number.isFinite(zone)) return this.show();
-      const scale = zone / first.zone;
-      for (const own of members) this.put(own.name, own === first ? zone : rounded(own.zone * scale));
+      held ??= members.map((own) => this.zone(own.name));
+      members.forEach((own, k) => this.put(own.name, k ? fine((held[k] * zone) / held[0]) : zone));
+      if (settled) held = null;
+      this.accept();
       this.show();
       this.changed(this.design, settled);
     };
-    const field = make("input", { inputmode: "decimal", "aria-label": `zone of ${name} in ${MICRO}`, onchange: (e) => set(typed(e.target.value), true) });
+    const read = (text) => {
+      const zone = typed(text);
+      if (zone > 0 && Number.isFinite(zone)) return zone;
+      row.refuse(`“${text}” is no zone: write a number above 0, such as 4 or 0.004 mm.`);
+      return null;
+    };
+    const field = make("input", { inputmode: "decimal", "aria-label": `zone of ${name} in ${MICRO}`, onchange: (e) => {
+      const zone = read(e.target.value);
+      if (zone === null) this.show();
+      else set(zone, true);
+    } });
     const slider = make("input", {
-      type: "range", min: 0, max: STEPS, step: 1, "aria-label": `zone of ${name}, from ${lower.toPrecision(3)} to ${upper.toPrecision(3)} ${MICRO}`,
+      type: "range", min: 0, max: STEPS, step: 1, "aria-label": `zone of ${name}`,
       oninput: (e) => set(rounded(at(Number(e.target.value))), false), onchange: (e) => set(rounded(at(Number(e.target.value))), true),
     });
-    const lock = make("button", { title: "lock: an allocation leaves it as it is", "aria-label": `lock ${name}`, onclick: () => this.toggle(group) });
-    const price = make("span", { class: "price", title: "cost" });
+    const lock = make("button", { title: "lock: an allocation leaves it as it is", onclick: () => this.toggle(group) });
+    const price = make("span", { class: "price of-design", title: "cost" }), delta = make("small", { class: "delta" });
+    const drawn = make("i", { class: "drawn", title: `drawing: ${number(rounded(first.zone))} ${MICRO}` });
     const share = make("div", { class: "share", hidden: true });
     const labels = [...new Set(members.map((own) => own.label).filter(Boolean))];
     const about = make("small", {}, [...labels, many ? `${members.length} alike: ${first.meaning}` : first.meaning].join(" · "));
     const row = make("div", { class: "row", onpointerenter: () => this.point(members.map((own) => own.name)), onpointerleave: () => this.point([]) },
-      make("span", { class: "title" }, name, make("br"), about), make("span", {}, field, ` ${MICRO}`), lock, price,
-      make("span", { class: "slide" }, slider, make("button", { title: "effect of this source over its zone", "aria-label": `effect of ${first.name}`, onclick: () => this.effect(first.name) }, "effect")), share);
+      make("span", { class: "title" }, name, make("br"), about), make("span", {}, field, ` ${MICRO}`), lock, price, delta,
+      make("span", { class: "slide" }, make("span", { class: "track" }, slider, drawn), make("button", { title: "effect of this source over its zone", "aria-label": `effect of ${first.name}`, onclick: () => this.effect(first.name) }, "effect")), share);
     if (many) {
       const fields = members.map((own) => {
         const input = make("input", { inputmode: "decimal", "aria-label": `zone of ${own.name} in ${MICRO}`, onchange: (e) => {
-          const zone = typed(e.target.value);
-          if (zone > 0 && Number.isFinite(zone)) this.put(own.name, zone);
+          const zone = read(e.target.value);
+          if (zone === null) return this.show();
+          this.put(own.name, zone);
+          this.accept();
           this.show();
           this.changed(this.design, true);
         } });
@@ -100,12 +141,18 @@ export class Zones {
     if (made) row.insertBefore(make("label", { class: "process" }, "cheapest by ", made), share);
     Object.assign(row, { update: (costs, shares, by) => {
       const zone = this.zone(first.name);
+      if (held === null) [lower, upper] = ends(); // they stay while the hand holds the slider
+      slider.setAttribute("aria-valuetext", `${number(rounded(zone))} ${MICRO}, from ${lower.toPrecision(3)} to ${upper.toPrecision(3)}`);
+      placed(drawn, place(first.zone) / STEPS);
+      const alike = members.every((own) => Math.abs(this.zone(own.name) / own.zone / (zone / first.zone) - 1) < 1e-3);
+      delta.textContent = alike ? change(zone, first.zone, MICRO) : "members differ";
       field.value = rounded(zone);
       slider.value = Math.round(place(zone));
-      const held = this.locked.has(group);
-      lock.textContent = held ? "locked" : "lock";
-      lock.setAttribute("aria-pressed", held);
-      for (const input of [field, slider, ...(made ? [made] : []), ...(row.fields ?? []).map(([, own]) => own)]) input.disabled = held;
+      const locked = this.locked.has(group);
+      lock.textContent = locked ? "locked" : "lock";
+      lock.setAttribute("aria-label", `${lock.textContent} ${name}`);
+      lock.setAttribute("aria-pressed", locked);
+      for (const input of [field, slider, ...(made ? [made] : []), ...(row.fields ?? []).map(([, own]) => own)]) input.disabled = locked;
       (row.fields ?? []).forEach(([own, input]) => (input.value = rounded(this.zone(own.name))));
       if (made && by) made.selectedIndex = first.processes.findIndex(([process]) => process === by[first.name]);
       if (costs) price.textContent = members.reduce((sum, own) => sum + costs[own.name], 0).toFixed(2);
@@ -116,6 +163,7 @@ export class Zones {
         share.title = `${own.toFixed(1)} % of the sum of all total indices`;
       }
     } });
+    this.refusable(row, [field, ...(row.fields ?? []).map(([, own]) => own)]);
     this.rows.set(group, row);
     return row;
   }
@@ -123,17 +171,26 @@ export class Zones {
   settingRow(own) {
     const fixed = own.lower >= own.upper, unit = /\[([^\]]*)\]$/.exec(own.name)?.[1] ?? "";
     const set = (value, settled) => {
-      if (!Number.isFinite(value)) return this.show();
-      this.design = { ...this.design, settings: { ...this.design.settings, [own.name]: Math.max(own.lower, Math.min(own.upper, value)) } };
+      this.design = { ...this.design, settings: { ...this.design.settings, [own.name]: value } };
+      this.accept();
       this.show();
       this.changed(this.design, settled);
     };
-    const field = make("input", { inputmode: "decimal", disabled: fixed, "aria-label": own.name, onchange: (e) => set(typed(e.target.value, unit), true) });
-    const slider = make("input", { type: "range", min: own.lower, max: own.upper, step: own.step || 1, disabled: fixed, "aria-label": `${own.name}, from ${own.lower} to ${own.upper}`,
+    const field = make("input", { inputmode: "decimal", disabled: fixed, "aria-label": own.name, onchange: (e) => {
+      const value = typed(e.target.value, unit);
+      if (Number.isFinite(value) && value >= own.lower && value <= own.upper) return set(value, true);
+      row.refuse(`“${e.target.value}” is not allowed: write a number from ${number(own.lower)} to ${number(own.upper)}.`);
+      this.show();
+    } });
+    const delta = make("small", { class: "delta" }), drawn = make("i", { class: "drawn", hidden: fixed, title: `study: ${number(own.value)} ${unit}` });
+    const slider = make("input", { type: "range", min: own.lower, max: own.upper, step: own.step || 1, disabled: fixed, "aria-label": `${own.name}, from ${number(own.lower)} to ${number(own.upper)}`,
       oninput: (e) => set(rounded(Number(e.target.value)), false), onchange: (e) => set(rounded(Number(e.target.value)), true) });
     const note = make("small", {}, fixed ? "as drawn: the study gives no bounds" : own.word);
-    const row = make("div", { class: "row" }, make("span", { class: "title" }, own.name, make("br"), note), field, "", "", make("span", { class: "slide" }, slider));
+    const row = make("div", { class: "row" }, make("span", { class: "title" }, own.name, make("br"), note), make("span", { class: "alone" }, field), delta, make("span", { class: "slide" }, make("span", { class: "track" }, slider, drawn)));
+    this.refusable(row, [field]);
     row.update = () => {
+      placed(drawn, (own.value - own.lower) / (own.upper - own.lower || 1));
+      delta.textContent = fixed ? "" : change(this.setting(own.name), own.value, unit);
       field.value = rounded(this.setting(own.name));
       slider.value = this.setting(own.name);
     };
@@ -143,7 +200,7 @@ export class Zones {
 
   put(name, zone) {
     const zones = { ...this.design.zones };
-    if (zone === this.drawn[name]) delete zones[name];
+    if (Math.abs(zone - this.drawn[name]) <= 1e-6 * this.drawn[name]) delete zones[name];
     else zones[name] = zone;
     this.design = { ...this.design, zones };
   }
@@ -151,6 +208,37 @@ export class Zones {
   toggle(group) {
     if (!this.locked.delete(group)) this.locked.add(group);
     this.show();
+  }
+
+  // A row says why a value was refused, it alone, until something else is accepted.
+  refusable(row, fields) {
+    const sentence = make("p", { class: "refusal", role: "alert", hidden: true });
+    row.append(sentence);
+    row.mark = (text) => {
+      row.classList.toggle("refused", Boolean(text));
+      sentence.hidden = !text;
+      sentence.textContent = text;
+      for (const own of fields) own.setAttribute("aria-invalid", Boolean(text));
+    };
+    row.refuse = (text) => {
+      this.accept();
+      row.mark(text);
+    };
+  }
+
+  // No row is marked any more: something else was accepted, or refused.
+  accept() {
+    for (const row of this.rows.values()) row.mark("");
+  }
+
+  // Design and rows that a server refused: they alone are marked, and the last good values return.
+  refuse(sentence) {
+    const { design, good } = this;
+    const changed = [...this.rows].filter(([key]) => (key.startsWith("setting ") ? design.settings[key.slice(8)] !== good.settings[key.slice(8)]
+      : this.groups.get(key).some(({ name }) => design.zones[name] !== good.zones[name])));
+    this.accept();
+    for (const [, row] of changed) row.mark(sentence);
+    this.take(good);
   }
 
   // Take over a whole design: an earlier one, a pinned one, or what an allocation found.
