@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _say = Sentences("ranking")
+_ALIKE = 9
+"""Decimals of a value over the largest one to which equal ones are alike, so that no last digit orders them [-]."""
 
 
 def of_positions(name: str, columns: Mapping[str, Any], rows: Iterable[int]) -> Table[int]:
@@ -58,7 +60,9 @@ def _reader(column: Any) -> Any:
 
 def largest_first(values: Sequence[float] | np.ndarray) -> list[int]:
     """Return the positions of values, largest first, equal ones in their order."""
-    return [int(at) for at in np.argsort(-np.asarray(values), kind="stable")]
+    known = np.asarray(values, float)
+    size = float(np.abs(known[np.isfinite(known)]).max(initial=0.0)) or 1.0
+    return [int(at) for at in np.argsort(-np.round(known / size, _ALIKE), kind="stable")]
 
 
 def sobol_table(sobol: SobolIndices) -> pd.DataFrame:
