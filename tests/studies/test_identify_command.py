@@ -147,7 +147,14 @@ def test_the_report_folder_is_complete(run):
     assert load_identified_stiffness(run.report / "identified.stiffness.toml").values
     sheets = pd.read_excel(run.report / "results.xlsx", sheet_name=None)
     assert list(sheets)[:2] == ["answer", "contents"]
-    assert set(sheets) == {"answer", "contents", "parameters", "directions", "choices", "units", "assumptions"}
+    assert set(sheets) == {
+        "charts",
+        "data of charts",
+        "answer",
+        "contents",
+        "assumptions",
+        *(Path(name).stem for name in tables),
+    }
     assert len(sheets["units"]) == 6
 
 

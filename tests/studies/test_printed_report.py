@@ -159,7 +159,7 @@ def test_a_printed_report_has_lost_nothing(written, tmp_path, paper, size):
     said = " ".join(text.split())
     assert "Allocation: sentence 4 on the yield." in said
     assert "Ranking: sentence 4 on the yield." not in said
-    assert "The answer in full: in the report" in said
+    assert "More on this answer: in the report" in said
     assert text.count("⌀0.0047") == 2
     assert "Both" in pages[0] and "drawing number" in pages[0] and "⌀0.0047" in pages[0]
     continued = [page for page in pages if ".part59." in page]

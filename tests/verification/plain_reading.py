@@ -86,7 +86,12 @@ def made(value: Any) -> Any:
 
 
 def _text(content: bytes) -> str:
-    return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    """Return a text in UTF-8, or as offices save a table: in Windows-1252 where one byte or more is none of UTF-8."""
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = content.decode("utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "cp1252")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def _meant(text: str) -> object:

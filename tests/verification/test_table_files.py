@@ -169,6 +169,10 @@ def test_all_tables_are_read_alike(tmp_path):
     ("content", "sentence"),
     [
         (b"name,note\na,5 \x81\n", r"row 2 looks like Windows-1252 \(cp1252\); save it as CSV UTF-8\.$"),
+        (
+            "name,note\na,5 µm\nb,".encode() + b"\xe4\n",
+            r"row 3 looks like Windows-1252 \(cp1252\); save it as CSV UTF-8\.$",
+        ),
         (b"\xff\xfex\n1", r"row 2 looks like UTF-16; save it as CSV UTF-8\.$"),
         (b"a,b\n1,2,3\n", "row 2: 3 cells stand under 2 headers; numbers have a decimal point, and .* by ','"),
         (b"a;b\n1;2;3\n", "row 2: 3 cells stand under 2 headers; cells are separated by ';'"),

@@ -85,13 +85,13 @@ _OFFICES = {"UTF-16": "utf-16", "Windows-1252": "cp1252"}
 
 
 def _encoding(content: bytes) -> str:
-    """Return how a text that is not UTF-8 is most likely written; nothing where it is UTF-8."""
+    """Return how a text that is not UTF-8 is most likely written; nothing where it is UTF-8, also a damaged one."""
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "UTF-16"
     try:
         content.decode("utf-8")
     except UnicodeDecodeError:
-        return "Windows-1252"
+        return "Windows-1252" if content.decode("utf-8", "ignore").isascii() else ""
     return ""
 
 
