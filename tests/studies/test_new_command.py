@@ -123,17 +123,6 @@ def test_every_sample_is_read_by_its_command(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_sample_of_a_bad_unit_is_bad_where_it_says(tmp_path):
-    place = tmp_path / "mine"
-    assert tolalloc("new", place, "--with", "curve").returncode == 0
-    assert "pitch of the housing is bad" in (place / "unit7.csv").read_text(encoding="utf-8").splitlines()[0]
-    drawn = ("--reducer", place / "reducer.toml", "--tolerances", place / "zones.csv")
-    found = tolalloc("diagnose", place / "unit7.csv", *drawn, "--json")
-    assert found.returncode == 0, found.stderr
-    assert json.loads(found.stdout)["named"][0] == "housing.pitch"  # a random search may leave others less likely
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("cranks", [2, 3, 4])
 def test_a_newcomer_asks_what_a_zone_does(tmp_path, cranks):
     place = tmp_path / "mine"

@@ -49,7 +49,7 @@ def change_cells(path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("cranks", "questions"), [(2, "ta.Allocation"), (3, "ta.Ranking"), (4, "ta.Allocation")])
+@pytest.mark.parametrize(("cranks", "questions"), [(2, "ta.Allocation"), (3, "ta.Ranking")])
 def test_a_newcomer_comes_from_nothing_to_an_answer(tmp_path, cranks, questions):
     place = tmp_path / "mine"
     assert tolalloc("new", place, "--cranks", cranks).returncode == 0
