@@ -127,6 +127,8 @@ def test_members_of_a_group_share_one_zone_inside_the_ranges_of_all():
 
 PUBLISHED_FITS = {
     ("h5", 25): (0, -9),
+    ("h01", 25): (0, -0.6),
+    ("h1", 25): (0, -1.5),
     ("H7", 25): (21, 0),
     ("g6", 25): (-7, -20),
     ("f7", 60): (-30, -60),
@@ -168,7 +170,7 @@ def test_deviations_of_a_fit_are_those_of_the_standard(fit, size):
     assert found == pytest.approx(PUBLISHED_FITS[fit, size], abs=1e-9)
 
 
-@pytest.mark.parametrize("fit", ["z6", "K9", "h19", "h", "ZC8"])
+@pytest.mark.parametrize("fit", ["z6", "K9", "K0", "P2", "h19", "h", "ZC8"])
 def test_a_fit_that_is_not_known_is_refused(fit):
     with pytest.raises(InputError, match=f"ISO 286-2: fit is '{fit}'; allowed is"):
         fit_deviations(fit, 0.04)

@@ -94,13 +94,20 @@ FAULTS = (
 )
 
 
-@pytest.mark.parametrize("kind", FAULTS, ids=lambda kind: kind.__name__)
-def test_whatever_else_a_function_raises_is_its_fault_said_with_its_line(kind):
+def raising(kind):
+    """Return a function that raises an exception of a kind for large values, in its second line."""
+
     def broken(height):
         if height > 1.0:
             raise kind("no such pin")
         return height
 
+    return broken
+
+
+@pytest.mark.parametrize("kind", FAULTS, ids=lambda kind: kind.__name__)
+def test_whatever_else_a_function_raises_is_its_fault_said_with_its_line(kind):
+    broken = raising(kind)
     line = broken.__code__.co_firstlineno + 2
     with pytest.raises(InputError) as caught:
         returned(broken, 1, np.array([[0.5], [2.0], [0.7]]))
@@ -114,12 +121,9 @@ NO_ANSWERS = (ValueError, ZeroDivisionError, OverflowError, FloatingPointError, 
 
 @pytest.mark.parametrize("kind", NO_ANSWERS, ids=lambda kind: kind.__name__)
 def test_a_calculation_that_fails_leaves_one_unit_without_an_answer(kind):
-    def broken(height):
-        if height > 1.0:
-            raise kind("does not converge")
-        return height
-
-    assert returned(broken, 1, np.array([[0.5], [2.0], [0.7]]))[:, 0] == pytest.approx([0.5, np.nan, 0.7], nan_ok=True)
+    assert returned(raising(kind), 1, np.array([[0.5], [2.0], [0.7]]))[:, 0] == pytest.approx(
+        [0.5, np.nan, 0.7], nan_ok=True
+    )
 
 
 def test_a_root_finder_that_does_not_converge_leaves_one_unit_without_an_answer():

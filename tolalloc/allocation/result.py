@@ -300,11 +300,11 @@ def limit_step(side: OneSidedConstraint) -> float:
     [0.01, 1.0]
     """
     size = abs(side.limit) or side.scale
-    return float(10.0 ** np.floor(np.log10(size / 10) + _ROUNDING)) if size > 0 else 1.0
+    return float(10.0 ** np.floor(np.log10(size / 10) + _OF_A_LOGARITHM)) if size > 0 else 1.0
 
 
-_ROUNDING = 1e-9
-"""What a logarithm may lose [-]."""
+_OF_A_LOGARITHM = 1e-9
+"""What rounding may take of a logarithm [-]."""
 
 
 def limit_price(side: OneSidedConstraint, price: float) -> tuple[float, str]:

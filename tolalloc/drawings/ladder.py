@@ -97,7 +97,7 @@ def grade_zones(nominal: float) -> dict[str, float]:
     return {grade: zone for grade, zone in zones.items() if not (too_small and grade in _COARSE)}
 
 
-SHAFTS = {
+_SHAFTS = {
     "d": (-20, -30, -40, -50, -65, -80, -100, -120, -145, -170, -190, -210, -230),
     "e": (-14, -20, -25, -32, -40, -50, -60, -72, -85, -100, -110, -125, -135),
     "f": (-6, -10, -13, -16, -20, -25, -30, -36, -43, -50, -56, -62, -68),
@@ -111,10 +111,12 @@ SHAFTS = {
 """Fundamental deviation of a shaft in every size step, of d to h the upper one, of the others the lower one; of k from
 IT4 to IT7, 0 in other grades [µm]."""
 _FIT = re.compile(r"(js|JS|[A-Za-z])\s?(\d{1,2})|IT\s?(\d{1,2})")
+_FINEST = 3
+"""Finest grade of a hole K to P [-]."""
 _CORRECTED = {"K": 8, "M": 8, "N": 8, "P": 7}
 """Holes of these letters are a step of grades tighter than the shafts that they mirror, up to this grade."""
 _OF_K = range(4, 8)
-FITS = "d to h, js, k, m, n and p, the same of holes in capitals, or IT, with a grade, such as h5, H7 or IT6"
+_FITS = "d to h, js, k, m, n and p, the same of holes in capitals, or IT, with a grade, such as h5, H7 or IT6"
 """Fits that are known."""
 
 
@@ -144,19 +146,22 @@ def fit_deviations(fit: str, nominal: float) -> tuple[float, float]:
     [[0.0, -16.0], [25.0, 0.0], [-9.0, -25.0], [7.0, -18.0], [31.0, -31.0]]
     """
     found = _FIT.fullmatch(fit)
-    letter, number = (found[1] or "js", int(found[2] or found[3])) if found else ("", 0)
+    letter, grade = (found[1] or "js", found[2] or found[3]) if found else ("", "")
     step, zones = _size_step(nominal), grade_zones(nominal)
-    width, small = zones.get(f"IT{number}", 0.0), letter.lower()
-    if not width or small not in (*SHAFTS, "js"):
-        raise InputError.at("ISO 286-2", "fit", fit, FITS)
+    width, small = zones.get(f"IT{grade}", 0.0), letter.lower()  # IT01 is another grade than IT1
+    if not width or small not in (*_SHAFTS, "js"):
+        raise InputError.at("ISO 286-2", "fit", fit, _FITS)
     if small == "js":
         return width / 2, -width / 2
-    own = SHAFTS[small][step] if small != "k" or number in _OF_K or letter == "K" else 0
+    number = int(grade)
+    own = _SHAFTS[small][step] if small != "k" or number in _OF_K or letter == "K" else 0
     size = own * MICROMETRE
     if letter == small:
         return (size, size - width) if small <= "h" else (size + width, size)
     if letter <= "H":
         return width - size, 0.0 - size
+    if number < _FINEST:
+        raise InputError.at("ISO 286-2", "fit", fit, f"{letter} from grade {_FINEST} on")
     if number <= _CORRECTED[letter]:
         raised = width - zones[f"IT{number - 1}"] if step else 0.0
         size -= raised if (fit, SIZE_STEPS[step]) != ("M6", 315) else raised + 2 * MICROMETRE

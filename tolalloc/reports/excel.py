@@ -24,7 +24,7 @@ from tolalloc.reading.units import in_cost_units, unit_of
 from tolalloc.reports.figure import Figure, shares
 
 _MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
-_FORMATS = {"µm": "0.0##", "mm": "0.0000", "%": "0.0", "cost units": "0.00", "arcsec": "0.00", "arcmin": "0.000"}
+_FORMATS = {"µm": "0.0##", "mm": "0.0000", "%": "0.0#", "cost units": "0.00", "arcsec": "0.00", "arcmin": "0.000"}
 """Unit in a header → format of its numbers."""
 
 
@@ -36,10 +36,10 @@ _CHARTS, _SERIES, _POINTS = 8, 4, 2000
 """Charts of a workbook, series of one and points of one, at most [-]."""
 _WIDE, _ROW, _PAPER = 13.0, 0.53, 17.0
 """Width of a chart, height of a row of its sheet, and height of what a sheet of paper holds [cm]."""
+_COLUMN = 8.5
+"""Width of a column of the sheet of charts [characters]."""
 _LINE = 110
 """Characters of a line of the answer, with room for wide ones [-]."""
-_COLUMN = 8.5
-"""Width of a column of that sheet [characters]."""
 
 
 @dataclass(frozen=True)

@@ -117,6 +117,11 @@ class Portrait(Generic[Own]):
         return self._said("remarks", ())
 
     @property
+    def not_included(self) -> str:
+        """What may move the outputs of a part in use and is not computed, as the end of a sentence."""
+        return "wear and temperature"
+
+    @property
     def spectra_note(self) -> str:
         """Which sources show at which orders, a clause that begins a sentence; nothing unless a model knows."""
         return ""

@@ -79,7 +79,7 @@ class Teller(ABC, Generic[Result]):
 
     @property
     def headline(self) -> tuple[str, ...]:
-        """What a terminal says in place of all tables and sentences; nothing where it says everything."""
+        """What a terminal, and a first page behind another answer, says in short; nothing where all is said."""
         return ()
 
     @property

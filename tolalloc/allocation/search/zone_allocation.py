@@ -572,11 +572,18 @@ def allocate(
     start
         A verified design to start from, the best of proportional scaling if there is none; with the reducer's own
         modification it tells tolerances alone from tolerances and modification together.
+
+    Raises
+    ------
+    FailedUnitsError
+        Of every design inside the ranges that was tried too many units have no answer.
     """
     first, space = start or cheapest_met(proportional_tried), verifier.space
     # Proportional scaling has no bounds; a start that keeps them is an answer like any other.
     stepped = step_to_optimum(verifier, first, effort.steps, effort.reach)
-    tried = ((first,) if space.allows(first.design) or not stepped else ()) + stepped
+    tried = ((first,) if space.allows(first.design) else ()) + stepped
+    if not tried:
+        raise FailedUnitsError("Of every drawing inside the ranges that was tried too many units have no answer.")
     tried = tuple(own.divided(tried[-1].parts) for own in tried)
     chosen = cheapest_met(tried)
     return ZoneAllocation(

@@ -14,7 +14,7 @@ from tolalloc.allocation.space.requirement import USUAL_YIELD
 from tolalloc.exceptions import InputError
 from tolalloc.models.model import Units
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE
-from tolalloc.reducers import FRICTION_TORQUE, PEAK_TO_PEAK, PRELOAD, RADIAL_CLEARANCE
+from tolalloc.reducers import DISC_TEMPERATURE, FRICTION_TORQUE, PEAK_TO_PEAK, PRELOAD, RADIAL_CLEARANCE
 from tolalloc.reducers.contact import contact_of
 from tolalloc.reducers.cycloid.clearance import LARGE, is_large
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
@@ -107,6 +107,11 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
         """Rigidity and lost motion beside the catalogue's."""
         sentence, _ = against_catalogue(self.model.reducer, self.model.exact_loop_in_force)
         return (sentence,) if sentence else ()
+
+    @property
+    def not_included(self) -> str:
+        """Wear; temperature too where the study states none."""
+        return "wear" if DISC_TEMPERATURE in self.model.conditions else super().not_included
 
     @property
     def spectra_note(self) -> str:
@@ -434,7 +439,7 @@ def _crank_turn_figure(curves: Mapping[str, Equilibria], reducer: Reducer) -> Fi
 def _crank_turn(label: str, curve: Equilibria, disc_teeth: int) -> Series:
     """Return the curve of a unit folded onto one turn of the crankshafts."""
     phase = (curve.carrier_angle * disc_teeth / (2 * np.pi)) % 1.0
-    place = np.minimum((phase * _PHASES + 0.5).astype(int) % _PHASES, _PHASES - 1)
+    place = (phase * _PHASES + 0.5).astype(int) % _PHASES
     errors = curve.transmission_error[0] / ARCSECOND
     parts = [errors[place == at] for at in range(_PHASES)]
     known = [at for at, own in enumerate(parts) if own.size]

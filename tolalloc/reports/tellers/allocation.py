@@ -133,7 +133,7 @@ class AllocationTeller(Teller[AllocationResult]):
             heading=_say("heading_today"),
             figures=(figures.units_figure(result), *effects_figure(result)),
             tables=((table.name, table.frame(unit)),),
-            paragraphs=(texts.capability_change(result),),
+            paragraphs=texts.capability_change(result),
             first=True,
         )
 

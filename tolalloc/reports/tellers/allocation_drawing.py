@@ -216,34 +216,19 @@ def effects_figure(result: AllocationResult) -> tuple[Figure, ...]:
 
 def risks(result: AllocationResult) -> tuple[str, ...]:
     """Return what can go wrong with the drawing: in the shop, with its first driver, and beyond what was computed."""
-    found = []
-    name, members = min(
-        ((result.line_name(own), own[1]) for own in result.lines),
-        key=lambda line: _change(_paired(result, line[1][0])),
-    )
-    before, after = _paired(result, members[0])
-    if (change := _change((before, after))) < -_NOTICED:
+    found, driver = [], next(iter(effects(result).items()), ("", 0.0))
+    name, members = min(dimensions_table(result).rows, key=lambda row: _change(row[1][0]))
+    before, after = members[0]
+    if (change := _change(members[0])) < -_NOTICED:
         zones = {"before": before.zone / MICROMETRE, "after": after.zone / MICROMETRE}
         found.append(_say("risk_tightest", name=name, change=-change / 100, **zones))
-    left = -result.chosen.checks[0].tightest.excess
-    for name, effect in list(effects(result).items())[:1]:
-        moved = {"effect": with_unit(f"{abs(effect):.2g}", result.leading), "output": short(result.leading)}
-        if result.met and effect > 0:
-            found.append(_say("risk_driver", name=name, step=_STEP, left=_left(left, result.leading), **moved))
-    if not any(value for name, value in result.model.conditions.items() if "warmer" in name or "temperature" in name):
-        found.append(_say("risk_not_included"))
+    if result.met and driver[1] > 0:
+        left = max(-result.chosen.checks[0].tightest.excess, 0.0)
+        moved = {"effect": driver[1], "left": left}
+        said = {key: with_unit(f"{value:.2g}", result.leading) for key, value in moved.items()}
+        found.append(_say("risk_driver", name=driver[0], step=_STEP, output=short(result.leading), **said))
+    found.append(_say("risk_not_included", what=portrait_of(result.model).not_included))
     return tuple(found)
-
-
-def _left(distance: float, output: str) -> str:
-    """Return a distance to a limit, none below 0."""
-    return with_unit(f"{max(distance, 0.0):.2g}", output)
-
-
-def _paired(result: AllocationResult, member: Source) -> _Source:
-    """Return a source before and after."""
-    known = {own.name: own for own in result.space.errors.sources}
-    return known[member.name], member
 
 
 def zones_figure(rows: Sequence[_Source]) -> Figure:

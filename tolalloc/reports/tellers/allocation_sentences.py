@@ -180,20 +180,25 @@ def _cost(result: AllocationResult, cost_unit: str) -> str:
     return _say("cost_same" if same else "cost", before=before, cost=chosen.cost, cost_unit=cost_unit, alike=said)
 
 
-def capability_change(result: AllocationResult) -> str:
-    """Return mean, standard deviation, Cpk and share beyond the limit of the leading output, as it is and as drawn."""
+def capability_change(result: AllocationResult) -> tuple[str, ...]:
+    """Return mean, standard deviation, Cpk and share beyond the limit of the leading output, as it is and as drawn.
+
+    Nothing where the output does not vary.
+    """
     limits, leading = result.requirements[0].limits, result.leading
     gaps: dict[str, Any] = {"output": short(leading).capitalize(), "simulated": portrait_of(result.model).simulated}
     for after, design in (("_before", result.free.baseline), ("", result.chosen)):
         values = design.sample.values
-        found = capability(values[np.isfinite(values)], limits)
+        if not np.ptp(known := values[np.isfinite(values)]):
+            return ()
+        found = capability(known, limits)
         gaps |= {
             f"mean{after}": with_unit(f"{found.mean:.3g}", leading),
             f"sigma{after}": with_unit(f"{found.deviation_overall:.3g}", leading),
-            f"cpk{after}": found.ppk,
+            f"cpk{after}": found.cpk,
             f"beyond{after}": 1 - design.achieved.estimate,
         }
-    return _say("capability", **gaps)
+    return (_say("capability", **gaps),)
 
 
 def _solved(design: VerifiedDesign) -> tuple[str, ...]:
