@@ -137,6 +137,7 @@ GLOSSARY = {
     "NSGA-II": "A genetic search for designs that are each the cheapest for some limit.",
     "order": "Number of waves per turn of the output.",
     "peak-to-peak": "Largest minus smallest transmission error over one turn of the output.",
+    "Ppk": "Distance of the mean from the nearer limit over three standard deviations of all units.",
     "preloaded": "Said of a reducer whose pins press harder without torque than the rated torque presses them: it "
     "turns, but warm, worn early and without lost motion.",
     "quantile": "Value that a stated share of the units keeps.",

@@ -181,7 +181,7 @@ def _cost(result: AllocationResult, cost_unit: str) -> str:
 
 
 def capability_change(result: AllocationResult) -> tuple[str, ...]:
-    """Return mean, standard deviation, Cpk and share beyond the limit of the leading output, as it is and as drawn.
+    """Return mean, standard deviation, Ppk and share beyond the limit of the leading output, as it is and as drawn.
 
     Nothing where the output does not vary.
     """
@@ -195,7 +195,7 @@ def capability_change(result: AllocationResult) -> tuple[str, ...]:
         gaps |= {
             f"mean{after}": with_unit(f"{found.mean:.3g}", leading),
             f"sigma{after}": with_unit(f"{found.deviation_overall:.3g}", leading),
-            f"cpk{after}": found.cpk,
+            f"ppk{after}": found.ppk,
             f"beyond{after}": 1 - design.achieved.estimate,
         }
     return (_say("capability", **gaps),)
