@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from tolalloc.cli.main import run_script as run_script
     from tolalloc.cli.start import new as new
     from tolalloc.cli.start import schema as schema
+    from tolalloc.drawings.compensators import Shim as Shim
+    from tolalloc.drawings.compensators import Sorting as Sorting
     from tolalloc.drawings.drawing import Drawing as Drawing
     from tolalloc.drawings.drawing import load_drawing as drawing  # noqa: F401
     from tolalloc.drawings.seeds import SamplingDesign as SamplingDesign
@@ -114,8 +116,10 @@ _WHERE = {
     "SeedTree": "drawings.seeds",
     "Series": "reports.figure",
     "Setting": "models.settings",
+    "Shim": "drawings.compensators",
     "SobolEffort": "sensitivity.effort",
     "SolveError": "exceptions",
+    "Sorting": "drawings.compensators",
     "Study": "study.study",
     "TORSIONAL_STIFFNESS": "reducers",
     "Teller": "reports.teller",

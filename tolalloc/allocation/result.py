@@ -20,7 +20,8 @@ from tolalloc.allocation.space.joint_yield import JointRequirement
 from tolalloc.allocation.space.problem import OneSidedConstraint, Solution
 from tolalloc.allocation.space.requirement import AtYield, Check, Requirement
 from tolalloc.allocation.verify.verification import VerifiedDesign
-from tolalloc.capability.monte_carlo import Yield
+from tolalloc.capability.monte_carlo import KeptLimits, Yield
+from tolalloc.drawings.compensators import Compensator
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.sources import Source
 from tolalloc.models.model import Model
@@ -42,6 +43,43 @@ class Amount:
     value: float  # On the drawing [unit of the name]
     before: float  # In the tolerance table [unit of the name]
     tolerance: float | None = None  # Half of the zone that the table states for it, if it does [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class AssemblyChoice:
+    """One way to choose parts at assembly, and what its cheapest drawing costs."""
+
+    compensators: tuple[Compensator, ...]  # What acts
+    label: str  # In words
+    met: bool  # Whether its drawing was shown to keep the limits
+    zones_cost: float  # Of the zones [cost units]
+    assembly_cost: float  # Of classes, sizes and parts that are left over, per unit [cost units]
+    bound: float | None  # Lower bound on the cost of its zones, if there is one [cost units]
+    joint: Yield  # Share of units that keep all limits at once
+
+    @property
+    def cost(self) -> float:
+        """Cost of zones and assembly [cost units]."""
+        return self.zones_cost + self.assembly_cost
+
+
+@dataclass(frozen=True, kw_only=True)
+class AssembledDrawing:
+    """What was compared of the ways to choose parts at assembly."""
+
+    choices: tuple[AssemblyChoice, ...]
+    chosen: int  # Which of them the drawing is for
+    as_they_come: KeptLimits  # Units of the drawing if nothing is chosen
+
+    @property
+    def best(self) -> AssemblyChoice:
+        """The choice that the drawing is for."""
+        return self.choices[self.chosen]
+
+    @property
+    def nothing_chosen(self) -> AssemblyChoice | None:
+        """The choice of taking parts as they come, if it was compared."""
+        return next((own for own in self.choices if not own.compensators), None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,6 +124,8 @@ class AllocationResult:
         What the model counted of random units of the drawing, units in the names.
     statuses
         Outcome → number of units that were solved for the answer, without those that the front was searched with [-].
+    assembled
+        What was compared of the ways to choose parts at assembly, if the question names any.
     """
 
     name: str
@@ -106,6 +146,7 @@ class AllocationResult:
     examination: Mapping[str, float]
     statuses: Mapping[str, int]
     front_lacks: str = ""
+    assembled: AssembledDrawing | None = None
 
     @property
     def leading(self) -> str:

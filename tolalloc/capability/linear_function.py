@@ -133,7 +133,9 @@ class LinearLaw:
 
     @classmethod
     def of(cls, function: LinearFunction, errors: ErrorModel, zones: Float[np.ndarray, " source"]) -> LinearLaw | None:
-        """Return the law, none where a source has a distribution that cannot be folded."""
+        """Return the law, none where a source has a distribution that cannot be folded, or parts are chosen."""
+        if errors.compensators:
+            return None
         correlated = {name for block in errors.blocks if len(block) > 1 for name in block}
         for source in errors.active:
             folded = _is_normal(source) or (source.feature is Feature.SIZE and source.name not in correlated)

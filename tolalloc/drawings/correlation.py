@@ -94,11 +94,14 @@ class Correlation:
             matrix[one, other] = matrix[other, one] = pair.correlation
         return matrix
 
-    def blocks(self, sources: Sequence[Source]) -> tuple[tuple[str, ...], ...]:
-        """Return the varying sources in sets that are independent of each other, in the order of the sources."""
+    def blocks(self, sources: Sequence[Source], tied: Sequence[tuple[str, str]] = ()) -> tuple[tuple[str, ...], ...]:
+        """Return the varying sources in sets that are independent of each other, in the order of the sources.
+
+        Pairs that depend on each other otherwise than by a correlation may be given as tied.
+        """
         members = {source.name: {source.name} for source in sources if source.zone > 0.0}
-        for pair in self.among(sources):
-            joined = members[pair.one] | members[pair.other]
+        for one, other in (*((pair.one, pair.other) for pair in self.among(sources)), *tied):
+            joined = members[one] | members[other]
             members |= dict.fromkeys(joined, joined)
         ordered = (tuple(name for name in members if name in block) for block in members.values())
         return tuple(dict.fromkeys(ordered))

@@ -9,9 +9,11 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.drawings.compensators import Compensator, Shim, Sorting, sorted_together
 from tolalloc.drawings.correlation import CorrelatedSource, Correlation
 from tolalloc.drawings.distributions import ABOVE_ZERO, BELOW_ONE, ndtr, ndtri
 from tolalloc.drawings.sources import Source
+from tolalloc.exceptions import InputError
 
 
 @dataclass(frozen=True)
@@ -32,9 +34,16 @@ class ErrorModel:
     correlation: Correlation = field(default_factory=Correlation)
     # Table that the sources come from, as its user named it, for messages alone; empty where there is none
     table: str = field(default="", compare=False, repr=False)
+    # What is chosen at assembly for the units that are drawn, of those that act
+    compensators: tuple[Compensator, ...] = ()
 
     def __post_init__(self) -> None:
         self.correlation.require_sound(self.sources)
+        correlated = {name for pair in self.correlation.among(self.sources) for name in (pair.one, pair.other)}
+        for own in self._sortings:
+            if own.parts in correlated:
+                allowed = "a source that is correlated with no other; its mates may be"
+                raise InputError.at(own.called, "parts", own.parts, allowed)
 
     @cached_property
     def active(self) -> tuple[Source, ...]:
@@ -73,7 +82,8 @@ class ErrorModel:
     @cached_property
     def blocks(self) -> tuple[tuple[str, ...], ...]:
         """Names of what varies, in sets that are independent of each other."""
-        return (*self.correlation.blocks(self.sources), *((source.name,) for source in self.joint))
+        tied = sorted_together(self.compensators)
+        return (*self.correlation.blocks(self.sources, tied), *((source.name,) for source in self.joint))
 
     @property
     def block_of_column(self) -> tuple[str, ...]:
@@ -94,14 +104,18 @@ class ErrorModel:
 
     @property
     def is_correlated(self) -> bool:
-        """Whether some sources of the table depend on each other."""
-        return any(len(block) > 1 for block in self.blocks)
+        """Whether some sources of the table are correlated."""
+        return bool(self._correlated_blocks)
+
+    @property
+    def _sortings(self) -> tuple[Sorting, ...]:
+        return tuple(own for own in self.compensators if isinstance(own, Sorting))
 
     @cached_property
     def _correlated_blocks(self) -> tuple[tuple[int, ...], ...]:
-        """Positions of the sources that depend on each other."""
-        names = [source.name for source in self._varying]
-        return tuple(tuple(names.index(name) for name in block) for block in self.blocks if len(block) > 1)
+        """Positions of the sources that are correlated with each other."""
+        names, blocks = [source.name for source in self._varying], self.correlation.blocks(self.sources)
+        return tuple(tuple(names.index(name) for name in block) for block in blocks if len(block) > 1)
 
     @cached_property
     def source_correlation(self) -> Float[np.ndarray, "source source"]:
@@ -141,8 +155,14 @@ class ErrorModel:
         return self.marginal_values(self.dependent(uniform))
 
     def dependent(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
-        """Return uniform numbers with the correlation of the sources from independent ones in (0, 1) [-]."""
-        return self.mixed(uniform, self._factor)
+        """Return uniform numbers as the sources depend on each other from independent ones in (0, 1) [-].
+
+        By their correlation, and then by parts that are sorted into classes and mated.
+        """
+        found = self.mixed(uniform, self._factor)
+        for own in self._sortings:
+            own.sorted(found, self)
+        return found
 
     def mixed(
         self, uniform: Float[np.ndarray, "*sample column"], factor: Float[np.ndarray, "*#sample source source"]
@@ -180,12 +200,16 @@ class ErrorModel:
     def deviations(
         self, standard: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]
     ) -> Float[np.ndarray, "sample column"]:
-        """Return the columns [m, angles rad] that the standard values give at the zones [m]."""
+        """Return the columns [m, angles rad] that the standard values give at the zones [m], sizes chosen for them."""
         counts = [len(source.columns) for source in self._varying]
         middle = np.concatenate(
             [*(source.middles for source in self.active), *(np.zeros(len(source.columns)) for source in self.joint), []]
         )
-        return np.asarray(standard * np.repeat(zones, counts) + middle)
+        found = np.asarray(standard * np.repeat(zones, counts) + middle)
+        for own in self.compensators:
+            if isinstance(own, Shim):
+                own.shimmed(found, self)
+        return found
 
     def deviations_of_normal(
         self, numbers: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]

@@ -245,8 +245,7 @@ def _squared_gradients(
 
 def _zone_per_column(experiment: Experiment[ResponseWithDerivatives]) -> Float[np.ndarray, " column"]:
     """Return the zone of every column's source [m]."""
-    ones = np.ones((1, len(experiment.errors.columns)))
-    return np.asarray((experiment.deviations(ones) - experiment.deviations(0.0 * ones))[0])
+    return np.repeat(experiment.zones, [own.stop - own.start for own in experiment.errors.columns_of_source])
 
 
 DIRECTIONS = 16

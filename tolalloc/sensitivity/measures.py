@@ -128,8 +128,8 @@ class Measures:
         )
 
     def shapley(self) -> ShapleyEffects | None:
-        """Return the shares of correlated sources; none where all are independent."""
-        if not self.errors.is_correlated:
+        """Return the shares of correlated sources; none where all are independent, or some are sorted together."""
+        if not self.errors.is_correlated or self.errors.compensators:
             return None
         return shapley_effects(self.experiment("shapley", self.response), self.effort.permutations)
 

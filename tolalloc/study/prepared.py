@@ -18,6 +18,7 @@ from tolalloc.allocation.space.joint_yield import JointRequirement
 from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, Guarantee, OwnLimit, Requirement
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import KeptLimits
+from tolalloc.drawings.compensators import Compensator, all_choices, in_force
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, UnknownNameError
@@ -71,7 +72,19 @@ class Prepared:
         stated = {own.name: (own.stated, repr(self._processes.get(own.name))) for own in rows}
         lines: Mapping[str, str] = source.shared_lines(stated) if isinstance(source, HasCopies) else {}
         found = (replace(own, group=own.group or lines.get(own.name, own.name)) for own in self._stated.sources)
-        return replace(self._stated, sources=tuple(found))
+        return replace(self._stated, sources=tuple(found), compensators=self.assemblies[0])
+
+    @cached_property
+    def assemblies(self) -> tuple[tuple[Compensator, ...], ...]:
+        """What may act at assembly, every combination of classes and sizes; the first one is that of today.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            A source that is not there or cannot be sorted or shimmed, or too many combinations.
+        """
+        choices = all_choices(self.study.compensators, self.place)
+        return tuple(in_force(own, self._stated.sources, self.place) for own in choices)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -217,6 +230,7 @@ class Prepared:
             self.errors.sources,
             self.errors.correlation,
             self.space.processes,
+            *((self.assemblies,) if self.study.compensators else ()),
         )
         return hashlib.sha256(repr(content).encode()).hexdigest()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 from tolalloc.allocation.space.effort import QUICK_ALLOCATION, AllocationEffort
 from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, Guarantee
 from tolalloc.capability.indices import Limits
+from tolalloc.drawings.compensators import Compensator, Shim, Sorting
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.model import is_fast
 from tolalloc.reading.named_fields import NamedFields, Rule, a, mapped, number, or_none, whole
@@ -178,6 +179,10 @@ def _is_drawing(given: object) -> bool:
     return given is None or hasattr(given, "errors")
 
 
+def _are_compensators(given: object) -> bool:
+    return isinstance(given, Sequence) and all(isinstance(own, Sorting | Shim) for own in given)
+
+
 def _is_title_block(given: object) -> bool:
     return isinstance(given, Mapping) and all(
         label in _TITLE_BLOCK and isinstance(text, str) and len(text) <= _LONGEST_TEXT for label, text in given.items()
@@ -212,6 +217,9 @@ class Problem(NamedFields):
     title_block
         What the title blocks of page and drawing say beside study and date: ``drawing number``, ``revision``,
         ``author``, and ``material`` on the drawing. What is not said stays empty there, to be filled in by hand.
+    compensators
+        What is chosen at assembly, ``ta.Sorting(...)`` and ``ta.Shim(...)``: reducers are judged as they are assembled.
+        An allocation compares all numbers of classes and sizes that they state, other questions take the first.
     """
 
     called: ClassVar[str] = "study"
@@ -239,11 +247,17 @@ class Problem(NamedFields):
             f"a dictionary of texts up to {_LONGEST_TEXT} characters under {', '.join(_TITLE_BLOCK)}", _is_title_block
         ),
     ] = field(default_factory=dict)
+    compensators: Annotated[
+        "Sequence[Compensator]", Rule("several of ta.Sorting(...) and ta.Shim(...)", _are_compensators)
+    ] = ()
 
     def __post_init__(self) -> None:
         if isinstance(self.effort, str):
             object.__setattr__(self, "effort", effort_of(self.effort, self.place))
+        if isinstance(self.compensators, Sorting | Shim):
+            object.__setattr__(self, "compensators", (self.compensators,))
         super().__post_init__()
+        object.__setattr__(self, "compensators", tuple(self.compensators))
         for output, limit in self.limits.items():
             if not isinstance(limit, Limit | None):
                 allowed = "ta.Limit(...), or None to lift the model's own"

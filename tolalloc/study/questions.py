@@ -37,7 +37,7 @@ class Question(NamedFields, ABC):
 
     kind: ClassVar[str]
     reads: ClassVar[frozenset[str]] = frozenset(
-        {"model", "drawing", "limits", "seed", "largest_failed_share", "effort"}
+        {"model", "drawing", "limits", "seed", "largest_failed_share", "effort", "compensators"}
     )
 
     def __init_subclass__(cls) -> None:
@@ -162,7 +162,8 @@ class Allocation(Question):
 
     def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any]:
         """Return the cheapest drawing."""
-        from tolalloc.allocation.drawing_question import DrawingQuestion, allocate_drawing
+        from tolalloc.allocation.assembly_choice import AssembledQuestion, allocate_assembled
+        from tolalloc.allocation.drawing_question import DrawingQuestion
 
         study = prepared.study
         question = DrawingQuestion(
@@ -180,7 +181,8 @@ class Allocation(Question):
             quality_loss=self.quality_loss,
             place=prepared.place,
         )
-        found = allocate_drawing(question, record, study.name, prepared.header.digest, checkpoint)
+        asked = AssembledQuestion(question=question, choices=prepared.assemblies)
+        found = allocate_assembled(asked, record, study.name, prepared.header.digest, checkpoint)
         answer = _answer(self.kind, prepared.header, record, found)
         return replace(answer, header=replace(answer.header, statuses=found.statuses))
 

@@ -18,6 +18,7 @@ from tolalloc.reports.teller import Teller
 from tolalloc.reports.tellers import allocation_figures as figures
 from tolalloc.reports.tellers import allocation_sentences as texts
 from tolalloc.reports.tellers import allocation_tables as tables
+from tolalloc.reports.tellers.allocation_assembly import assembly_section, assembly_summary
 from tolalloc.reports.tellers.allocation_drawing import (
     dimensions_table,
     effects_figure,
@@ -95,6 +96,7 @@ class AllocationTeller(Teller[AllocationResult]):
             self._today,
             Section(heading=_say("heading_risks"), paragraphs=risks(result), first=True),
             self._dimensions,
+            *assembly_section(result, unit),
             Section(
                 heading=_say("heading_sources"),
                 figures=(zones_figure(sources.rows),),
@@ -236,6 +238,7 @@ class AllocationTeller(Teller[AllocationResult]):
             **told_yields(result.yields, chosen.joint),
             f"{short(result.leading)} kept [{unit_of(result.leading)}]": chosen.quantile_bound,
             **self._costs,
+            **assembly_summary(result),
             "blocking requirement": None if result.met else chosen.blocking.requirement.output,
             f"beyond its limit by [{unit_of(chosen.blocking.requirement.output)}]": None
             if result.met

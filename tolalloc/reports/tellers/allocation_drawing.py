@@ -23,6 +23,7 @@ from tolalloc.reports.feature_frame import Frames, callout
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
+from tolalloc.reports.tellers.allocation_assembly import assembly_notes
 from tolalloc.reports.tellers.allocation_sentences import amounts_convention, drawn_amounts
 from tolalloc.reports.tellers.allocation_sheet import drawing_sheet
 from tolalloc.reports.tellers.allocation_workbook import calculator_sheets, style_calculator
@@ -248,7 +249,8 @@ def zones_figure(rows: Sequence[_Source]) -> Figure:
 
 def write_drawing(result: AllocationResult, header: Header, folder: Path) -> None:
     """Write ``allocation.csv``, which is read back, ``drawing.xlsx``, which goes on calculating, and ``frames.dxf``."""
-    cost_unit, notes = header.cost_unit, (*drawn_amounts(result), *amounts_convention(result))
+    cost_unit = header.cost_unit
+    notes = (*drawn_amounts(result), *amounts_convention(result), *assembly_notes(result))
     write_csv(table_frame(result.drawn_sources, folder, cost_unit), folder / "allocation.csv")
     with (folder / "allocation.csv").open("a", encoding="utf-8") as file:
         file.write("".join(f"{line}\n" for line in _table_comments(result, header, notes)))

@@ -18,6 +18,7 @@ from tolalloc.capability.monte_carlo import Yield
 from tolalloc.reports.feature_frame import callout_assumptions
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import Examination, portrait_of
+from tolalloc.reports.tellers.allocation_assembly import assembly_cost_sentences
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import QUICK_RUN, number, quantity, short, with_unit
 from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
@@ -71,13 +72,14 @@ def verdict(result: AllocationResult) -> tuple[str, ...]:
 
 def headline(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     """Return the verdict and the cost."""
-    return (*verdict(result), _cost(result, cost_unit))
+    return (*verdict(result), _cost(result, cost_unit), *assembly_cost_sentences(result, cost_unit))
 
 
 def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     """Return the answer in sentences; the first ones stand in the headline of a report."""
     chosen = result.chosen
     found = [*verdict(result), *drawn_amounts(result), _cost(result, cost_unit)]
+    found += assembly_cost_sentences(result, cost_unit)
     if len(result.requirements) > 1 and not chosen.jointly:
         found.append(_say("all_limits", share=chosen.joint.estimate))
     if result.met and result.error < _EVEN_ODDS:
@@ -381,6 +383,7 @@ def assumptions(result: AllocationResult, header: Header) -> tuple[str, ...]:
         "assumed_processes" if space.processes else "assumed_costs",
         *(("assumed_settings",) if space.settings else ()),
         "assumed_correlated" if space.errors.is_correlated else "assumed_independent",
+        *(("assumed_chosen",) if result.assembled else ()),
     )
     drawn = tuple(source for source in space.errors.sources if source.zone > 0.0)
     return (*header.assumptions, *map(_say, keys), *callout_assumptions(drawn))

@@ -12,6 +12,7 @@ from tolalloc.reports.drawing_sheet import DrawingSheet, SheetTable
 from tolalloc.reports.feature_frame import INSPECTED, FeatureFrame, callout
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
+from tolalloc.reports.tellers.allocation_assembly import assembly_notes
 from tolalloc.reports.tellers.allocation_sentences import amounts_convention, drawn_amounts, examined, verdict
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import number, quantity
@@ -31,7 +32,12 @@ def drawing_sheet(result: AllocationResult, header: Header, today: date) -> Draw
         frames=tuple(_framed(result.line_name(own), callout(own[1][0])) for own in framed),
         tables=(*_inspection(result, inspected), *_amounts(result), *_datums([*framed, *inspected])),
         sketches=model.sign_sketches if result.amounts else (),
-        notes=(*drawn_amounts(result), *amounts_convention(result), verdict(result)[-1]),
+        notes=(
+            *drawn_amounts(result),
+            *amounts_convention(result),
+            *assembly_notes(result),
+            verdict(result)[-1],
+        ),
         title_block=_title_block(result, header, today),
     )
 

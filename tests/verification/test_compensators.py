@@ -1,0 +1,290 @@
+"""Parts chosen at assembly: sorted into classes and mated, or taken in the size that fits, against closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import openpyxl
+import pytest
+from scipy import optimize, stats
+from scipy.optimize import linear_sum_assignment
+
+import tolalloc as ta
+from tests.builders import baseline_errors, source
+from tolalloc.allocation.result import AllocationResult
+from tolalloc.drawings.compensators import Compensator, all_choices, assembly_cost, in_force
+from tolalloc.drawings.correlation import Correlation, Pair
+from tolalloc.drawings.distributions import Distribution
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.zones import Feature
+from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
+from tolalloc.study.prepared import Prepared
+
+UNITS = 40_000
+SIZES = tuple(source(name, zone=6e-6) for name in ("hole", "shaft", "washer"))
+SIGMA = 1e-6  # of each of them, at Cp = 1
+
+
+def errors_of(*compensators: Compensator, sources=SIZES, **others) -> ErrorModel:
+    acting = in_force(compensators, sources, "test")
+    return ErrorModel(sources, compensators=acting, **others)
+
+
+def units_of(errors: ErrorModel, units: int = UNITS, seed: int = 1) -> np.ndarray:
+    uniform = np.random.default_rng(seed).random((units, len(errors.columns)))
+    return errors.deviations(errors.standard_values(uniform), errors.zones)
+
+
+def class_means(classes: int) -> np.ndarray:
+    """Return the mean of a standard normal number in each class of equal probability, n·(φ(a) − φ(b))."""
+    ends = stats.norm.ppf(np.arange(classes + 1) / classes)
+    return classes * (stats.norm.pdf(ends[:-1]) - stats.norm.pdf(ends[1:]))
+
+
+@pytest.mark.parametrize("classes", [2, 3, 5, 8])
+@pytest.mark.parametrize("opposite", [False, True])
+def test_the_variance_of_a_gap_of_sorted_parts_has_its_closed_form(classes, opposite):
+    x = units_of(errors_of(ta.Sorting("shaft", "hole", classes=classes, opposite=opposite)))
+    gap = x[:, 0] + x[:, 1] if opposite else x[:, 0] - x[:, 1]
+    expected = 2 * SIGMA**2 * (1 - np.mean(class_means(classes) ** 2))
+    error = np.sqrt(np.var((gap - gap.mean()) ** 2) / UNITS)
+    assert abs(np.var(gap) - expected) < 4 * error
+    for column in x.T:  # sorting changes who goes with whom, and no part
+        assert stats.kstest(column, stats.norm(scale=SIGMA).cdf).pvalue > 1e-4
+
+
+@pytest.mark.parametrize(("classes", "batch"), [(2, 50), (4, 100), (6, 60)])
+def test_units_have_the_law_of_batches_that_are_assigned_exactly_and_leave_as_many_parts(classes, batch):
+    rng, batches = np.random.default_rng(5), 400
+    gaps, left = [], []
+    for _ in range(batches):
+        hole, shaft = rng.normal(size=(2, batch))
+        number = [np.floor(classes * stats.norm.cdf(own)) for own in (hole, shaft)]
+        one, other = linear_sum_assignment(number[0][:, np.newaxis] != number[1])
+        fits = number[0][one] == number[1][other]
+        gaps.append((hole[one] - shaft[other])[fits])
+        left.append(1 - fits.mean())
+    sorting = ta.Sorting("shaft", "hole", classes=classes, batch=batch)
+    assert abs(np.mean(left) - sorting.leftover) < 4 * np.std(left) / np.sqrt(batches)
+    x = units_of(errors_of(sorting))
+    assert stats.ks_2samp(np.concatenate(gaps), (x[:, 0] - x[:, 1]) / SIGMA).pvalue > 1e-4
+
+
+def test_one_class_and_one_size_choose_nothing():
+    plain = ErrorModel(SIZES)
+    chosen = errors_of(ta.Sorting("shaft", "hole", classes=1), ta.Shim("washer", step=1.0, sizes=1))
+    assert chosen == plain
+    np.testing.assert_array_equal(units_of(chosen), units_of(plain))
+
+
+def test_all_pins_of_a_unit_come_from_the_class_of_its_grooves():
+    pins = source("pins", zone=6e-6, each=8)
+    sources = (*SIZES, pins)
+    errors = errors_of(ta.Sorting("pins", "hole", classes=4), sources=sources)
+    x = units_of(errors, 2000)
+    own = np.floor(4 * stats.norm.cdf(x[:, 3:] / SIGMA))
+    assert (own == own[:, :1]).all()
+    assert (own[:, 0] == np.floor(4 * stats.norm.cdf(x[:, 0] / SIGMA))).all()
+
+
+def test_positions_are_sorted_on_each_axis():
+    sources = tuple(source(name, feature=Feature.POSITION, zone=6e-6) for name in ("one", "other"))
+    x = units_of(errors_of(ta.Sorting("one", "other", classes=3), sources=sources))
+    difference = x[:, :2] - x[:, 2:]
+    deviation = x[:, 0].std()
+    expected = 2 * deviation**2 * (1 - np.mean(class_means(3) ** 2))
+    assert np.var(difference, axis=0) == pytest.approx(expected, rel=0.04)
+    assert ta.Sorting("one", "other", classes=3).leftover_of(sources[0]) > ta.Sorting("one", "other", classes=3).leftover
+
+
+@pytest.mark.parametrize("kind", [Distribution.UNIFORM, Distribution.TRIANGULAR])
+def test_classes_of_any_distribution_hold_equally_many_parts(kind):
+    sources = tuple(source(name, zone=6e-6, distribution=kind) for name in ("hole", "shaft"))
+    sorting = ta.Sorting("shaft", "hole", classes=5)
+    x, ends = units_of(errors_of(sorting, sources=sources)), sorting.limits(sources[1])
+    counts = np.bincount(np.searchsorted(ends, x[:, 1]), minlength=5)
+    assert abs(counts - UNITS / 5).max() < 4.5 * np.sqrt(UNITS * 0.16)
+    assert (np.searchsorted(ends, x[:, 0]) == np.searchsorted(ends, x[:, 1])).all()
+
+
+def test_a_shim_leaves_a_gap_within_half_a_step_where_sizes_reach():
+    shim = ta.Shim("washer", step=0.5, sizes=41, against={"hole": -1.0, "shaft": 1.0})
+    x = units_of(errors_of(shim))
+    gap = x[:, 2] - x[:, 0] + x[:, 1]
+    assert np.abs(gap).max() <= 0.25e-6 + 1e-15
+    assert stats.kstest(gap, stats.uniform(-0.25e-6, 0.5e-6).cdf).pvalue > 1e-4
+
+
+def test_a_gap_beyond_the_last_size_keeps_what_no_size_takes():
+    x = units_of(errors_of(ta.Shim("washer", step=1.0, sizes=3)), 5000)
+    plain = units_of(ErrorModel(SIZES), 5000)
+    expected = plain[:, 2] - 1e-6 * np.clip(np.rint(plain[:, 2] / 1e-6), -1, 1)
+    np.testing.assert_array_equal(x[:, 2], expected)
+    np.testing.assert_array_equal(x[:, :2], plain[:, :2])
+
+
+def test_sizes_taken_add_up_to_all_units():
+    shim = ta.Shim("washer", step=1.0, sizes=5)
+    counts = shim.taken(units_of(ErrorModel(SIZES)), ErrorModel(SIZES))
+    assert counts.sum() == UNITS
+    share = np.diff(stats.norm.cdf([-np.inf, -1.5, -0.5, 0.5, 1.5, np.inf]))
+    assert abs(counts - UNITS * share).max() < 4.5 * np.sqrt(UNITS * 0.25)
+
+
+def test_costs_are_of_classes_sizes_and_what_is_left_over():
+    sorting = ta.Sorting("shaft", "hole", classes=4, batch=100, class_cost=0.2, leftover_cost=3.0)
+    shim = ta.Shim("washer", step=1.0, sizes=5, size_cost=0.1)
+    lost = sorting.leftover
+    assert assembly_cost((sorting, shim), SIZES) == pytest.approx(0.2 * 3 + 3.0 * lost / (1 - lost) + 0.1 * 4)
+    assert assembly_cost((), SIZES) == 0.0
+
+
+def test_sorted_sources_are_one_block_of_a_ranking():
+    errors = errors_of(ta.Sorting("shaft", "hole", classes=4))
+    assert errors.blocks == (("hole", "shaft"), ("washer",))
+    assert not errors.is_correlated
+
+
+REFUSED = [
+    (lambda: ta.Sorting("shaft", "hole", classes=0), "classes is 0"),
+    (lambda: ta.Sorting("shaft", "hole", classes=(2, 2)), "classes is"),
+    (lambda: ta.Sorting("shaft", "hole", classes=2.0), "classes is 2.0"),
+    (lambda: ta.Sorting("shaft", "shaft"), "mates is 'shaft'"),
+    (lambda: ta.Sorting("shaft"), "mates is missing"),
+    (lambda: ta.Sorting("shaft", "hole", klasses=3), "klasses"),
+    (lambda: ta.Sorting("shaft", "hole", batch=0), "batch is 0"),
+    (lambda: ta.Sorting("shaft", "hole", class_cost=-1.0), "class_cost is -1"),
+    (lambda: ta.Shim("washer", step=0.0), "step is 0"),
+    (lambda: ta.Shim("washer", step=1.0, sizes=4), "sizes is 4"),
+    (lambda: ta.Shim("washer", step=1.0, against={"washer": 1.0}), "against is 'washer'"),
+    (lambda: ta.Shim("washer", step=1.0, against={"hole": "much"}), "against is"),
+    (lambda: errors_of(ta.Sorting("shift", "hole")), "shift"),
+    (lambda: errors_of(ta.Sorting("*", "hole")), "one source"),
+    (lambda: errors_of(ta.Sorting("shaft", "hole", classes=2), ta.Sorting("shaft", "washer", classes=2)), "2 times"),
+    (lambda: errors_of(ta.Sorting("shaft", "hole", classes=2), ta.Sorting("washer", "shaft", classes=2)), "mates"),
+    (lambda: errors_of(ta.Shim("washer", step=1.0), ta.Shim("washer", step=2.0)), "2 times"),
+    (lambda: all_choices((ta.Sorting("a", "b", classes=tuple(range(1, 18))),), "test"), "16 or less"),
+]
+
+
+@pytest.mark.parametrize(("made", "says"), REFUSED)
+def test_what_cannot_be_sorted_or_shimmed_is_refused_in_one_sentence(made, says):
+    with pytest.raises(TolallocError) as refused:
+        made()
+    said = str(refused.value)
+    assert says in said
+    assert said.endswith((".", "?"))
+    assert "\n" not in said
+
+
+def test_waves_and_correlated_parts_are_refused():
+    with pytest.raises(InputError, match=r"disc1\.pitch"):
+        in_force((ta.Sorting("disc1.pitch", "disc2.pitch", classes=2),), baseline_errors().sources, "test")
+    pair = Correlation(pairs=(Pair(one="shaft", other="washer", correlation=0.5),))
+    with pytest.raises(InputError, match="correlated with no other"):
+        errors_of(ta.Sorting("shaft", "hole", classes=2), correlation=pair)
+    with pytest.raises(UnknownNameError, match="hole"):
+        in_force((ta.Sorting("pin.diameter", "hole", classes=2),), baseline_errors().sources, "test")
+
+
+SMALL = ta.Effort(
+    allocation=ta.AllocationEffort(
+        verification_units=2**13, confirmation_units=2**16, share_blocks=64, search=ta.SearchEffort(steps=4)
+    ),
+    ranking=ta.RankingEffort(sobol=ta.SobolEffort(start=64, limit=64)),
+)
+
+
+def gap_study(**changes) -> ta.Study:
+    """Return the study of a gap of two sizes."""
+    row = {"plus": 10, "minus": -10, "unit": "µm", "min": 2, "max": 60, "cost": 10.0}
+    nominal = {"hole": 10.0, "shaft": 10.0}
+    model = ta.model(lambda hole, shaft: 1000 * (hole - shaft), inputs=nominal, outputs=("gap [µm]",))
+    drawing = ta.Drawing.of_rows([{"id": name, "nominal": size, **row} for name, size in nominal.items()])
+    limits = {"gap [µm]": ta.Limit(lower=-8.0, upper=8.0)}
+    plain = ta.Allocation(front=False, what_if=False)
+    return ta.Study(model, drawing, limits=limits, questions=[plain], effort=SMALL, **{"name": "gap", **changes})
+
+
+def yield_of_classes(zones: tuple[float, float], limit: float, classes: int) -> float:
+    """Return the share of gaps within ± a limit, σ = zone/6 each, integrated class by class [zones and limit alike]."""
+    ends = np.clip(stats.norm.ppf(np.arange(classes + 1) / classes), -9, 9)
+    (one, other), found = (own / 6 for own in zones), 0.0
+    points, weights = np.polynomial.legendre.leggauss(200)
+    for low, high in zip(ends[:-1], ends[1:], strict=True):
+        x = (low + high) / 2 + (high - low) / 2 * points
+        inside = [np.clip((one * x + side) / other, low, high) for side in (-limit, limit)]
+        share = stats.norm.cdf(inside[1]) - stats.norm.cdf(inside[0])
+        found += classes * np.sum(weights * (high - low) / 2 * stats.norm.pdf(x) * share)
+    return float(found)
+
+
+@pytest.fixture(scope="module")
+def sorted_gap(tmp_path_factory) -> tuple[AllocationResult, object]:
+    sorting = ta.Sorting("shaft", "hole", classes=(1, 2), batch=100, class_cost=0.3, leftover_cost=2.0)
+    folder = tmp_path_factory.mktemp("sorted") / "run"
+    run = gap_study(compensators=sorting).run(folder)
+    return run.answers["allocation"].result, folder
+
+
+def test_the_cheapest_of_all_class_counts_is_drawn_and_keeps_its_yield(sorted_gap):
+    result, _ = sorted_gap
+    alone, two = result.assembled.choices
+    assert result.met
+    assert result.assembled.best is two
+    assert two.cost < alone.cost
+    zones = [1e6 * own.zone for own in result.drawn_sources]
+    assert yield_of_classes((zones[0], zones[1]), 8.0, 2) >= 0.9973
+    kept = result.assembled.as_they_come.joint
+    assert kept.low <= yield_of_classes((zones[0], zones[1]), 8.0, 1) <= kept.high
+
+
+@pytest.mark.slow
+def test_the_cost_of_sorted_parts_lies_near_the_optimum_of_the_closed_form():
+    sorting = ta.Sorting("shaft", "hole", classes=(1, 2))
+    for own in gap_study(compensators=sorting).allocate(effort="quick").result.assembled.choices:
+        classes = own.compensators[0].count if own.compensators else 1
+        least = optimize.brentq(lambda zone, n=classes: yield_of_classes((zone, zone), 8.0, n) - 0.9973, 5, 60)
+        assert 2 * 10 * 20 / least * 0.999 <= own.zones_cost <= 2 * 10 * 20 / least * 1.01
+
+
+def test_an_allocation_of_one_class_is_todays_to_the_last_bit(sorted_gap):
+    result, _ = sorted_gap
+    today = gap_study().allocate().result
+    assert result.assembled.choices[0].zones_cost == today.cost
+    assert result.assembled.choices[0].joint == today.chosen.joint
+    assert today.assembled is None
+
+
+def test_every_file_that_leaves_says_which_classes_the_zones_hold_with(sorted_gap):
+    result, folder = sorted_gap
+    said = "Sort shaft into 2 classes"
+    assert said in (folder / "allocation.csv").read_text(encoding="utf-8")
+    assert said in (folder / "frames.dxf").read_text(encoding="utf-8")
+    sheets = openpyxl.load_workbook(folder / "drawing.xlsx")
+    assert any(said in str(cell.value) for sheet in sheets for row in sheet.iter_rows() for cell in row)
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "Parts chosen at assembly" in page
+    assert f"{result.assembled.best.cost:.2f} cost units in all" in page
+    again = ta.drawing(folder / "allocation.csv")
+    drawn = [own.zone for own in result.drawn_sources]
+    assert [own.zone for own in again.sources] == pytest.approx(drawn, rel=1e-6)
+
+
+def test_questions_beside_the_allocation_take_the_first_number_of_classes():
+    study = gap_study(compensators=ta.Sorting("shaft", "hole", classes=(4, 1)))
+    assert Prepared(study=study).errors.compensators[0].count == 4
+    kept = Prepared(study=study).kept_limits(4096).joint.estimate
+    plain = Prepared(study=replace(study, compensators=())).kept_limits(4096).joint.estimate
+    assert kept > plain
+    assert "hole + shaft" in study.rank(effort="quick").result.sobol.sources
+
+
+def test_a_shim_is_chosen_with_the_zones():
+    shim = ta.Shim("hole", step=4.0, sizes=(1, 5), against={"shaft": -1.0}, size_cost=0.1)
+    result = gap_study(compensators=shim).allocate().result
+    assert result.met
+    assert result.assembled.best.label == "5 sizes of hole"
+    assert result.assembled.best.assembly_cost == pytest.approx(0.4)
+    assert result.assembled.best.cost < 0.6 * result.assembled.choices[0].cost
