@@ -43,7 +43,7 @@ from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.springs import Coordinates, Positions
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.unit_file import load_unit
-from tolalloc.running.blas import one_blas_thread
+from tolalloc.running.chunks import one_blas_thread
 from tolalloc.running.compiled import use_threads
 
 STEPS, FIRST_STEPS, TORQUE, TURN = 1404, 100, -10.0, 60.0

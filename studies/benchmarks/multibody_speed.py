@@ -35,7 +35,7 @@ from tolalloc.reducers.simulation import (
     simulate,
     with_ideal_gears,
 )
-from tolalloc.running.blas import one_blas_thread
+from tolalloc.running.chunks import one_blas_thread
 from tolalloc.running.compiled import use_threads
 
 MODEL, PROTOTYPE = "generalised-alpha", "exudyn"

@@ -95,7 +95,9 @@ def test_positions_are_sorted_on_each_axis():
     deviation = x[:, 0].std()
     expected = 2 * deviation**2 * (1 - np.mean(class_means(3) ** 2))
     assert np.var(difference, axis=0) == pytest.approx(expected, rel=0.04)
-    assert ta.Sorting("one", "other", classes=3).leftover_of(sources[0]) > ta.Sorting("one", "other", classes=3).leftover
+    assert (
+        ta.Sorting("one", "other", classes=3).leftover_of(sources[0]) > ta.Sorting("one", "other", classes=3).leftover
+    )
 
 
 @pytest.mark.parametrize("kind", [Distribution.UNIFORM, Distribution.TRIANGULAR])

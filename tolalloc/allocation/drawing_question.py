@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -20,7 +20,7 @@ from tolalloc.allocation.front.what_if import (
     robustness,
     setting_trade,
 )
-from tolalloc.allocation.result import AllocationResult
+from tolalloc.allocation.result import AllocationResult, AssembledDrawing, AssemblyChoice
 from tolalloc.allocation.search.candidates import ALONE, FREE, GRADES, TABLE, Candidates, NextCandidate
 from tolalloc.allocation.search.discrete import GradedAllocation, allocate_grades, group_options, with_shared_zones
 from tolalloc.allocation.search.zone_allocation import (
@@ -32,6 +32,7 @@ from tolalloc.allocation.search.zone_allocation import (
 )
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import AllocationEffort
+from tolalloc.allocation.space.joint_yield import JointRequirement
 from tolalloc.allocation.space.requirement import Requirement
 from tolalloc.allocation.verify.acceptance import (
     AS_GOOD_AS,
@@ -44,11 +45,13 @@ from tolalloc.allocation.verify.acceptance import (
 )
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, cheapest_met
 from tolalloc.capability.experiment import Experiment
+from tolalloc.capability.monte_carlo import KeptLimits
+from tolalloc.drawings.compensators import Compensator, assembly_cost, choice_label
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.checkpoint import CachedResponse, Checkpoint
 from tolalloc.models.model import Model, is_fast
-from tolalloc.running.blas import one_blas_thread
+from tolalloc.running.chunks import one_blas_thread
 from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.sobol import SobolIndices, regrouped, sobol_indices
@@ -428,3 +431,71 @@ def allocate_drawing(
         examination=examination,
         statuses=statuses,
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class AssembledQuestion:
+    """What is asked of the cheapest drawing whose parts are chosen at assembly."""
+
+    question: DrawingQuestion  # What is asked of every choice
+    choices: Sequence[tuple[Compensator, ...]]  # What acts in each, nothing where parts are taken as they come
+
+    def of(self, acting: tuple[Compensator, ...]) -> DrawingQuestion:
+        """Return the question with units assembled so."""
+        space = self.question.space
+        return replace(self.question, space=replace(space, errors=replace(space.errors, compensators=acting)))
+
+    def tried(self, acting: tuple[Compensator, ...], found: AllocationResult) -> AssemblyChoice:
+        """Return what became of a choice."""
+        return AssemblyChoice(
+            compensators=acting,
+            label=choice_label(acting),
+            met=found.met,
+            zones_cost=found.cost,
+            assembly_cost=assembly_cost(acting, found.space.errors.sources),
+            bound=found.bound,
+            joint=found.chosen.joint,
+        )
+
+    def as_they_come(self, found: AllocationResult) -> KeptLimits:
+        """Return which random units of a drawing keep its limits if nothing is chosen."""
+        design, question = found.chosen, self.question
+        errors = replace(design.space.errors, compensators=())
+        asked = [own for own in found.requirements if not isinstance(own, JointRequirement)]
+        limits = {own.output: own.limits for own in asked}
+        units = replace(design.space, errors=errors).units(
+            design.design, question.seeds("as they come"), question.effort.verification_units
+        )
+        response = question.model.at(design.settings).reading(tuple(limits))
+        return KeptLimits.of(response(units), response.outputs, limits)
+
+
+def allocate_assembled(
+    asked: AssembledQuestion, record: RunRecord, name: str, digest: str = "", checkpoint: Path | None = None
+) -> AllocationResult:
+    """Return the cheapest drawing over all choices, zones and assembly together.
+
+    Parameters
+    ----------
+    asked
+        What is asked, with what may be chosen.
+    record, name, digest, checkpoint
+        As of `allocate_drawing`.
+
+    Notes
+    -----
+    Every choice has the same random numbers. Of choices that keep the limits the cheapest sum of zones and assembly
+    wins; of none, the first is shown. What is asked around the drawing is asked of it alone.
+    """
+    if len(asked.choices) == 1 and not asked.choices[0]:
+        return allocate_drawing(asked.question, record, name, digest, checkpoint)
+    tried = []
+    for acting in asked.choices:
+        record.progress.tell(f"parts: {choice_label(acting)}")
+        alone = replace(asked.of(acting), front=False, what_if=False)
+        tried.append(asked.tried(acting, allocate_drawing(alone, record, name)))
+    best = min(range(len(tried)), key=lambda at: (not tried[at].met, tried[at].cost if tried[at].met else at))
+    found = allocate_drawing(asked.of(asked.choices[best]), record, name, digest, checkpoint)
+    with record.stage("parts as they come"):
+        kept = asked.as_they_come(found)
+    return replace(found, assembled=AssembledDrawing(choices=tuple(tried), chosen=best, as_they_come=kept))

@@ -32,7 +32,7 @@ from tolalloc.reading.units import ARCSECOND, DEGREE
 from tolalloc.reducers.choice import bind
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.response.kernel import KernelResponse
-from tolalloc.running.blas import one_blas_thread
+from tolalloc.running.chunks import one_blas_thread
 from tolalloc.running.progress import SILENT, Progress, RunRecord
 
 IMPLAUSIBLE = 0.001

@@ -18,7 +18,7 @@ _AGREES = 0.001
 def doctor(as_json: AsJson = False) -> None:
     """Tell versions, processor, threads and what is kept, and solve a published unit whose answer is known."""
     from tolalloc.reports.writer import versions
-    from tolalloc.running.blas import blas_libraries
+    from tolalloc.running.chunks import blas_libraries
     from tolalloc.running.compiled import is_kept, kept_in, processor, thread_count
 
     kept = [path.stat().st_size for path in Path("runs/.tolalloc-units").glob("*.units")]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.models.function_model import BoundFunction
 from tolalloc.models.model import Model, Units
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure
@@ -194,7 +195,6 @@ class Portrait(Generic[Own]):
 
 _PORTRAITS: dict[type[Model], type[Portrait[Any]]] = {}
 _SHIPPED = {
-    "tolalloc.models.function_model": "tolalloc.reports.portraits.own_function",
     "tolalloc.reducers.model": "tolalloc.reports.portraits.reducer",
 }
 """Module of a model → module of its portrait, which is imported when it is first asked for."""
@@ -217,3 +217,17 @@ def sections_of(heading: str, made: Callable[[], tuple[Section, ...]]) -> tuple[
     except Exception as error:
         said = f"The pictures are left out: {str(error).rstrip('.') or type(error).__name__}."
         return (Section(heading=heading, paragraphs=(said,)),)
+
+
+class FunctionPortrait(Portrait[BoundFunction], of=BoundFunction):
+    """What is said of a function at the sources of a drawing."""
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What a reader must know: inputs that the drawing gives no nominal size."""
+        bare = ", ".join(self.model.without_nominal)
+        return (f"no nominal size on the drawing, taken as deviations from 0: {bare}",) if bare else ()
+
+    def examination(self, figures: Mapping[str, float]) -> Examination:  # noqa: ARG002
+        """Return which inputs have no nominal size: a size that was forgotten moves every output."""
+        return Examination(tuple(f"{said[0].upper()}{said[1:]}." for said in self.assumptions))

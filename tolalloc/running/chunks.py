@@ -1,12 +1,19 @@
-"""The one interface behind which an executor stands: samples in chunks, answers in the order of the samples."""
+"""The one interface behind which an executor stands: samples in chunks, answers in their order, with the same bits.
+
+Matrix products use one thread: the threads of a BLAS library spin while they wait for each other, which on cores that
+are taken costs a hundred times the product itself, and the sizes here never need a second thread.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager
+from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
 from jaxtyping import Float
+from threadpoolctl import ThreadpoolController
 
 Answer = TypeVar("Answer")
 
@@ -43,3 +50,21 @@ def one_thread() -> None:
     from tolalloc.running.compiled import use_threads
 
     use_threads(1)
+
+
+@lru_cache(maxsize=1)
+def _libraries() -> ThreadpoolController:
+    """Return the libraries that are loaded; looking for them takes a millisecond."""
+    return ThreadpoolController()
+
+
+def blas_libraries() -> str:
+    """Return which BLAS libraries are loaded, with their versions; each works on one thread here."""
+    found = [own for own in _libraries().info() if own["user_api"] == "blas"]
+    return ", ".join(sorted({f"{own['internal_api']} {own['version']}" for own in found})) or "none that is known"
+
+
+def one_blas_thread() -> AbstractContextManager[Any]:
+    """Return a context in which matrix products use one thread."""
+    context: AbstractContextManager[Any] = _libraries().limit(limits=1, user_api="blas")
+    return context

@@ -15,7 +15,7 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models.differences import derived
 from tolalloc.models.model import KeepsTables, Model, Response, ResponseWithDerivatives
-from tolalloc.running.blas import one_blas_thread
+from tolalloc.running.chunks import one_blas_thread
 from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.derivatives import classical_estimate, derivative_measures, local_derivatives
 from tolalloc.sensitivity.effort import RankingEffort

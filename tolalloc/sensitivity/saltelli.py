@@ -26,7 +26,7 @@ from jaxtyping import Bool, Float, Int
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Evaluation
-from tolalloc.running.blas import one_blas_thread
+from tolalloc.running.chunks import one_blas_thread
 from tolalloc.sensitivity.surrogate.control_variate import Control, optimal_weights
 
 SAMPLES_AT_ONCE = 8192

@@ -162,8 +162,7 @@ class Allocation(Question):
 
     def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any]:
         """Return the cheapest drawing."""
-        from tolalloc.allocation.assembly_choice import AssembledQuestion, allocate_assembled
-        from tolalloc.allocation.drawing_question import DrawingQuestion
+        from tolalloc.allocation.drawing_question import AssembledQuestion, DrawingQuestion, allocate_assembled
 
         study = prepared.study
         question = DrawingQuestion(

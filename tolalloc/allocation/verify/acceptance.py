@@ -21,7 +21,7 @@ from tolalloc.capability.near_limit import Drawn
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import FailedUnitsError
 from tolalloc.models.model import Model, is_fast
-from tolalloc.running.blas import one_blas_thread
+from tolalloc.running.chunks import one_blas_thread
 
 _SPENT = 0.75
 """Share of the error left that a design may spend [-]."""
