@@ -118,6 +118,7 @@ COMPUTES_NOTHING = {
     "allocation.space.requirement.spread_constraints": "passes on",
     "allocation.space.joint_yield.divided": "passes on",
     "allocation.space.joint_yield.tightened": "passes on",
+    "allocation.drawing_question.allocate_assembled": "orders",
     "allocation.space.joint_yield.limited_by": "passes on",
     "reducers.equivalent.solvers.pressing.press": "passes on",
     "reducers.equivalent.solvers.simd.above": "passes on",

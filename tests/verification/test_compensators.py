@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import openpyxl
@@ -126,14 +127,6 @@ def test_a_gap_beyond_the_last_size_keeps_what_no_size_takes():
     np.testing.assert_array_equal(x[:, :2], plain[:, :2])
 
 
-def test_sizes_taken_add_up_to_all_units():
-    shim = ta.Shim("washer", step=1.0, sizes=5)
-    counts = shim.taken(units_of(ErrorModel(SIZES)), ErrorModel(SIZES))
-    assert counts.sum() == UNITS
-    share = np.diff(stats.norm.cdf([-np.inf, -1.5, -0.5, 0.5, 1.5, np.inf]))
-    assert abs(counts - UNITS * share).max() < 4.5 * np.sqrt(UNITS * 0.25)
-
-
 def test_costs_are_of_classes_sizes_and_what_is_left_over():
     sorting = ta.Sorting("shaft", "hole", classes=4, batch=100, class_cost=0.2, leftover_cost=3.0)
     shim = ta.Shim("washer", step=1.0, sizes=5, size_cost=0.1)
@@ -214,7 +207,7 @@ def yield_of_classes(zones: tuple[float, float], limit: float, classes: int) -> 
     ends = np.clip(stats.norm.ppf(np.arange(classes + 1) / classes), -9, 9)
     (one, other), found = (own / 6 for own in zones), 0.0
     points, weights = np.polynomial.legendre.leggauss(200)
-    for low, high in zip(ends[:-1], ends[1:], strict=True):
+    for low, high in pairwise(ends):
         x = (low + high) / 2 + (high - low) / 2 * points
         inside = [np.clip((one * x + side) / other, low, high) for side in (-limit, limit)]
         share = stats.norm.cdf(inside[1]) - stats.norm.cdf(inside[0])

@@ -81,6 +81,8 @@ class DrawingQuestion:
     unit_price: UnitPrice | None
     quality_loss: QualityLoss | None
     place: str  # Where the question stands, for messages
+    # Scales [-] and settings of a design of another question from which the search starts where it is cheaper
+    start: Float[np.ndarray, " variable"] | None = None
 
     @property
     def limits_one_side_above(self) -> bool:
@@ -156,7 +158,9 @@ class DrawingQuestion:
     def direct(self) -> ZoneAllocation:
         """Return the allocation of tolerances and settings at once, from proportional scaling."""
         verifier = self.verifier("direct", self.space)
-        return allocate(verifier, scale_in_proportion(verifier, self.effort.search.steps), self.effort.search)
+        scaled = scale_in_proportion(verifier, self.effort.search.steps)
+        start = None if self.start is None else self._cheaper_start(verifier, cheapest_met(scaled))
+        return allocate(verifier, scaled, self.effort.search, start)
 
     def fixed(self) -> ZoneAllocation:
         """Return the allocation of tolerances with the settings as they are."""
@@ -165,7 +169,15 @@ class DrawingQuestion:
 
     def free(self, fixed: ZoneAllocation) -> ZoneAllocation:
         """Return the allocation of tolerances and settings together, from where the tolerances alone ended."""
-        return allocate(self.verifier("joint", self.space), fixed.proportional_tried, self.effort.search, fixed.chosen)
+        verifier = self.verifier("joint", self.space)
+        start = self._cheaper_start(verifier, fixed.chosen)
+        return allocate(verifier, fixed.proportional_tried, self.effort.search, start)
+
+    def _cheaper_start(self, verifier: Verifier, own: VerifiedDesign) -> VerifiedDesign:
+        """Return a design to start from: an own one, or that of another question where it is cheaper and met."""
+        if self.start is None:
+            return own
+        return cheapest_met((own, verifier.verify(self.start, "start")))
 
     def graded(self, free: ZoneAllocation, fixed: ZoneAllocation | None) -> GradedAllocation:
         """Return the cheaper allocation on ladders of zones, with the settings free or as they are."""
@@ -457,6 +469,12 @@ class AssembledQuestion:
             joint=found.chosen.joint,
         )
 
+    def start(self, found: AllocationResult) -> Float[np.ndarray, " variable"]:
+        """Return a drawing as the start of the next search: its zones over those of the table [-], and its settings."""
+        drawn = found.chosen
+        scales = drawn.space.first_zones * drawn.scales / self.question.space.first_zones
+        return np.concatenate([scales, drawn.settings])
+
     def as_they_come(self, found: AllocationResult) -> KeptLimits:
         """Return which random units of a drawing keep its limits if nothing is chosen."""
         design, question = found.chosen, self.question
@@ -484,18 +502,24 @@ def allocate_assembled(
 
     Notes
     -----
-    Every choice has the same random numbers. Of choices that keep the limits the cheapest sum of zones and assembly
-    wins; of none, the first is shown. What is asked around the drawing is asked of it alone.
+    Every choice has the same random numbers, and starts where the one before it ended if that is cheaper. Of choices
+    that keep the limits the cheapest sum of zones and assembly wins; of none, the first is shown. What is asked around
+    the drawing is asked of it alone.
     """
     if len(asked.choices) == 1 and not asked.choices[0]:
         return allocate_drawing(asked.question, record, name, digest, checkpoint)
-    tried = []
+    tried, starts = list[AssemblyChoice](), list[Float[np.ndarray, " variable"] | None]()
+    start = None
     for acting in asked.choices:
         record.progress.tell(f"parts: {choice_label(acting)}")
-        alone = replace(asked.of(acting), front=False, what_if=False)
-        tried.append(asked.tried(acting, allocate_drawing(alone, record, name)))
+        alone = replace(asked.of(acting), front=False, what_if=False, start=start)
+        found = allocate_drawing(alone, record, name)
+        tried.append(asked.tried(acting, found))
+        starts.append(start)
+        start = asked.start(found)
     best = min(range(len(tried)), key=lambda at: (not tried[at].met, tried[at].cost if tried[at].met else at))
-    found = allocate_drawing(asked.of(asked.choices[best]), record, name, digest, checkpoint)
+    drawn = replace(asked.of(asked.choices[best]), start=starts[best])
+    found = allocate_drawing(drawn, record, name, digest, checkpoint)
     with record.stage("parts as they come"):
         kept = asked.as_they_come(found)
     return replace(found, assembled=AssembledDrawing(choices=tuple(tried), chosen=best, as_they_come=kept))

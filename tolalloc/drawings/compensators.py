@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from tolalloc.drawings.distributions import ABOVE_ZERO, BELOW_ONE
 from tolalloc.drawings.sources import Source, known_as, meant
@@ -19,9 +19,6 @@ from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.named_fields import NamedFields, Rule, flag, is_number, mapped, number, whole
 from tolalloc.reading.units import MICROMETRE
-
-if TYPE_CHECKING:
-    from tolalloc.drawings.error_model import ErrorModel
 
 _MOST = 64
 """Most classes and most sizes that are believed [-]."""
@@ -85,7 +82,7 @@ class Sorting(NamedFields):
     --------
     >>> sorting = Sorting("pin.diameter", "housing.groove.radius", classes=4)
     >>> round(sorting.leftover, 4)
-    0.0954
+    0.0975
     """
 
     called: ClassVar[str] = "sorting"
@@ -177,15 +174,13 @@ class Sorting(NamedFields):
         lost = self.leftover_of(parts)
         return float(self.class_cost * (self.count ** _axes(parts) - 1) + self.leftover_cost * lost / (1.0 - lost))
 
-    def sorted(self, uniform: Float[np.ndarray, "*sample column"], errors: ErrorModel) -> None:
-        """Sort uniform numbers of units in place: the parts go into the class of their mates [-]."""
-        names = [source.name for source in errors.active]
-        parts, mates = (errors.columns_of_source[names.index(own)] for own in self.named)
-        number = uniform[..., mates]
+    def sorted(self, uniform: Float[np.ndarray, "*sample column"], columns: Mapping[str, slice]) -> None:
+        """Put the parts of units into the class of their mates, uniform numbers in place, by columns of sources [-]."""
+        number, parts = uniform[..., columns[self.mates]], columns[self.parts]
         least = np.floor(self.count * (1.0 - number if self.opposite else number))
-        columns = uniform[..., parts]
-        copies = np.tile(np.minimum(least, self.count - 1), columns.shape[-1] // number.shape[-1])
-        inside = np.modf(self.count * columns)[0]
+        own = uniform[..., parts]
+        copies = np.tile(np.minimum(least, self.count - 1), own.shape[-1] // number.shape[-1])
+        inside = np.modf(self.count * own)[0]
         uniform[..., parts] = np.clip((copies + inside) / self.count, ABOVE_ZERO, BELOW_ONE)
 
     def limits(self, source: Source) -> Float[np.ndarray, " limit"]:
@@ -297,23 +292,13 @@ class Shim(NamedFields):
         """Return what it costs per unit [cost units]."""
         return self.size_cost * (self.count - 1)
 
-    def shimmed(self, deviations: Float[np.ndarray, "*sample column"], errors: ErrorModel) -> None:
-        """Put the size that is chosen into the deviations of units, in place [m]."""
-        at = {source.name: own.start for source, own in zip(errors.active, errors.columns_of_source, strict=False)}
-        gap = deviations[..., at[self.part]].copy()
+    def shimmed(self, deviations: Float[np.ndarray, "*sample column"], columns: Mapping[str, slice]) -> None:
+        """Put the size that is chosen into deviations of units in place, by the columns of every source [m]."""
+        part, step = columns[self.part].start, self.step * MICROMETRE
+        gap = deviations[..., part].copy()
         for name, weight in self.against.items():
-            gap += weight * (deviations[..., at[name]] if name in at else errors.fixed.get(name, 0.0))
-        step = self.step * MICROMETRE
-        deviations[..., at[self.part]] -= step * np.clip(np.rint(gap / step), -self.reach, self.reach)
-
-    def taken(self, deviations: Float[np.ndarray, "sample column"], errors: ErrorModel) -> Int[np.ndarray, " size"]:
-        """Return how many of some units took each size, the smallest first, from their deviations before [-]."""
-        after = deviations.copy()
-        self.shimmed(after, errors)
-        at = next(i for i, source in enumerate(errors.active) if source.name == self.part)
-        own = errors.columns_of_source[at].start
-        steps = np.rint((after - deviations)[:, own] / (self.step * MICROMETRE)).astype(int)
-        return np.bincount(steps + self.reach, minlength=self.count)
+            gap += weight * deviations[..., columns[name].start]
+        deviations[..., part] -= step * np.clip(np.rint(gap / step), -self.reach, self.reach)
 
 
 Compensator = Sorting | Shim

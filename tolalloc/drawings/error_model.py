@@ -146,6 +146,11 @@ class ErrorModel:
         return tuple(slice(start, end) for start, end in zip([0, *ends], ends, strict=False))
 
     @cached_property
+    def _places(self) -> dict[str, slice]:
+        """Where the columns of each source stand, by its name."""
+        return {own.name: at for own, at in zip(self._varying, self.columns_of_source, strict=True)}
+
+    @cached_property
     def zones(self) -> Float[np.ndarray, " source"]:
         """Zones of the active sources [m], then 1 for every joint one [-]."""
         return np.array([*(source.zone for source in self.active), *(1.0 for _ in self.joint)])
@@ -161,7 +166,7 @@ class ErrorModel:
         """
         found = self.mixed(uniform, self._factor)
         for own in self._sortings:
-            own.sorted(found, self)
+            own.sorted(found, self._places)
         return found
 
     def mixed(
@@ -208,7 +213,7 @@ class ErrorModel:
         found = np.asarray(standard * np.repeat(zones, counts) + middle)
         for own in self.compensators:
             if isinstance(own, Shim):
-                own.shimmed(found, self)
+                own.shimmed(found, self._places)
         return found
 
     def deviations_of_normal(
