@@ -125,10 +125,12 @@ def bins_table(result: AllocationResult) -> Table[_Bin] | None:
         Column(header="source", value=lambda row: row.source),
         Column(header="what", value=lambda row: row.what),
         Column(header="number [-]", value=lambda row: row.number),
-        Column(header="from [µm]", value=lambda row: row.low, nothing="open"),
-        Column(header="to [µm]", value=lambda row: row.high, nothing="open"),
-        Column(header="off nominal [µm]", value=lambda row: row.middle, nothing=""),
     ]
+    if any(isinstance(own, Sorting) for own in _acting(result)):
+        columns.append(Column(header="from [µm]", value=lambda row: row.low, nothing="open"))
+        columns.append(Column(header="to [µm]", value=lambda row: row.high, nothing="open"))
+    if any(isinstance(own, Shim) for own in _acting(result)):
+        columns.append(Column(header="off nominal [µm]", value=lambda row: row.middle, nothing=""))
     return Table(name="classes and sizes", columns=columns, rows=rows)
 
 

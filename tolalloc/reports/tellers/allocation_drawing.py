@@ -181,35 +181,39 @@ def tolerances_frame(result: AllocationResult, cost_unit: str = COST_UNITS) -> p
     return frame
 
 
-def effects(result: AllocationResult) -> dict[str, float]:
+def effects(result: AllocationResult, width: float | None = None) -> dict[str, float]:
     """Return what opening each dimension does to what is kept of the leading output, largest effect first.
 
-    Nothing where the model of the drawing knows no derivatives by zones [unit of the leading output].
+    By a tenth, or each zone by a width [m]. Nothing where the model of the drawing knows no derivatives by zones [unit
+    of the leading output].
     """
     if result.chosen.by_zone is None:
         return {}
     names = [source.name for source in result.drawn.errors.active]
     slope = dict(zip(names, result.chosen.by_zone.tolist(), strict=True))
     found = {
-        name: sum(_STEP * source.zone * slope.get(source.name, 0.0) for source in members)
+        name: sum((width or _STEP * source.zone) * slope.get(source.name, 0.0) for source in members)
         for name, members in result.dimensions.items()
     }
     return dict(sorted(found.items(), key=lambda own: -abs(own[1])))
 
 
 def effects_figure(result: AllocationResult) -> tuple[Figure, ...]:
-    """Return the largest of these effects; nothing where there are none."""
-    largest = dict(list(effects(result).items())[:_EFFECTS])
+    """Return the largest of these effects, a tenth beside a micrometre; nothing where there are none."""
+    largest, each = dict(list(effects(result).items())[:_EFFECTS]), effects(result, MICROMETRE)
     if not largest:
         return ()
     kept, guarantee = with_unit(f"{result.chosen.quantile_bound:.4g}", result.leading), result.requirements[0].guarantee
     key = "figure_effects" if isinstance(guarantee, AtYield) else "figure_effects_other"
-    label = "effect with its sign, to first order"
+    names = list(largest)
     figure = Figure(
         name="effects",
-        title=_say(key, step=_STEP, output=short(result.leading), kept=kept, target=getattr(guarantee, "target", None)),
+        title=_say(key, output=short(result.leading), kept=kept, target=getattr(guarantee, "target", None)),
         x_label=f"change of {result.leading}",
-        series=(Series(label=label, kind="bars", x=list(largest), y=list(largest.values())),),
+        series=(
+            Series(label=f"by {_STEP:.0%} of it", kind="bars", x=names, y=list(largest.values())),
+            Series(label="by 1 µm", kind="bars", x=names, y=[each[name] for name in names]),
+        ),
         vertical=((0.0, ""),),
     )
     return (figure,)
