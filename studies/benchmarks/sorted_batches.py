@@ -57,9 +57,10 @@ def main() -> None:
         between = time.perf_counter()
         own = mapped(sorting, exact.size, rng)
         took = (between - start, time.perf_counter() - between)
+        error = np.std(left) / np.sqrt(given.batches)
         print(
             f"{classes} classes, {given.batches} batches of {given.batch}: spread {exact.std():.4f} and "
-            f"{own.std():.4f} σ, left over {100 * np.mean(left):.2f} ± {100 * np.std(left) / np.sqrt(given.batches):.2f} and "
+            f"{own.std():.4f} σ, left over {100 * np.mean(left):.2f} ± {100 * error:.2f} and "
             f"{100 * sorting.leftover:.2f} %, one law with p = {ks_2samp(exact, own).pvalue:.2f}; a batch takes "
             f"{1e3 * took[0] / given.batches:.0f} ms assigned and {1e3 * took[1] / given.batches:.1f} ms mapped"
         )

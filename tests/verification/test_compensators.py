@@ -198,8 +198,8 @@ def gap_study(**changes) -> ta.Study:
     model = ta.model(lambda hole, shaft: 1000 * (hole - shaft), inputs=nominal, outputs=("gap [µm]",))
     drawing = ta.Drawing.of_rows([{"id": name, "nominal": size, **row} for name, size in nominal.items()])
     limits = {"gap [µm]": ta.Limit(lower=-8.0, upper=8.0)}
-    plain = ta.Allocation(front=False, what_if=False)
-    return ta.Study(model, drawing, limits=limits, questions=[plain], effort=SMALL, **{"name": "gap", **changes})
+    fields = {"name": "gap", "effort": SMALL, "questions": [ta.Allocation(front=False, what_if=False)], **changes}
+    return ta.Study(model, drawing, limits=limits, **fields)
 
 
 def yield_of_classes(zones: tuple[float, float], limit: float, classes: int) -> float:
@@ -283,3 +283,13 @@ def test_a_shim_is_chosen_with_the_zones():
     assert result.assembled.best.label == "5 sizes of hole"
     assert result.assembled.best.assembly_cost == pytest.approx(0.4)
     assert result.assembled.best.cost < 0.6 * result.assembled.choices[0].cost
+
+
+def test_a_ranking_of_one_block_draws_its_index_within_what_is_possible(tmp_path):
+    sorting = ta.Sorting("shaft", "hole", classes=4)
+    study = gap_study(compensators=sorting, questions=[ta.Ranking()])
+    run = study.run(tmp_path / "run", effort="quick")
+    [ranking] = [own for section in run.document.sections for own in section.figures if own.name.endswith("ranking")]
+    for series in ranking.series[:2]:
+        assert 0 <= series.low[0] <= series.y[0] <= series.high[0] <= 1
+    assert (tmp_path / "run" / "report.html").exists()

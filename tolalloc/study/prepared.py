@@ -18,7 +18,7 @@ from tolalloc.allocation.space.joint_yield import JointRequirement
 from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, Guarantee, OwnLimit, Requirement
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import KeptLimits
-from tolalloc.drawings.compensators import Compensator, all_choices, in_force
+from tolalloc.drawings.compensators import Compensator, all_choices, choice_label, in_force
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, UnknownNameError
@@ -30,6 +30,7 @@ from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.effort import RankingEffort
 from tolalloc.study.problem import COMMON, Limit, Problem
 
+_ASSEMBLED = "Units are judged as they are assembled: {label}."
 _SHARED = "Rows without a group are one line where identical parts have the same zone, limits and price: {lines}."
 """What is said of the lines that `Prepared.errors` made, with the number of rows of each."""
 
@@ -93,7 +94,12 @@ class Prepared:
         rows = zip(self._stated.sources, self.errors.sources, strict=True)
         lines = Counter(own.group for before, own in rows if not before.group)
         shared = ", ".join(f"{line} ({rows})" for line, rows in lines.items() if rows > 1)
-        return (*stated, *((_SHARED.format(lines=shared),) if shared else ()))
+        acting = self.assemblies[0]
+        return (
+            *stated,
+            *((_SHARED.format(lines=shared),) if shared else ()),
+            *((_ASSEMBLED.format(label=choice_label(acting)),) if acting else ()),
+        )
 
     @cached_property
     def model(self) -> Model:

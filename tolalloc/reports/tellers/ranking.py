@@ -502,9 +502,9 @@ class RankingTeller(Teller[RankingResult]):
                         label=_say("with_interval", name=name),
                         kind="bars",
                         x=[indices.sources[at] for at in rows],
-                        y=[max(values[at], 0.0) for at in rows],
-                        low=[max(interval[0, at], 0.0) for at in rows],
-                        high=[float(np.clip(interval[1, at], 0.0, 1.0)) for at in rows],
+                        y=np.clip(values[rows], 0.0, 1.0).tolist(),
+                        low=np.clip(interval[0, rows], 0.0, 1.0).tolist(),
+                        high=np.clip(interval[1, rows], 0.0, 1.0).tolist(),
                     )
                     for name, values, interval in bars
                 ),
