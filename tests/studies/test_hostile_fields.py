@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import io
+import subprocess
 import sys
 from unittest import mock
 
@@ -76,6 +77,14 @@ def test_output_that_is_not_utf_8_shows_a_question_mark(calculation):
         main()
     assert not stop.value.code
     assert b'"study": "?"' in stdout.buffer.getvalue()
+
+
+def test_a_command_ends_well_where_all_its_streams_are_closed(tmp_path):
+    words = [sys.executable, "-c", "from tolalloc.cli.main import main; main()", "new", str(tmp_path / "mine")]
+    shell = ["sh", "-c", '"$@" <&- >&- 2>&-', "sh", *words]
+    assert subprocess.run(shell, check=False).returncode == 0
+    assert (tmp_path / "mine" / "study.py").is_file()
+    assert subprocess.run(shell, check=False).returncode == 2  # the folder is there now
 
 
 def test_a_full_disk_is_one_sentence(calculation):

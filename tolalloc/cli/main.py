@@ -93,6 +93,7 @@ for command in _COMMANDS:
 
 def main() -> None:
     """Run the command line; an error that a user can mend becomes one sentence and exit code 2."""
+    _open_closed_streams()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # where output is not UTF-8, a µ becomes a question mark
@@ -114,6 +115,13 @@ def main() -> None:
         if isinstance(sys.stdout, io.TextIOWrapper):  # what is left of the output has nowhere to go
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(2) from None
+
+
+def _open_closed_streams() -> None:
+    """Let what a closed stream would take go nowhere: Python has None in its place, and files would get its number."""
+    for name in ("stdin", "stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "r" if name == "stdin" else "w", encoding="utf-8"))  # noqa: SIM115
 
 
 def _require_threads(stated: str) -> None:
