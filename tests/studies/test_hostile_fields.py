@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import errno
 import io
+import json
 import subprocess
 import sys
 from unittest import mock
 
+import numpy as np
 import pandas as pd
 import pytest
 from openpyxl import load_workbook
@@ -20,6 +22,7 @@ from tolalloc.cli.main import main
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.reports.excel import Formula, write_sheets
 from tolalloc.reports.writer import write_csv
+from tolalloc.study.script import load_study
 
 
 @pytest.mark.parametrize(
@@ -87,6 +90,24 @@ def test_a_command_ends_well_where_all_its_streams_are_closed(tmp_path):
     assert subprocess.run(shell, check=False).returncode == 2  # the folder is there now
 
 
+def test_what_numpy_does_at_a_rounding_stays_as_a_study_found_it(tmp_path):
+    script = study_script(tmp_path)
+    script.write_text(f"import numpy\nnumpy.seterr(all='raise')\n{script.read_text()}")
+    before = np.geterr()
+    load_study(script)
+    assert np.geterr() == before != dict.fromkeys(before, "raise")
+
+
+def test_what_a_script_prints_is_no_part_of_an_answer_to_a_program(tmp_path):
+    script = study_script(tmp_path)
+    script.write_text(f"print('mine')\n{script.read_text()}")
+    found = tolalloc("check", script, "--json")
+    assert found.returncode == 0
+    assert json.loads(found.stdout)["study"]
+    assert "mine" in found.stderr
+    assert tolalloc("check", script).stdout.startswith("mine\n")
+
+
 def test_a_full_disk_is_one_sentence(calculation):
     full = OSError(errno.ENOSPC, "No space left on device", "out.csv")
     with mock.patch("tolalloc.cli.studies.say", side_effect=full):
@@ -96,6 +117,11 @@ def test_a_full_disk_is_one_sentence(calculation):
 @pytest.mark.parametrize("threads", ["0", "x", "-1", "1_0"])
 def test_a_number_of_threads_that_numba_cannot_use_is_refused(threads):
     refused(tolalloc("--version", NUMBA_NUM_THREADS=threads), f"NUMBA_NUM_THREADS is {threads!r}; allowed is a whole")
+
+
+def test_a_clock_before_the_first_day_of_a_workbook_is_refused():
+    with mock.patch("tolalloc.cli.main.time.strftime", return_value="1970-01-01"):
+        refused(tolalloc("--version"), "clock is '1970-01-01'; allowed is 1980-01-01 or later")
 
 
 TEXTS = ("=1+1", "+cmd", "-cmd", "@sum", "plain", "-1.5")

@@ -81,6 +81,15 @@ def test_a_report_fills_an_empty_folder_that_stands_there(tmp_path):
     assert left(tmp_path) == {"mine"}
 
 
+def test_a_run_folder_stays_where_it_was_asked_for_when_work_goes_elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with claimed(Path("mine")) as folder:
+        (folder / "report.html").touch()
+        monkeypatch.chdir("/")
+    assert left(tmp_path) == {"mine"}
+    assert left(tmp_path / "mine") == {"report.html"}
+
+
 def test_what_a_killed_writer_left_is_cleared_by_the_next_one(tmp_path):
     writing = f"""
 from pathlib import Path

@@ -62,15 +62,16 @@ def claimed(folder: Path) -> Iterator[Path]:
         Something is in the way, or the folder cannot be made.
     """
     require_usable(folder)
+    named, folder = folder, folder.absolute()  # what is run inside may go to another folder
     new = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         _clear_left(folder)
         own = f".{folder.name}-{_machine()}-{os.getpid()}-"
-        beside = Path(mkdtemp(prefix=own, suffix=_UNFINISHED, dir=folder.absolute().parent))
+        beside = Path(mkdtemp(prefix=own, suffix=_UNFINISHED, dir=folder.parent))
     except OSError as error:
         raise RunFolderError(
-            f"{folder}: the run folder cannot be made ({error.strerror}); name another (--out)."
+            f"{named}: the run folder cannot be made ({error.strerror}); name another (--out)."
         ) from None
     try:
         yield beside
@@ -85,7 +86,7 @@ def claimed(folder: Path) -> Iterator[Path]:
             beside.rmdir()
     except BaseException as error:
         if isinstance(error, OSError) and error.filename is None:
-            error.filename = str(folder)  # a full disk does not say where it is
+            error.filename = str(named)  # a full disk does not say where it is
         rmtree(beside, ignore_errors=True)
         if new and folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()
