@@ -16,7 +16,7 @@ from tests.studies.command import ROOT, command, process, tolalloc
 from tests.studies.test_allocate_command import script_with
 from tolalloc.cli.console import Lines
 from tolalloc.reports import writer
-from tolalloc.reports.folder import claimed
+from tolalloc.reports.folder import claimed, numbered
 from tolalloc.running import result_cache as kept_units
 
 COMPARED = ("summary.json", "allocation.csv", "tables/drawing.csv", "tables/front.csv")
@@ -90,10 +90,10 @@ def test_a_run_folder_stays_where_it_was_asked_for_when_work_goes_elsewhere(tmp_
     assert left(tmp_path / "mine") == {"report.html"}
 
 
-def test_what_a_killed_writer_left_is_cleared_by_the_next_one(tmp_path):
+def test_a_writer_keeps_its_folder_and_what_a_killed_one_left_is_cleared_by_the_next_one(tmp_path):
     writing = f"""
 from pathlib import Path
-from tolalloc.reports.folder import claimed
+from tolalloc.reports.folder import claimed, numbered
 with claimed(Path({str(tmp_path / "mine")!r})) as folder:
     (folder / "report.html").write_text("half")
     print("writing", flush=True)
@@ -102,11 +102,13 @@ with claimed(Path({str(tmp_path / "mine")!r})) as folder:
     words = [sys.executable, "-c", writing]
     with subprocess.Popen(words, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as running:
         assert running.stdout.readline() == "writing\n"
+        assert numbered(tmp_path / "mine")[-1] == tmp_path / "mine-2"  # who names no folder gets another one
         with claimed(tmp_path / "mine") as other:  # the first writer lives, so what it has stays
             (other / "whole").touch()
             assert len(left(tmp_path)) == 3
         running.kill()
     (tmp_path / "mine" / "whole").unlink()
+    assert numbered(tmp_path / "mine") == [tmp_path / "mine"]
     assert len(left(tmp_path)) == 2
     with claimed(tmp_path / "mine"):
         assert len(left(tmp_path)) == 2

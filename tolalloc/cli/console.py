@@ -274,7 +274,7 @@ def print_table(frame: pd.DataFrame, title: str) -> None:
     from rich.table import Table
 
     console, names = Console(), [str(name) for name in frame.columns]
-    rows = [[_cell(value) for value in row] for row in frame.itertuples(index=False)]
+    rows = [list(map(_cell, row, names)) for row in frame.itertuples(index=False)]
     cells = [[row[column] for row in rows] for column in range(len(names))]
     words = [word for text in (names[0], *cells[0]) for word in text.split()]
     first = max(map(len, words), default=1)
@@ -321,9 +321,14 @@ def _widened(least: list[int], most: list[int], room: int) -> list[int]:
     return widths
 
 
-def _cell(value: object) -> str:
-    """Return a cell with four significant digits and a true minus; what is not there stays empty."""
+def _cell(value: object, name: str) -> str:
+    """Return a cell with four significant digits and a true minus; what is not there stays empty.
+
+    A share just below all is not rounded up to all.
+    """
     if isinstance(value, float):
+        if name.endswith("[%]") and value < 100.0 <= float(f"{value:.4g}"):
+            return "99.99"
         return "" if isnan(value) else signed(f"{value:.4g}")
     return true_minus(str(value))
 

@@ -42,9 +42,9 @@ def require_usable(folder: Path | None) -> None:
 
 
 def numbered(first: Path) -> list[Path]:
-    """Return the folders that runs of one name have taken, and last the next one that is new or empty."""
+    """Return the folders that runs of one name have taken or are filling, and last the next one that is free."""
     found = [first]
-    while found[-1].is_file() or (found[-1].is_dir() and any(found[-1].iterdir())):
+    while found[-1].is_file() or (found[-1].is_dir() and any(found[-1].iterdir())) or _is_being_filled(found[-1]):
         found.append(first.with_name(f"{first.name}-{len(found) + 1}"))
     return found
 
@@ -95,10 +95,22 @@ def claimed(folder: Path) -> Iterator[Path]:
 
 def _clear_left(folder: Path) -> None:
     """Remove what processes of this machine that are no more left unfinished beside a folder."""
-    written = re.compile(rf"\.{re.escape(folder.name)}-{re.escape(_machine())}-(\d+)-\w+{re.escape(_UNFINISHED)}")
-    for path in folder.absolute().parent.iterdir():
-        if (found := written.fullmatch(path.name)) and _is_gone(int(found[1])):
+    for path, process in _unfinished(folder):
+        if _is_gone(process):
             rmtree(path, ignore_errors=True)
+
+
+def _is_being_filled(folder: Path) -> bool:
+    """Return whether a living process of this machine seems to fill a folder; its number may be another's."""
+    return any(not _is_gone(process) for _, process in _unfinished(folder))
+
+
+def _unfinished(folder: Path) -> list[tuple[Path, int]]:
+    """Return what processes of this machine have begun beside a folder, each with the number of its process."""
+    written = re.compile(rf"\.{re.escape(folder.name)}-{re.escape(_machine())}-(\d+)-\w+{re.escape(_UNFINISHED)}")
+    above = folder.absolute().parent
+    found = [(path, written.fullmatch(path.name)) for path in (above.iterdir() if above.is_dir() else ())]
+    return [(path, int(name[1])) for path, name in found if name]
 
 
 def _is_gone(process: int) -> bool:
