@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -88,6 +89,24 @@ def test_a_run_folder_stays_where_it_was_asked_for_when_work_goes_elsewhere(tmp_
         monkeypatch.chdir("/")
     assert left(tmp_path) == {"mine"}
     assert left(tmp_path / "mine") == {"report.html"}
+
+
+def test_a_disk_that_fills_while_a_folder_is_moved_to_it_holds_no_half_of_it(tmp_path, monkeypatch):
+    def filled(source: Path, target: Path) -> None:
+        if source.name == "tables":
+            target.mkdir()
+            (target / "half.csv").touch()
+            raise shutil.Error([(str(source), str(target), "[Errno 28] No space left on device")])
+        shutil.move(source, target)
+
+    (tmp_path / "disk").mkdir()
+    monkeypatch.setattr("tolalloc.reports.folder.move", filled)
+    with pytest.raises(OSError, match="No space left on device") as caught, claimed(tmp_path / "disk") as folder:
+        (folder / "tables").mkdir()
+        (folder / "report.html").touch()
+    assert caught.value.filename == str(tmp_path / "disk")
+    assert left(tmp_path) == {"disk"}
+    assert left(tmp_path / "disk") == set()
 
 
 def test_a_writer_keeps_its_folder_and_what_a_killed_one_left_is_cleared_by_the_next_one(tmp_path):

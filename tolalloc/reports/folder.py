@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from shutil import Error as MoveError
 from shutil import move, rmtree
 from tempfile import mkdtemp
 
@@ -81,8 +82,7 @@ def claimed(folder: Path) -> Iterator[Path]:
             folder.rmdir()
             beside.rename(folder)
         else:  # it may be a disk of its own, or where someone stands
-            for path in sorted(beside.iterdir(), key=lambda path: path.name == "manifest.json"):
-                move(path, folder / path.name)
+            _move_all(beside, folder)
             beside.rmdir()
     except BaseException as error:
         if isinstance(error, OSError) and error.filename is None:
@@ -90,6 +90,22 @@ def claimed(folder: Path) -> Iterator[Path]:
         rmtree(beside, ignore_errors=True)
         if new and folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()
+        raise
+
+
+def _move_all(beside: Path, folder: Path) -> None:
+    """Move what stands in one folder into an empty one, the manifest last; where that fails nothing is left there."""
+    try:
+        for path in sorted(beside.iterdir(), key=lambda path: path.name == "manifest.json"):
+            move(path, folder / path.name)
+    except BaseException as error:
+        for path in folder.iterdir():
+            if path.is_dir() and not path.is_symlink():
+                rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)
+        if isinstance(error, MoveError):  # of a folder, with what happened to each of its files and no other word
+            raise OSError(0, str(error.args[0][0][-1])) from None
         raise
 
 
