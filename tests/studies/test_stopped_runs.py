@@ -91,6 +91,13 @@ def test_a_run_folder_stays_where_it_was_asked_for_when_work_goes_elsewhere(tmp_
     assert left(tmp_path / "mine") == {"report.html"}
 
 
+def test_a_run_whose_empty_folder_is_cleared_away_is_not_lost(tmp_path):
+    with claimed(tmp_path / "mine") as folder:
+        (folder / "report.html").touch()
+        (tmp_path / "mine").rmdir()
+    assert left(tmp_path / "mine") == {"report.html"}
+
+
 def test_a_disk_that_fills_while_a_folder_is_moved_to_it_holds_no_half_of_it(tmp_path, monkeypatch):
     def filled(source: Path, target: Path) -> None:
         if source.name == "tables":

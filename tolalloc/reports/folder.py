@@ -6,7 +6,7 @@ import os
 import platform
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from shutil import Error as MoveError
 from shutil import move, rmtree
@@ -79,7 +79,8 @@ def claimed(folder: Path) -> Iterator[Path]:
         beside.chmod(0o777 & ~_umask())  # a temporary folder is its owner's alone
         require_usable(folder)
         if new:
-            folder.rmdir()
+            with suppress(FileNotFoundError):  # an empty folder may be cleared away meanwhile
+                folder.rmdir()
             beside.rename(folder)
         else:  # it may be a disk of its own, or where someone stands
             _move_all(beside, folder)
