@@ -5,8 +5,10 @@ from __future__ import annotations
 import errno
 import io
 import json
+import os
 import subprocess
 import sys
+from pathlib import Path
 from unittest import mock
 
 import numpy as np
@@ -106,6 +108,13 @@ def test_what_a_script_prints_is_no_part_of_an_answer_to_a_program(tmp_path):
     assert json.loads(found.stdout)["study"]
     assert "mine" in found.stderr
     assert tolalloc("check", script).stdout.startswith("mine\n")
+
+
+@pytest.mark.parametrize("other", [Path.mkdir, os.mkfifo], ids=("folder", "pipe"))
+def test_what_is_no_file_is_said_to_be_there(tmp_path, other):
+    other(tmp_path / "mine.toml")
+    refused(tolalloc("te", "--reducer", tmp_path / "mine.toml"), "mine.toml: is a folder, a device or a pipe; allowed")
+    refused(tolalloc("te", "--reducer", tmp_path / "other.toml"), "other.toml: no such file; shipped reducer files are")
 
 
 def test_a_full_disk_is_one_sentence(calculation):
