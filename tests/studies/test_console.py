@@ -16,6 +16,7 @@ import pytest
 from tests.golden.cases import OWN
 from tolalloc.cli import console as lines
 from tolalloc.cli.console import print_table
+from tolalloc.reports.writer import written
 
 
 @pytest.mark.parametrize("width", ["40", "80", "200"])
@@ -54,6 +55,15 @@ def test_a_table_that_just_fits_is_not_cut(capsys, monkeypatch):
     said = capsys.readouterr().out
     assert all(len(line) <= 80 for line in said.splitlines())
     assert "−0.1123\n" in said and " 1.421\n" in said
+
+
+def test_a_share_just_below_all_is_not_all_and_a_report_says_the_same_of_others(capsys):
+    shares = (99.9966, 100.0, 99.9566, 98.9583)
+    print_table(pd.DataFrame({"limit": list("abcd"), "yield [%]": shares, "cost [EUR]": shares}), "Yields")
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()[-4:]]
+    assert [row[1] for row in rows] == ["99.99", "100", "99.96", "98.96"]
+    assert rows[0][2] == "100"
+    assert [written(share, "%") for share in shares] == ["99.99", "100.0", "99.96", "98.96"]
 
 
 def numbers_of(line: str) -> list[float]:

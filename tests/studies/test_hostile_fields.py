@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import errno
 import io
+import json
+import os
+import subprocess
 import sys
+from pathlib import Path
 from unittest import mock
 
+import numpy as np
 import pandas as pd
 import pytest
 from openpyxl import load_workbook
@@ -19,6 +24,7 @@ from tolalloc.cli.main import main
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.reports.excel import Formula, write_sheets
 from tolalloc.reports.writer import write_csv
+from tolalloc.study.script import load_study
 
 
 @pytest.mark.parametrize(
@@ -78,6 +84,39 @@ def test_output_that_is_not_utf_8_shows_a_question_mark(calculation):
     assert b'"study": "?"' in stdout.buffer.getvalue()
 
 
+def test_a_command_ends_well_where_all_its_streams_are_closed(tmp_path):
+    words = [sys.executable, "-c", "from tolalloc.cli.main import main; main()", "new", str(tmp_path / "mine")]
+    shell = ["sh", "-c", '"$@" <&- >&- 2>&-', "sh", *words]
+    assert subprocess.run(shell, check=False).returncode == 0
+    assert (tmp_path / "mine" / "study.py").is_file()
+    assert subprocess.run(shell, check=False).returncode == 2  # the folder is there now
+
+
+def test_what_numpy_does_at_a_rounding_stays_as_a_study_found_it(tmp_path):
+    script = study_script(tmp_path)
+    script.write_text(f"import numpy\nnumpy.seterr(all='raise')\n{script.read_text()}")
+    before = np.geterr()
+    load_study(script)
+    assert np.geterr() == before != dict.fromkeys(before, "raise")
+
+
+def test_what_a_script_prints_is_no_part_of_an_answer_to_a_program(tmp_path):
+    script = study_script(tmp_path)
+    script.write_text(f"print('mine')\n{script.read_text()}")
+    found = tolalloc("check", script, "--json")
+    assert found.returncode == 0
+    assert json.loads(found.stdout)["study"]
+    assert "mine" in found.stderr
+    assert tolalloc("check", script).stdout.startswith("mine\n")
+
+
+@pytest.mark.parametrize("other", [Path.mkdir, os.mkfifo], ids=("folder", "pipe"))
+def test_what_is_no_file_is_said_to_be_there(tmp_path, other):
+    other(tmp_path / "mine.toml")
+    refused(tolalloc("te", "--reducer", tmp_path / "mine.toml"), "mine.toml: is a folder, a device or a pipe; allowed")
+    refused(tolalloc("te", "--reducer", tmp_path / "other.toml"), "other.toml: no such file; shipped reducer files are")
+
+
 def test_a_full_disk_is_one_sentence(calculation):
     full = OSError(errno.ENOSPC, "No space left on device", "out.csv")
     with mock.patch("tolalloc.cli.studies.say", side_effect=full):
@@ -87,6 +126,11 @@ def test_a_full_disk_is_one_sentence(calculation):
 @pytest.mark.parametrize("threads", ["0", "x", "-1", "1_0"])
 def test_a_number_of_threads_that_numba_cannot_use_is_refused(threads):
     refused(tolalloc("--version", NUMBA_NUM_THREADS=threads), f"NUMBA_NUM_THREADS is {threads!r}; allowed is a whole")
+
+
+def test_a_clock_before_the_first_day_of_a_workbook_is_refused():
+    with mock.patch("tolalloc.cli.main.time.strftime", return_value="1970-01-01"):
+        refused(tolalloc("--version"), "clock is '1970-01-01'; allowed is 1980-01-01 or later")
 
 
 TEXTS = ("=1+1", "+cmd", "-cmd", "@sum", "plain", "-1.5")

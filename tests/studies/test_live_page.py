@@ -247,7 +247,7 @@ def test_a_saved_study_says_the_same_digits_and_overwrites_nothing(script, desk)
     before = saved.read_bytes()
     with pytest.raises(InputError, match="already"):
         ask(desk, "save", design={}, name="tighter")
-    for name in ("../out", "a/b", "", "x" * 61, "1st", ".py", "a.b", None, 3, "con\0"):
+    for name in ("../out", "a/b", "", "x" * 61, "1st", ".py", "a.b", None, 3, "con\0", "numpy", "json", "tolalloc"):
         with pytest.raises(InputError, match="name is"):
             ask(desk, "save", design={}, name=name)
     assert saved.read_bytes() == before
@@ -395,6 +395,8 @@ HOSTILE = [
     (404, {"method": "GET", "path": "/%2e%2e/fit.py"}),
     (404, {"method": "GET", "path": "//etc/passwd"}),
     (404, {"method": "GET", "path": "/live/server.py"}),
+    (404, {"method": "GET", "path": "http://["}),
+    (404, {"method": "GET", "path": "http://evil.example/"}),
     (403, {"method": "GET", "path": "/"}),
     (403, {"method": "GET", "path": "/?token=guess"}),
     (403, {"method": "GET", "path": "/", "Host": "evil.example"}),

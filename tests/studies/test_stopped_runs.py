@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,7 +17,7 @@ from tests.studies.command import ROOT, command, process, tolalloc
 from tests.studies.test_allocate_command import script_with
 from tolalloc.cli.console import Lines
 from tolalloc.reports import writer
-from tolalloc.reports.folder import claimed
+from tolalloc.reports.folder import claimed, numbered
 from tolalloc.running import result_cache as kept_units
 
 COMPARED = ("summary.json", "allocation.csv", "tables/drawing.csv", "tables/front.csv")
@@ -81,10 +82,44 @@ def test_a_report_fills_an_empty_folder_that_stands_there(tmp_path):
     assert left(tmp_path) == {"mine"}
 
 
-def test_what_a_killed_writer_left_is_cleared_by_the_next_one(tmp_path):
+def test_a_run_folder_stays_where_it_was_asked_for_when_work_goes_elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with claimed(Path("mine")) as folder:
+        (folder / "report.html").touch()
+        monkeypatch.chdir("/")
+    assert left(tmp_path) == {"mine"}
+    assert left(tmp_path / "mine") == {"report.html"}
+
+
+def test_a_run_whose_empty_folder_is_cleared_away_is_not_lost(tmp_path):
+    with claimed(tmp_path / "mine") as folder:
+        (folder / "report.html").touch()
+        (tmp_path / "mine").rmdir()
+    assert left(tmp_path / "mine") == {"report.html"}
+
+
+def test_a_disk_that_fills_while_a_folder_is_moved_to_it_holds_no_half_of_it(tmp_path, monkeypatch):
+    def filled(source: Path, target: Path) -> None:
+        if source.name == "tables":
+            target.mkdir()
+            (target / "half.csv").touch()
+            raise shutil.Error([(str(source), str(target), "[Errno 28] No space left on device")])
+        shutil.move(source, target)
+
+    (tmp_path / "disk").mkdir()
+    monkeypatch.setattr("tolalloc.reports.folder.move", filled)
+    with pytest.raises(OSError, match="No space left on device") as caught, claimed(tmp_path / "disk") as folder:
+        (folder / "tables").mkdir()
+        (folder / "report.html").touch()
+    assert caught.value.filename == str(tmp_path / "disk")
+    assert left(tmp_path) == {"disk"}
+    assert left(tmp_path / "disk") == set()
+
+
+def test_a_writer_keeps_its_folder_and_what_a_killed_one_left_is_cleared_by_the_next_one(tmp_path):
     writing = f"""
 from pathlib import Path
-from tolalloc.reports.folder import claimed
+from tolalloc.reports.folder import claimed, numbered
 with claimed(Path({str(tmp_path / "mine")!r})) as folder:
     (folder / "report.html").write_text("half")
     print("writing", flush=True)
@@ -93,11 +128,13 @@ with claimed(Path({str(tmp_path / "mine")!r})) as folder:
     words = [sys.executable, "-c", writing]
     with subprocess.Popen(words, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as running:
         assert running.stdout.readline() == "writing\n"
+        assert numbered(tmp_path / "mine")[-1] == tmp_path / "mine-2"  # who names no folder gets another one
         with claimed(tmp_path / "mine") as other:  # the first writer lives, so what it has stays
             (other / "whole").touch()
             assert len(left(tmp_path)) == 3
         running.kill()
     (tmp_path / "mine" / "whole").unlink()
+    assert numbered(tmp_path / "mine") == [tmp_path / "mine"]
     assert len(left(tmp_path)) == 2
     with claimed(tmp_path / "mine"):
         assert len(left(tmp_path)) == 2

@@ -15,6 +15,7 @@ from tolalloc.allocation.space.effort import AllocationEffort
 from tolalloc.allocation.space.joint_yield import JointCheck, JointRequirement
 from tolalloc.allocation.verify.verification import Verifier
 from tolalloc.drawings.seeds import SeedTree
+from tolalloc.reports.tellers.allocation_tables import today_table
 from tolalloc.study.prepared import Prepared
 
 GAP, PLAY = "gap [mm]", "play [mm]"
@@ -157,11 +158,15 @@ def test_failures_that_coincide_count_once():
     assert checked(same_study()).shares == pytest.approx([twice * (1 - TARGET)] * 2, rel=0.05)
 
 
-def test_a_limit_that_costs_nothing_leaves_its_failures_to_the_other():
+def test_a_limit_that_costs_nothing_leaves_its_failures_to_the_other(monkeypatch):
     wide = {GAP: ta.Limit(upper=NARROW), PLAY: ta.Limit(upper=5.0)}
     found = replace(apart_study(), limits=wide).allocate().result
     assert found.chosen.parts[1] < 0.05
     assert found.met
+    prices = dict.fromkeys((own.stack.name for own in found.chosen.constraints), 1.0)
+    monkeypatch.setattr(type(found.free), "prices", prices)  # a local model gives a price to what no unit misses too
+    rows = today_table(found, "cost units").rows
+    assert {row.name: row.binds for row in rows if row.limit and row.name in (GAP, PLAY)} == {GAP: "yes", PLAY: ""}
 
 
 def test_the_first_sentence_says_the_yield_of_all_limits(answers):

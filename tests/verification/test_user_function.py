@@ -87,6 +87,32 @@ def test_what_a_function_raises_is_said():
     assert isinstance(caught.value.__cause__, TypeError)
 
 
+class Aside(BaseException):
+    """What a library raises to be caught by nobody else."""
+
+
+class SilentError(Exception):
+    """What cannot say what it is."""
+
+    def __str__(self):
+        raise ValueError("no words")
+
+
+@pytest.mark.parametrize(("kind", "said"), [(Aside, r"Aside \(no such pin\)"), (SilentError, "SilentError")])
+def test_an_exception_that_is_hardly_one_is_a_fault_too(kind, said):
+    with pytest.raises(InputError, match=f"the function has a fault: {said} in test_user_function.py, line"):
+        returned(raising(kind), 1, np.array([[0.5], [2.0], [0.7]]))
+    with pytest.raises(KeyboardInterrupt):
+        returned(raising(KeyboardInterrupt), 1, np.array([[0.5], [2.0], [0.7]]))
+
+
+@pytest.mark.parametrize("function", [lambda h: None, lambda h: h + 1j, lambda h: h * np.inf], ids=("None", "i", "inf"))
+def test_a_function_without_a_number_for_any_of_many_samples_is_refused(function):
+    with pytest.raises(SolveError, match=r"no number for any of 40 samples, as for \(0\.5\); allowed are numbers"):
+        returned(function, 1, np.full((40, 1), 0.5))
+    assert not np.isfinite(returned(function, 1, np.full((3, 1), 0.5))).any()
+
+
 FAULTS = (
     *(KeyError, IndexError, AttributeError, AssertionError, NameError, UnboundLocalError, LookupError, TypeError),
     *(RecursionError, NotImplementedError, MemoryError, OSError, FileNotFoundError, TimeoutError, ImportError),
@@ -376,7 +402,7 @@ def test_a_function_that_answers_differently_the_second_time_is_refused(made):
         (lambda a: np.float32(a), "float32"),
         (lambda a: np.asarray(a).astype(np.float16), "float16"),
         (lambda a: np.complex64(a), "complex64"),
-        (lambda a: str(a), "str"),
+        (lambda a: str(a), "text"),
         (lambda a: np.datetime64("2026-01-01"), "datetime64"),
     ],
     ids=["float32", "float16", "complex64", "text", "time"],

@@ -230,7 +230,7 @@ def _common(levels: ChainedEstimate, scaled: ScaledSigmaEstimate | SolveError) -
         if not any(run.levels[0].share for run in scaled.runs):
             return alone(found="scaled-sigma sampling met no failure at any width, so no other broad region")
         found = f"scaled-sigma sampling can see {100 * seen:.0f} % of the failures and says nothing definite"
-        return alone(found=found, doubts=("it lost failures on the way",) * (seen > 0.5))
+        return alone(found=found, doubts=("scaled-sigma sampling found too few failures to confirm it",) * (seen > 0.5))
     # What scaled-sigma sampling cannot see explains at most that it found less.
     explained = scaled.probability / seen if seen else np.inf
     corrected = max(scaled.probability, min(explained, levels.probability))
@@ -242,7 +242,7 @@ def _common(levels: ChainedEstimate, scaled: ScaledSigmaEstimate | SolveError) -
     if apart > LARGEST_DIFFERENCE:
         larger = max(levels, scaled, key=lambda item: item.probability)
         half = abs(levels.probability - scaled.probability) / 2
-        said = f"they contradict each other with {levels.probability:.2g} and {scaled.probability:.2g}"
+        said = f"two methods contradict each other with {levels.probability:.2g} and {scaled.probability:.2g}"
         error = max(larger.standard_error, half)
         return _Common(probability=larger.probability, error=error, found=found, doubts=(said,))
     weights = np.array([own, other]) ** -2

@@ -8,7 +8,9 @@ import shutil
 import sys
 import textwrap
 import time
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, redirect_stdout
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from math import isnan
 from pathlib import Path
@@ -27,6 +29,8 @@ if TYPE_CHECKING:
     from tolalloc.running.progress import Progress
     from tolalloc.study.answer import Answer
 
+_ANSWERS: ContextVar[TextIO | None] = ContextVar("answers", default=None)
+"""Where answers to a program go while nothing else shall go there."""
 _PAUSE = 5.0
 """Time between two lines of a log [s]."""
 _SHORT = 2.0
@@ -245,7 +249,18 @@ def announce_kernel(model: object) -> None:
 
 def print_json(answer: dict[str, Any]) -> None:
     """Print an answer for a program."""
-    sys.stdout.write(json.dumps(answer, ensure_ascii=False, indent=2) + "\n")
+    (_ANSWERS.get() or sys.stdout).write(json.dumps(answer, ensure_ascii=False, indent=2) + "\n")
+
+
+@contextmanager
+def answers_alone() -> Iterator[None]:
+    """Keep standard output for the answer to a program: what a user's script or function prints goes to the errors."""
+    token = _ANSWERS.set(sys.stdout)
+    try:
+        with redirect_stdout(sys.stderr):
+            yield
+    finally:
+        _ANSWERS.reset(token)
 
 
 def print_table(frame: pd.DataFrame, title: str) -> None:
@@ -259,7 +274,7 @@ def print_table(frame: pd.DataFrame, title: str) -> None:
     from rich.table import Table
 
     console, names = Console(), [str(name) for name in frame.columns]
-    rows = [[_cell(value) for value in row] for row in frame.itertuples(index=False)]
+    rows = [list(map(_cell, row, names)) for row in frame.itertuples(index=False)]
     cells = [[row[column] for row in rows] for column in range(len(names))]
     words = [word for text in (names[0], *cells[0]) for word in text.split()]
     first = max(map(len, words), default=1)
@@ -306,9 +321,14 @@ def _widened(least: list[int], most: list[int], room: int) -> list[int]:
     return widths
 
 
-def _cell(value: object) -> str:
-    """Return a cell with four significant digits and a true minus; what is not there stays empty."""
+def _cell(value: object, name: str) -> str:
+    """Return a cell with four significant digits and a true minus; what is not there stays empty.
+
+    A share just below all is not rounded up to all.
+    """
     if isinstance(value, float):
+        if name.endswith("[%]") and value < 100.0 <= float(f"{value:.4g}"):
+            return "99.99"
         return "" if isnan(value) else signed(f"{value:.4g}")
     return true_minus(str(value))
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import io
 import os
 import sys
+import time
+from contextlib import nullcontext
 from typing import Annotated
 
 import typer
 
-from tolalloc.cli.console import note
+from tolalloc.cli.console import answers_alone, note
 from tolalloc.cli.doctor import doctor
 from tolalloc.cli.inquiries import inquiry_command
 from tolalloc.cli.new import new, schema
@@ -86,6 +88,9 @@ EXAMPLES = {
 }
 """An example for the help of every command, in a folder that ``tolalloc new mine --with all`` made."""
 
+_FIRST_DAY = "1980-01-01"
+"""First day that a file inside a workbook, a ZIP archive, can state."""
+
 for command in _COMMANDS:
     word = command.__name__.removesuffix("_page")
     app.command(word, epilog=f"Example: `{EXAMPLES[word]}`")(saying_options(command, word))
@@ -93,13 +98,16 @@ for command in _COMMANDS:
 
 def main() -> None:
     """Run the command line; an error that a user can mend becomes one sentence and exit code 2."""
+    _open_closed_streams()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # where output is not UTF-8, a µ becomes a question mark
     try:
         _require_threads(os.environ.get("NUMBA_NUM_THREADS", "1"))
+        _require_clock(time.strftime("%Y-%m-%d"))
         try:
-            app()
+            with answers_alone() if "--json" in sys.argv and "--help" not in sys.argv else nullcontext():
+                app()
         finally:
             sys.stdout.flush()
     except StoppedError as stop:
@@ -116,10 +124,23 @@ def main() -> None:
         raise SystemExit(2) from None
 
 
+def _open_closed_streams() -> None:
+    """Let what a closed stream would take go nowhere: Python has None in its place, and files would get its number."""
+    for name in ("stdin", "stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "r" if name == "stdin" else "w", encoding="utf-8"))  # noqa: SIM115
+
+
 def _require_threads(stated: str) -> None:
     """Refuse a number of threads on which numba stops with a traceback."""
     if not (stated.isascii() and stated.isdecimal() and 1 <= len(stated) <= 4 and int(stated) > 0):
         raise InputError.at("environment", "NUMBA_NUM_THREADS", stated, "a whole number from 1 to 9999, or nothing")
+
+
+def _require_clock(today: str) -> None:
+    """Refuse a clock that was not set, before which a workbook ends in a traceback when all is solved."""
+    if today < _FIRST_DAY:
+        raise InputError.at("environment", "clock", today, f"{_FIRST_DAY} or later, the first day of a workbook")
 
 
 def run_script() -> None:

@@ -56,12 +56,13 @@ class UserFunction:
             The function takes another number of arguments, returns another number of values or what is no number, has
             a fault, or answers differently when it is asked the same again.
         SolveError
-            It raises for every one of many samples; a few without an answer are statuses.
+            It has an answer for none of many samples; a few without one are statuses.
         """
         self._require_arguments(arguments.shape[1])
         with np.errstate(all="ignore"):
             whole = self._of_columns(arguments)
             if whole is not None:
+                self._require_a_number(whole, arguments)
                 return whole
             rows, reasons = [], []
             for sample in arguments:
@@ -73,6 +74,7 @@ class UserFunction:
             self._require_same(arguments[few], found[few])
         if len(reasons) == len(rows) >= _FEWEST:
             raise SolveError(f"{self.place}: the function raises for each of {len(rows)} samples, first {reasons[0]}.")
+        self._require_a_number(found, arguments)
         return found
 
     def takes_columns(self, arguments: Float[np.ndarray, "sample argument"]) -> bool:
@@ -89,7 +91,9 @@ class UserFunction:
             found = self.function(*(column.copy() for column in arguments.T))
             single = self.values == 1 and np.shape(found) in ((), (samples,))
             columns = [np.broadcast_to(self._numbers(one), samples) for one in _flat([found] if single else found)]
-        except (Exception, SystemExit):  # whatever it is, it is met again sample by sample, and said there
+        except KeyboardInterrupt:
+            raise
+        except BaseException:  # whatever it is, it is met again sample by sample, and said there
             return None
         if len(columns) != self.values:
             return None
@@ -103,6 +107,16 @@ class UserFunction:
     def _alone(self, arguments: Float[np.ndarray, "sample argument"]) -> Float[np.ndarray, "sample value"]:
         """Return the values of samples that are called one by one."""
         return np.array([self._of_sample(sample)[0] for sample in arguments]).reshape(-1, self.values)
+
+    def _require_a_number(
+        self, found: Float[np.ndarray, "sample value"], arguments: Float[np.ndarray, "sample argument"]
+    ) -> None:
+        """Raise if none of many samples has an answer: what is wrong then is the function."""
+        if len(found) >= _FEWEST and not np.isfinite(found).any():
+            raise SolveError(
+                f"{self.place}: the function returns no number for any of {len(found)} samples, as for "
+                f"({_listed(arguments[0])}); allowed are numbers that are real and finite."
+            )
 
     def _require_same(
         self, arguments: Float[np.ndarray, "sample argument"], before: Float[np.ndarray, "sample value"]
@@ -123,7 +137,9 @@ class UserFunction:
         nothing = np.full(self.values, np.nan)
         try:
             said = self._said(sample)
-        except (Exception, SystemExit) as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
             if isinstance(error, FAILURES) and not isinstance(error, _FAULTS):
                 return nothing, f"{_named(error)} for ({_listed(sample)})"
             raise InputError(f"{self.place}: the function has a fault: {_named(error)}{_line_of(error)}.") from error
@@ -159,7 +175,8 @@ class UserFunction:
         masked = np.ma.getmaskarray(found) if isinstance(found, np.ma.MaskedArray) else False
         values = np.asarray(np.ma.getdata(found) if np.any(masked) else found)
         if values.dtype.kind in "USmM":
-            raise InputError(f"{self.place}: the function returned {values.dtype.name}; allowed are numbers.")
+            kind = "text" if values.dtype.kind in "US" else values.dtype.name
+            raise InputError(f"{self.place}: the function returned {kind}; allowed are numbers.")
         if values.dtype in (np.float16, np.float32, np.complex64):
             raise InputError(
                 f"{self.place}: the function returned {values.dtype.name}; allowed are numbers of 64 bits, as those of "
@@ -186,7 +203,10 @@ class UserFunction:
 
 def _named(error: BaseException) -> str:
     """Return what was raised, and what it says if it says anything."""
-    words = " ".join(str(error).split())
+    try:
+        words = " ".join(str(error).split())
+    except Exception:  # what a user's exception says may raise too
+        words = ""
     return f"{type(error).__name__} ({words})" if words else type(error).__name__
 
 

@@ -6,8 +6,9 @@ import os
 import platform
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from shutil import Error as MoveError
 from shutil import move, rmtree
 from tempfile import mkdtemp
 
@@ -42,9 +43,9 @@ def require_usable(folder: Path | None) -> None:
 
 
 def numbered(first: Path) -> list[Path]:
-    """Return the folders that runs of one name have taken, and last the next one that is new or empty."""
+    """Return the folders that runs of one name have taken or are filling, and last the next one that is free."""
     found = [first]
-    while found[-1].is_file() or (found[-1].is_dir() and any(found[-1].iterdir())):
+    while found[-1].is_file() or (found[-1].is_dir() and any(found[-1].iterdir())) or _is_being_filled(found[-1]):
         found.append(first.with_name(f"{first.name}-{len(found) + 1}"))
     return found
 
@@ -62,42 +63,71 @@ def claimed(folder: Path) -> Iterator[Path]:
         Something is in the way, or the folder cannot be made.
     """
     require_usable(folder)
+    named, folder = folder, folder.absolute()  # what is run inside may go to another folder
     new = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         _clear_left(folder)
         own = f".{folder.name}-{_machine()}-{os.getpid()}-"
-        beside = Path(mkdtemp(prefix=own, suffix=_UNFINISHED, dir=folder.absolute().parent))
+        beside = Path(mkdtemp(prefix=own, suffix=_UNFINISHED, dir=folder.parent))
     except OSError as error:
         raise RunFolderError(
-            f"{folder}: the run folder cannot be made ({error.strerror}); name another (--out)."
+            f"{named}: the run folder cannot be made ({error.strerror}); name another (--out)."
         ) from None
     try:
         yield beside
         beside.chmod(0o777 & ~_umask())  # a temporary folder is its owner's alone
         require_usable(folder)
         if new:
-            folder.rmdir()
+            with suppress(FileNotFoundError):  # an empty folder may be cleared away meanwhile
+                folder.rmdir()
             beside.rename(folder)
         else:  # it may be a disk of its own, or where someone stands
-            for path in sorted(beside.iterdir(), key=lambda path: path.name == "manifest.json"):
-                move(path, folder / path.name)
+            _move_all(beside, folder)
             beside.rmdir()
     except BaseException as error:
         if isinstance(error, OSError) and error.filename is None:
-            error.filename = str(folder)  # a full disk does not say where it is
+            error.filename = str(named)  # a full disk does not say where it is
         rmtree(beside, ignore_errors=True)
         if new and folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()
         raise
 
 
+def _move_all(beside: Path, folder: Path) -> None:
+    """Move what stands in one folder into an empty one, the manifest last; where that fails nothing is left there."""
+    try:
+        for path in sorted(beside.iterdir(), key=lambda path: path.name == "manifest.json"):
+            move(path, folder / path.name)
+    except BaseException as error:
+        for path in folder.iterdir():
+            if path.is_dir() and not path.is_symlink():
+                rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)
+        if isinstance(error, MoveError):  # of a folder, with what happened to each of its files and no other word
+            raise OSError(0, str(error.args[0][0][-1])) from None
+        raise
+
+
 def _clear_left(folder: Path) -> None:
     """Remove what processes of this machine that are no more left unfinished beside a folder."""
-    written = re.compile(rf"\.{re.escape(folder.name)}-{re.escape(_machine())}-(\d+)-\w+{re.escape(_UNFINISHED)}")
-    for path in folder.absolute().parent.iterdir():
-        if (found := written.fullmatch(path.name)) and _is_gone(int(found[1])):
+    for path, process in _unfinished(folder):
+        if _is_gone(process):
             rmtree(path, ignore_errors=True)
+
+
+def _is_being_filled(folder: Path) -> bool:
+    """Return whether a living process of this machine seems to fill a folder; its number may be another's."""
+    return any(not _is_gone(process) for _, process in _unfinished(folder))
+
+
+def _unfinished(folder: Path) -> list[tuple[Path, int]]:
+    """Return what processes of this machine have begun beside a folder, each with the number of its process."""
+    written = re.compile(rf"\.{re.escape(folder.name)}-{re.escape(_machine())}-(\d+)-\w+{re.escape(_UNFINISHED)}")
+    above = folder.absolute().parent
+    found = [(path, written.fullmatch(path.name)) for path in (above.iterdir() if above.is_dir() else ())]
+    return [(path, int(name[1])) for path, name in found if name]
 
 
 def _is_gone(process: int) -> bool:

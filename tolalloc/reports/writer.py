@@ -10,7 +10,6 @@ from datetime import date
 from functools import singledispatch
 from importlib.metadata import version
 from io import BytesIO
-from math import floor
 from numbers import Integral
 from pathlib import Path
 from typing import Any
@@ -54,8 +53,11 @@ def html_table(frame: pd.DataFrame) -> Markup:
 
 
 _NUMBER = ' class="number"'
-_NEARLY_ALL = 99.0
-"""Share from which two decimals are written [%]."""
+_NEARLY_ALL = 90.0
+"""Share from which two decimals are written, as in a sentence and on a terminal [%]."""
+
+_BELOW_ALL = 99.99
+"""Largest share that is written of what is less than all [%]."""
 
 
 def _is_number(value: object) -> bool:
@@ -69,12 +71,14 @@ def written(value: float, unit: str) -> str:
     A share just below all is not rounded up to all.
 
     >>> written(41.6543, "cost units"), written(-12.345678, "µm"), written(123456.7, "-"), written(99.967, "%")
-    ('41.65', '−12.35', '123457', '99.96')
+    ('41.65', '−12.35', '123457', '99.97')
+    >>> written(99.997, "%"), written(98.958, "%"), written(100.0, "%")
+    ('99.99', '98.96', '100.0')
     """
     if pd.isna(value):
         return ""
     if unit == "%" and _NEARLY_ALL < value < 100.0:
-        return f"{floor(100 * value) / 100:.2f}"
+        return f"{min(value, _BELOW_ALL):.2f}"
     if unit in _DECIMALS and (value == 0.0 or 0.05 <= abs(value) < 1e6):
         return signed(f"{value:.{_DECIMALS[unit]}f}")
     return signed(f"{value:.0f}" if 1e4 <= abs(value) < 1e15 else f"{value:.4g}")

@@ -86,6 +86,8 @@ def load_script(path: Path) -> StudyScript:
     InputError
         The script is missing, broken, or defines no study.
     """
+    import numpy as np
+
     from tolalloc.reading.file_content import is_file
     from tolalloc.reading.files import relative_to
     from tolalloc.study.study import Study
@@ -99,7 +101,8 @@ def load_script(path: Path) -> StudyScript:
     module = importlib.util.module_from_spec(spec)
     modules = {name: module}
     try:
-        with relative_to(folder), _modules_beside(folder, modules):
+        # A script that tells NumPy to raise at a rounding would stop libraries that mean to go on.
+        with relative_to(folder), _modules_beside(folder, modules), np.errstate():
             spec.loader.exec_module(module)
     except TolallocError as error:
         raise InputError(f"{path}: {error}") from None

@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import re
 import shlex
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from importlib.metadata import packages_distributions
 from pathlib import Path
 from threading import Event, Lock, Thread
 from typing import Any, cast
@@ -178,7 +180,7 @@ class Saving:
         Raises
         ------
         InputError
-            A name that is none of a Python module, or files that are there already.
+            A name that cannot be that of a new Python module, or files that are there already.
         """
         if not (isinstance(name, str) and _NAME.fullmatch(name)):
             raise InputError.at("page", "name", name, "60 letters, digits and _, a letter first")
@@ -186,6 +188,9 @@ class Saving:
         for path in (table, script):
             if path.exists():
                 raise InputError(f"{path.name}: is there already in the folder of the study; choose another name.")
+        # A script imports what lies beside it first: a saved numpy.py would take the place of NumPy.
+        if name in {"tolalloc", *sys.stdlib_module_names, *packages_distributions()}:
+            raise InputError.at("page", "name", name, "what no installed Python module is called")
         drawing, currency = self.study(design, name).drawing, self.session.prepared.currency
         sources = tuple(map(_with_range, drawing.sources if drawing else ()))
         write_new(table, table_text(sources, table.parent, currency))

@@ -15,7 +15,7 @@ from importlib.resources import files
 from pathlib import Path
 from threading import BoundedSemaphore
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs
 
 from tolalloc.cli.live.desk import Desk
 from tolalloc.exceptions import InputError, TolallocError
@@ -169,16 +169,16 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Answer with a page."""
-        address = urlsplit(self.path)
-        page = self.live.pages.get(address.path)
         if not self._is_local():
             return
+        path, _, query = self.path.partition("?")  # a page asks for a path, which has no host that could be malformed
+        page = self.live.pages.get(path)
         if page is None:
             self._refuse(HTTPStatus.NOT_FOUND, "There is no such page.")
-        elif address.path == "/" and not self._knows(parse_qs(address.query).get("token", [""])[0]):
+        elif path == "/" and not self._knows(parse_qs(query).get("token", [""])[0]):
             self._refuse(HTTPStatus.FORBIDDEN, "Open the address that tolalloc open printed: its token is missing.")
         else:
-            kind = _KINDS.get(address.path.rpartition(".")[2], "text/html")
+            kind = _KINDS.get(path.rpartition(".")[2], "text/html")
             self._send(HTTPStatus.OK, page, f"{kind}; charset=utf-8")
 
     def do_POST(self) -> None:

@@ -97,7 +97,9 @@ def today_table(result: AllocationResult, cost_unit: str) -> Table[_Compared]:
         asked = own.requirement
         if isinstance(asked, JointRequirement):
             continue
-        price = result.free.prices.get(drawn.stack.name, 0.0)
+        price, share = result.free.prices.get(drawn.stack.name, 0.0), after.yield_of(asked).estimate
+        # Of limits that are kept at once, one that no unit misses leaves all that may be missed to the others.
+        uses = price * drawn.scale > _BINDS * after.cost and not (after.jointly and share == 1.0)
         rows.append(
             _Compared(
                 name=f"{portrait.display_name(asked.output)} [{unit_of(asked.output)}]",
@@ -106,8 +108,8 @@ def today_table(result: AllocationResult, cost_unit: str) -> Table[_Compared]:
                 before=side.value,
                 after=drawn.value,
                 kept_before=100 * before.yield_of(check.requirement).estimate,
-                kept_after=100 * after.yield_of(asked).estimate,
-                binds="yes" if price * drawn.scale > _BINDS * after.cost else "",
+                kept_after=100 * share,
+                binds="yes" if uses else "",
             )
         )
     if len(result.requirements) > 1:
