@@ -107,8 +107,16 @@ def test_an_output_that_does_not_vary_is_refused():
     sample = drawn(2, 2000)
     same = replace(sample.evaluation, values=np.ones_like(sample.evaluation.values))
     for limit in (0.5, 1.5):
-        with pytest.raises(SolveError, match="same for all the worst units"):
+        with pytest.raises(SolveError, match="same for all units"):
             target_sensitivity(replace(sample, evaluation=same), SIZES, limit, SeedTree(2))
+
+
+def test_the_worst_units_of_an_output_with_steps_are_those_on_its_highest_step():
+    sample = drawn(2, 4000)
+    steps = replace(sample.evaluation, values=np.where(sample.evaluation.values > 0, 2.0, 1.0))
+    found = target_sensitivity(replace(sample, evaluation=steps), SIZES, 5.0, SeedTree(2), permutations=9, resamples=9)
+    assert (found.threshold, found.is_limit) == (1.0, False)
+    assert found.outside == np.count_nonzero(sample.evaluation.values > 0)
 
 
 def test_failed_units_do_not_make_a_sample_too_small():

@@ -194,7 +194,7 @@ def monte_carlo(
     for index, uniform in enumerate(uniform_chunks(design, seeds, units, len(errors.columns))):
         x[index * CHUNK : (index + 1) * CHUNK] = experiment.deviations(errors.standard_values(uniform))
     result = MonteCarlo(x=x, evaluation=experiment.response(x))
-    require_few_failures(result, ".".join(seeds.path), experiment.largest_failed_share)
+    require_few_failures(result, "random units", experiment.largest_failed_share)
     return result
 
 
@@ -203,8 +203,8 @@ def require_few_failures(result: AnsweredUnits, name: str, largest_failed_share:
     units = result.evaluation.status.size
     if result.failed > largest_failed_share * units:
         raise FailedUnitsError(
-            f"Monte Carlo {name}: {result.failed} of {units} units have no usable answer; allowed is "
-            f"{largest_failed_share:.4g} of them, because more would bias every figure."
+            f"{name[0].upper()}{name[1:]}: {result.failed:,} of {units:,} units have no usable answer; allowed is a "
+            f"share of {largest_failed_share:.4g}, because more would bias every figure."
         )
 
 

@@ -97,7 +97,7 @@ def target_sensitivity(
     InputError
         The worst 5 % are fewer units than needed.
     SolveError
-        More units failed, or the output is the same for all the worst units.
+        More units failed, or the output is the same for all units.
 
     Notes
     -----
@@ -131,8 +131,8 @@ def target_sensitivity(
     x, values = sample.x[good], sample.values
     threshold, is_limit = _threshold(values, limit, units=good.size)
     outside = values > threshold
-    if not outside.any():
-        raise SolveError("Target sensitivity: the output is the same for all the worst units, so none is set apart.")
+    if outside.all():
+        raise SolveError("Target sensitivity: the output is the same for all units, so none is set apart.")
     measures, squares = limited_measures(errors, x), _mean_squares(errors, x)
     tables = np.stack([_table(measure, outside) for measure in measures.T])
     return TargetSensitivity(
@@ -198,7 +198,9 @@ def _threshold(values: Float[np.ndarray, " good_unit"], limit: float, *, units: 
     needed = fewest_units()
     if units < needed:
         raise InputError.at("target sensitivity", "units", units, f"{needed} or more for {outside} outside")
-    return float(np.quantile(values, 1.0 - WORST_SHARE)), False
+    cut, most = float(np.quantile(values, 1.0 - WORST_SHARE)), values.max()
+    # Of an output with steps the worst units may all be alike: then they are those on the highest step.
+    return cut if cut < most else float(values[values < most].max(initial=-np.inf)), False
 
 
 def _table(measure: Float[np.ndarray, " unit"], outside: Bool[np.ndarray, " unit"]) -> Int[np.ndarray, "class 2"]:

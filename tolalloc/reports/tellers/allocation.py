@@ -135,7 +135,7 @@ class AllocationTeller(Teller[AllocationResult]):
             heading=_say("heading_today"),
             figures=(figures.units_figure(result), *effects_figure(result)),
             tables=((table.name, table.frame(unit)),),
-            paragraphs=texts.capability_change(result),
+            paragraphs=(*texts.today_values(result), *texts.capability_change(result)),
             first=True,
         )
 

@@ -11,10 +11,12 @@ from tolalloc.allocation.result import AllocationResult, limit_price, limit_step
 from tolalloc.allocation.search.candidates import ALONE
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
 from tolalloc.allocation.space.joint_yield import JointRequirement
-from tolalloc.allocation.space.requirement import AtYield, Guarantee
+from tolalloc.allocation.space.requirement import AtYield, Guarantee, OwnLimit, Requirement
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.capability.indices import capability
 from tolalloc.capability.monte_carlo import Yield
+from tolalloc.drawings.sources import Source
+from tolalloc.reading.units import MICROMETRE
 from tolalloc.reports.feature_frame import callout_assumptions
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import Examination, portrait_of
@@ -28,6 +30,10 @@ _NOTHING = 1e-3
 _WRITTEN = 0.005
 """Difference of two amounts below which they are written alike, in their units."""
 _EVEN_ODDS = 0.5
+_ALIKE = 0.005
+"""Relative change of a zone below which it stays [-]."""
+_MOST_CHANGED = 2
+"""Zones that are named of those tightened, and of those opened, most [-]."""
 _SAME_COST = 5e-4
 """Relative difference of costs below which they are printed alike [-]."""
 
@@ -78,7 +84,7 @@ def headline(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
 def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     """Return the answer in sentences; the first ones stand in the headline of a report."""
     chosen = result.chosen
-    found = [*verdict(result), *drawn_amounts(result), _cost(result, cost_unit)]
+    found = [*verdict(result), *drawn_amounts(result), *zones_changed(result), _cost(result, cost_unit)]
     found += assembly_cost_sentences(result, cost_unit)
     if len(result.requirements) > 1 and not chosen.jointly:
         found.append(_say("all_limits", share=chosen.joint.estimate))
@@ -106,7 +112,7 @@ def _verdict(result: AllocationResult) -> str:
         said = {}
     return _say(
         key,
-        verdict=_say("verdict_met" if result.met else "verdict_missed"),
+        verdict=_say(_verdict_key(result)),
         share=achieved.estimate,
         units=achieved.units,
         simulated=portrait_of(result.model).simulated,
@@ -114,6 +120,59 @@ def _verdict(result: AllocationResult) -> str:
         low=100 * achieved.low,
         high=achieved.high,
         **said,
+    )
+
+
+def _verdict_key(result: AllocationResult) -> str:
+    if not result.met:
+        return "verdict_missed"
+    return "verdict_met_quick" if result.error >= _EVEN_ODDS else "verdict_met"
+
+
+def zones_changed(result: AllocationResult) -> tuple[str, ...]:
+    """Return which zones change most, and how many stay; nothing where the drawing is the table."""
+    before = {own.name: own.zone for own in result.space.errors.sources}
+    changes = [
+        (members[0].zone / before[members[0].name], result.line_name((name, members)), members[0])
+        for name, members in result.lines
+    ]
+    changed = sorted((own for own in changes if abs(own[0] - 1) > _ALIKE), key=lambda own: own[0])
+    if not changed or not result.met:
+        return ()
+
+    def named(rows: list[tuple[float, str, Source]]) -> str:
+        zones = ((name, before[own.name] / MICROMETRE, own.zone / MICROMETRE) for _, name, own in rows)
+        return ", ".join(_say("zone_changed", name=name, before=old, zone=new) for name, old, new in zones)
+
+    tighter = [own for own in changed if own[0] < 1][:_MOST_CHANGED]
+    wider = [own for own in reversed(changed) if own[0] > 1][:_MOST_CHANGED]
+    left = len(changes) - len(changed)
+    said = [_say("zones_tightened", names=named(tighter))] if tighter else []
+    said += [_say("zones_opened", names=named(wider))] if wider else []
+    said += [_say("zones_kept", count=left, all=len(changes))] if left else []
+    return (_say("zones_changed", changed="; ".join(said)),)
+
+
+def own_limit(asked: Requirement) -> str:
+    """Return that a limit is the model's own, where nobody wrote it."""
+    return _say("own_limit") if isinstance(asked, OwnLimit) else ""
+
+
+def today_values(result: AllocationResult) -> tuple[str, ...]:
+    """Return what the numbers beside the limits are, and how many units keep the drawing as it is."""
+    today = result.free.baseline
+    several = len(result.requirements) > 1
+    kept = today.joint if several else today.achieved
+    return (
+        _say(
+            "today_values",
+            simulated=portrait_of(result.model).simulated,
+            share=kept.estimate,
+            low=100 * kept.low,
+            high=kept.high,
+            units=kept.units,
+            limits=_say("today_all" if several else "today_one"),
+        ),
     )
 
 
