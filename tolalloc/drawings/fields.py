@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from tolalloc.drawings.distributions import Distribution, batches_text, parsed_batches, require_shape
+from tolalloc.drawings.distributions import Distribution, batches_text, parsed_batches, parsed_shapes, require_shapes
 from tolalloc.drawings.measured_parts import MeasuredParts, load_measured_parts
 from tolalloc.drawings.sources import Source, is_angular
 from tolalloc.drawings.table_file import usual_signs
@@ -88,6 +88,26 @@ def _known_unit(text: str) -> str:
     return unit
 
 
+def shapes_text(stated: object) -> object:
+    """Return shapes as a cell states them, one number or several, as text."""
+    if isinstance(stated, int | float) and not isinstance(stated, bool):
+        return repr(stated)
+    if isinstance(stated, list | tuple):
+        return " ".join(map(repr, stated))
+    return "" if stated is None else stated
+
+
+def shapes_cell(shapes: tuple[float, ...]) -> Cell:
+    """Return shapes as a table writes them: one as the number that it is."""
+    return shapes[0] if len(shapes) == 1 else " ".join(map(repr, shapes)) or None
+
+
+def _known_shapes(text: str) -> str:
+    """Return the shapes of a row, as they were stated."""
+    parsed_shapes(text)
+    return text
+
+
 def _no_comment(text: str) -> str:
     """Return a first cell that no reader of the table takes for a comment."""
     if text.startswith("#"):
@@ -138,7 +158,8 @@ class ToleranceRow(Record):
     distribution: Annotated[
         Distribution,
         Column(
-            "`normal`, `uniform`, `triangular`, `lognormal`, `weibull`, `mixture` or `empirical`; normal unless given",
+            "`normal`, `uniform`, `triangular`, `trapezoid`, `beta`, `lognormal`, `weibull`, `rayleigh`, `mixture` or "
+            "`empirical`; normal unless given",
             attribute="distribution",
         ),
     ] = Distribution.NORMAL
@@ -147,8 +168,15 @@ class ToleranceRow(Record):
         float, Field(ge=-1, le=1), Column("mean shift over half the zone, sizes only", "half zone", "shift")
     ] = 0.0
     shape: Annotated[
-        float | None, Column("of lognormal and Weibull", "-", write=lambda source: source.shape or None)
-    ] = None
+        str,
+        BeforeValidator(shapes_text),
+        AfterValidator(_known_shapes),
+        Column(
+            "of lognormal and Weibull; of a trapezoid its plateau over its width; of beta both, as `2 5`",
+            "-",
+            write=lambda source: shapes_cell(source.shapes),
+        ),
+    ] = ""
     batches: Annotated[
         str,
         Column(
@@ -362,7 +390,12 @@ class ToleranceRow(Record):
     @model_validator(mode="after")
     def _distribution_makes_sense(self) -> ToleranceRow:
         kind, batches = self.distribution, parsed_batches(self.batches)
-        require_shape(kind, self.shape)
+        require_shapes(kind, parsed_shapes(self.shape))
+        if kind is Distribution.RAYLEIGH and self.feature is not Feature.SIZE:
+            raise ValueError(
+                f"distribution rayleigh is for radial sizes; for feature {self.feature.value} allowed is normal, whose "
+                "vectors have such a length"
+            )
         if (kind is Distribution.MIXTURE) != bool(batches):
             raise ValueError("distribution mixture and batches such as '0.7:-0.3:0.8 0.3:0.5:0.6' go together")
         if (kind is Distribution.EMPIRICAL) != bool(self.measured) or (self.measured_zone and not self.measured):
@@ -408,6 +441,7 @@ class ToleranceRow(Record):
         factor = UNITS[self.unit] * MICROMETRE
         middle = (self.plus + self.minus) / 2 * factor if self.feature is Feature.SIZE else 0.0
         spectrum, teeth = parsed_spectrum(self.spectrum)
+        shapes = parsed_shapes(self.shape)
         plain = {name: column for name, column in COLUMNS.items() if column.attribute}
         stated: dict[str, Any] = {column.attribute: column.read(getattr(self, name)) for name, column in plain.items()}
         return Source(
@@ -419,7 +453,7 @@ class ToleranceRow(Record):
             minimum=self.min * factor,
             maximum=self.max * factor,
             step=self.step * factor,
-            shape=self.shape or 0.0,
+            shape=shapes[0] if len(shapes) == 1 else shapes or 0.0,
             batches=parsed_batches(self.batches),
             measured=self._measured_parts(folder, middle),
             spectrum=spectrum,

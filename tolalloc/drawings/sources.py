@@ -129,7 +129,7 @@ class Source:
     shift
         Mean shift over half the zone, for sizes only [-].
     shape
-        Shape of a lognormal or Weibull distribution, else 0 [-].
+        Shape of a lognormal, Weibull or trapezoidal distribution, both of a beta distribution, else 0 [-].
     spectrum
         Order → relative amplitude of pitch and run-out deviations [-].
     systematic
@@ -163,7 +163,7 @@ class Source:
     distribution: Distribution = Distribution.NORMAL
     cp: float = 1.0
     shift: float = 0.0
-    shape: float = 0.0
+    shape: float | tuple[float, ...] = 0.0
     batches: tuple[Batch, ...] = ()
     measured: MeasuredParts | None = None
     sorted: bool = False
@@ -236,6 +236,11 @@ class Source:
         return self.over or 1.0
 
     @property
+    def shapes(self) -> tuple[float, ...]:
+        """Shapes of the distribution, none where it has none [-]."""
+        return self.shape if isinstance(self.shape, tuple) else (self.shape,) if self.shape else ()
+
+    @property
     def _base(self) -> Marginal:
         """Deviation of a size, from the middle of its zone or its lower limit; radius or amplitude of all others."""
         is_size = self.feature is Feature.SIZE
@@ -245,14 +250,23 @@ class Source:
             return smoothed(relative, smoothing_width(relative)) if is_size else smoothed_magnitude(relative)
         if self.distribution is Distribution.MIXTURE:
             return Mixture(normal, self.batches)
+        if self.distribution in (Distribution.NORMAL, Distribution.RAYLEIGH):
+            return normal if self.distribution is Distribution.NORMAL else RAYLEIGH
         start = -1.0 if is_size else 0.0
-        return {
-            Distribution.NORMAL: normal,
-            Distribution.UNIFORM: Family("uniform", (start, 1.0 - start), 1.0),
-            Distribution.TRIANGULAR: Family("triang", (0.5, start, 1.0 - start), 1.0),
-            Distribution.LOGNORMAL: Family("lognorm", (self.shape,)),
-            Distribution.WEIBULL: Family("weibull_min", (self.shape,)),
+        name, shapes = {
+            Distribution.UNIFORM: ("uniform", ()),
+            Distribution.TRIANGULAR: ("triang", (0.5,)),
+            Distribution.TRAPEZOID: (
+                "trapezoid",
+                tuple((1.0 + sign * own) / 2.0 for own in self.shapes for sign in (-1, 1)),
+            ),
+            Distribution.BETA: ("beta", self.shapes),
+            Distribution.LOGNORMAL: ("lognorm", self.shapes),
+            Distribution.WEIBULL: ("weibull_min", self.shapes),
         }[self.distribution]
+        return (
+            Family(name, (*shapes, start, 1.0 - start), 1.0) if self.distribution.is_bounded else Family(name, shapes)
+        )
 
     @cached_property
     def zone_mapping(self) -> ZoneMapping:
@@ -346,7 +360,10 @@ class Source:
                 f"{batch.weight:g} of all with shift {batch.shift:g} and spread {batch.spread:g}"
                 for batch in self.batches
             )
-        return f"{self.distribution.value}, shape {self.shape:g}" if self.shape else self.distribution.value
+        shapes = " and ".join(f"{own:g}" for own in self.shapes)
+        if len(self.shapes) > 1:
+            return f"{self.distribution.value}, shapes {shapes}"
+        return f"{self.distribution.value}, shape {shapes}" if shapes else self.distribution.value
 
 
 def limited_measure(source: Source, columns: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, " sample"]:

@@ -14,10 +14,10 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
-from tolalloc.drawings.distributions import Distribution, require_shape
-from tolalloc.drawings.fields import ALLOWED_UNITS, COLUMNS, UNITS, Cell, ToleranceRow, headers_in
+from tolalloc.drawings.distributions import Distribution, parsed_shapes, require_shapes
+from tolalloc.drawings.fields import ALLOWED_UNITS, COLUMNS, UNITS, Cell, ToleranceRow, headers_in, shapes_text
 from tolalloc.drawings.ladder import RADII, fit_deviations, is_fit
 from tolalloc.drawings.sources import Source, known_as
 from tolalloc.drawings.table_file import (
@@ -54,7 +54,7 @@ class ProcessCapability(Record):
     Cp: Annotated[float, Field(ge=0.1, le=10)]
     shift: Annotated[float, Field(ge=-1, le=1)] = 0.0
     distribution: Distribution = Distribution.NORMAL
-    shape: float | None = None
+    shape: Annotated[str, BeforeValidator(shapes_text)] = ""
     sorted: bool = False
     note: Annotated[str, Field(min_length=1)]
 
@@ -67,7 +67,7 @@ class ProcessCapability(Record):
             )
         if self.feature is not Feature.SIZE and self.shift != 0:
             raise ValueError(f"shift must be 0 for feature {self.feature.value}: {self.shift:g}")
-        require_shape(self.distribution, self.shape)
+        require_shapes(self.distribution, parsed_shapes(self.shape))
         return self
 
     @property
