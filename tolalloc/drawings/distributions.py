@@ -93,8 +93,8 @@ SHAPES = {
     Distribution.BETA: Shapes(2, 1.0, 50.0),
     Distribution.TRAPEZOID: Shapes(1, 0.01, 0.99),
 }
-"""The shapes of the distributions that have any. Without a plateau a trapezoid is triangular, without sides uniform; with
-a shape below 1 a beta density has no end at a limit."""
+"""The shapes of the distributions that have any. Without a plateau a trapezoid is triangular, without sides uniform;
+with a shape below 1 a beta density has no end at a limit."""
 
 
 def parsed_shapes(text: str) -> tuple[float, ...]:

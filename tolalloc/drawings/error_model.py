@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -32,6 +32,8 @@ class ErrorModel:
     correlation: Correlation = field(default_factory=Correlation)
     # Table that the sources come from, as its user named it, for messages alone; empty where there is none
     table: str = field(default="", compare=False, repr=False)
+    # What its user's table calls the columns, head → column, so that it is written again as it was
+    called: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         self.correlation.require_sound(self.sources)

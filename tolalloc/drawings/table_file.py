@@ -191,17 +191,22 @@ class Heads:
         """Return a head as a column is named, with the unit that it states.
 
         >>> heads = Heads(known=("id", "Cp"), called={"Merkmal": "id"})
-        >>> heads.meant("Merkmal"), heads.meant("CP [-]"), heads.meant("Bemerkung")
+        >>> heads.meant("MERKMAL"), heads.meant("CP [-]"), heads.meant("Bemerkung")
         ('id', 'Cp [-]', 'Bemerkung')
         """
         name, unit = split_header(head)
-        spelt = {own.lower(): own for own in self.known}
-        found = self.called.get(name.strip()) or spelt.get(name.strip().lower(), name)
+        spelt = {_spelt(own): own for own in self.known} | {_spelt(own): name for own, name in self.called.items()}
+        found = spelt.get(_spelt(name), name)
         return f"{found} [{unit}]" if unit else found
 
     def named(self, cells: Sequence[str]) -> set[str]:
         """Return the names that a row would give to columns."""
         return {split_header(self.meant(cell))[0] for cell in cells}
+
+
+def _spelt(head: str) -> str:
+    """Return a head without its capitals and line breaks."""
+    return " ".join(head.split()).lower()
 
 
 _ANY = Heads()

@@ -17,9 +17,18 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from tolalloc.drawings.distributions import Distribution, parsed_shapes, require_shapes
-from tolalloc.drawings.fields import ALLOWED_UNITS, COLUMNS, UNITS, Cell, ToleranceRow, headers_in, shapes_text
+from tolalloc.drawings.fields import (
+    ALLOWED_UNITS,
+    COLUMNS,
+    UNITS,
+    Cell,
+    ToleranceRow,
+    headers_in,
+    shapes_text,
+    usual_unit,
+)
 from tolalloc.drawings.ladder import RADII, fit_deviations, is_fit
-from tolalloc.drawings.sources import Source, known_as
+from tolalloc.drawings.sources import INCHES, LENGTHS, PERCENT, Source, known_as
 from tolalloc.drawings.table_file import (
     DATA,
     Heads,
@@ -30,11 +39,11 @@ from tolalloc.drawings.table_file import (
     require_units,
     split_header,
     typed_cells,
-    usual_signs,
 )
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
-from tolalloc.reading.files import Record, no_formula, shipped_or_path, validated
+from tolalloc.reading.file_content import is_file
+from tolalloc.reading.files import Record, as_toml, no_formula, read_toml, shipped_or_path, validated
 from tolalloc.reading.units import COST_UNITS, MICROMETRE, MILLIMETRE
 
 if TYPE_CHECKING:
@@ -136,6 +145,8 @@ _SMALLEST_SIZE = 0.1 * MILLIMETRE
 """Nominal size below which it is doubted, where one is stated [m]."""
 _FINEST_ZONE = 0.1 * MICROMETRE
 """Zone of a feature without a nominal size below which it is doubted [m]."""
+_WIDEST_ZONE = 2.0 * MILLIMETRE
+"""Zone of a feature without a nominal size above which it is doubted: a metre may be meant as a millimetre [m]."""
 _LARGEST_SIZE = 3150.0 * MILLIMETRE
 """Largest nominal size of ISO 286-1 [m]."""
 _OFF = 3.0
@@ -207,6 +218,8 @@ def _of_zone(source: Source) -> list[str]:
     found, zone = [], source.zone
     if zone < _FINEST_ZONE:
         found.append(f"the zone of {_length(zone)} is finer than any process holds")
+    elif not source.nominal and zone > _WIDEST_ZONE:
+        found.append(f"the zone of {_length(zone)} is wide, and no nominal size is stated beside it")
     elif source.nominal > 0 and source.feature is Feature.SIZE and not source.over:
         factor = zone / _tolerance_factor(source.nominal)
         if not _FINEST <= factor <= _COARSEST:
@@ -257,18 +270,45 @@ _NEAR = 0.75
 """Likeness of a head to the name of a column from which on it is a slip rather than a column of the user's own [-]."""
 
 
-def heads_of(columns: Mapping[str, str] = MappingProxyType({})) -> Heads:
+class HeadsFile(Record):
+    """What an office calls the columns of its table, as a TOML file beside it says it."""
+
+    columns: Mapping[str, str]  # Head as it is written, without its unit → name of the column that it is
+
+
+def heads_of(path: Path, columns: Mapping[str, str] = MappingProxyType({})) -> Heads:
     """Return how the heads of a tolerance table are read, some of them called as an office does.
+
+    What is given comes before what the file `heads_file` beside the table says.
 
     Raises
     ------
-    UnknownNameError
-        A head stands for what is no column.
+    InputError, UnknownNameError
+        A head stands for what is no column, or two heads for one; or the file is no such file.
     """
-    for name in columns.values():
+    beside, places = heads_file(path), dict.fromkeys(columns, "drawing, columns")
+    if is_file(beside):
+        stated = validated(HeadsFile, read_toml(beside), beside).columns
+        columns, places = {**stated, **columns}, {**dict.fromkeys(stated, f"{beside}, columns"), **places}
+    for head, name in columns.items():
         if name not in ToleranceRow.model_fields:
-            raise UnknownNameError.among("drawing, columns", "column", name, ToleranceRow.model_fields)
-    return Heads(needed=("id",), known=tuple(ToleranceRow.model_fields), called=columns)
+            raise UnknownNameError.among(places[head], f"{head!r} stands for column", name, ToleranceRow.model_fields)
+    return Heads(needed=("id",), known=tuple(ToleranceRow.model_fields), called=dict(columns))
+
+
+def heads_file(table: Path) -> Path:
+    """Return the file beside a tolerance table that says what its heads mean, whether it is there or not.
+
+    >>> heads_file(Path("shop/zones.xlsx")).name, heads_file(Path("mine.tolerances.csv")).name
+    ('zones.toml', 'mine.tolerances.toml')
+    """
+    return table.with_suffix(".toml")
+
+
+def heads_text(called: Mapping[str, str]) -> str:
+    """Return the text of such a file."""
+    lines = (f"{as_toml(head)} = {as_toml(name)}\n" for head, name in called.items())
+    return "".join(["# What the heads of the table beside this file mean.\n[columns]\n", *lines])
 
 
 def own_heads(path: Path, names: Sequence[str]) -> tuple[str, ...]:
@@ -284,7 +324,8 @@ def own_heads(path: Path, names: Sequence[str]) -> tuple[str, ...]:
     near = {name: get_close_matches(name.lower(), spelt, n=1, cutoff=_NEAR) for name in own}
     if slips := [f"{name!r} ({spelt[found[0]]}?)" for name, found in near.items() if found]:
         raise InputError(
-            f"{path}: no such column: {', '.join(slips)}; rename each, or say what it is by ta.drawing(columns=)."
+            f"{path}: no such column: {', '.join(slips)}; rename each, or say what it is in "
+            f"{heads_file(path).name} beside it or by ta.drawing(columns=)."
         )
     return tuple(own)
 
@@ -306,7 +347,7 @@ def load_tolerance_table(
         The file, row, field and value that are not allowed.
     """
     path = shipped_or_path(name, DATA, ".tolerances.csv", "tolerance table")
-    (_, first), *others = read_table_file(path, heads_of(columns), sheet=sheet)
+    (_, first), *others = read_table_file(path, heads_of(path, columns), sheet=sheet)
     stated = [split_header(header) for header in first]
     own = own_heads(path, [name for name, _ in stated])
     headers = tuple(name for name, _ in stated)
@@ -360,28 +401,37 @@ def _both_ways(row: dict[str, str], place: str) -> dict[str, str]:
     if feature != Feature.SIZE or row["id"].rsplit(".", 1)[-1] in RADII or not nominal:
         allowed = "plus and minus, since a fit is that of a diameter or width with its nominal size"
         raise InputError.at(place, "plus", plus, allowed)
-    unit = UNITS.get(usual_signs(row.get("unit", "")), 1.0) * MICROMETRE
+    unit, inch = usual_unit(row.get("unit", "")), usual_unit(row.get("unit", "")) == INCHES
     try:
-        deviations = fit_deviations(plus, plain_number(nominal) * MILLIMETRE)
+        width = plain_number(nominal) * LENGTHS[INCHES if inch else "mm"]
+        deviations = fit_deviations(plus, width)
     except ValueError:
         raise InputError.at(place, "nominal", nominal, "a number with a decimal point") from None
     except InputError as error:
         raise InputError(f"{place}: {error}") from None
-    upper, lower = (f"{round(one / unit, 9):.9g}" for one in deviations)
+    length = abs(width) / 100.0 if unit == PERCENT else UNITS.get(unit, 1.0) * MICROMETRE
+    upper, lower = (f"{round(one / length, 9):.9g}" for one in deviations)
     return {**row, "plus": upper, "minus": lower}
 
 
 def _require_units(path: Path, stated: Sequence[tuple[str, str]], rows: Sequence[tuple[int, dict[str, str]]]) -> None:
-    """Raise unless headers state the units of `COLUMNS`; that of zones may also be the one unit of all rows."""
+    """Raise unless headers state the units of `COLUMNS`; that of zones may also be the one unit of all rows.
+
+    A nominal size may be stated in inches where all rows are in inches, and in mm where none is.
+    """
     units = {name: column.unit for name, column in COLUMNS.items()}
     for column, unit in stated:
-        if units[column] != "unit" or unit in ("", "unit"):
+        own = usual_unit(unit)
+        is_length = units[column] == "mm" and own in ("mm", INCHES)
+        if not is_length and (units[column] != "unit" or unit in ("", "unit")):
             continue
-        if unit not in UNITS:
+        if own not in UNITS and own != PERCENT:
             allowed = f"unit, where the column unit says it row by row; or {ALLOWED_UNITS}, the same as in all rows"
             raise InputError.at(path, f"the unit of column {column}", unit, allowed)
         for number, row in rows:
-            if UNITS.get(usual_signs(row["unit"]), UNITS[unit]) != UNITS[unit]:
+            said = usual_unit(row["unit"])
+            other = (said == INCHES) != (own == INCHES) if is_length else said != own
+            if other and (said in UNITS or said == PERCENT):
                 allowed = f"{unit} as in the header {column} [{unit}]; numbers are not converted"
                 raise InputError.at(f"{path}, row {number} ({row['id'] or 'no id'})", "unit", row["unit"], allowed)
         units[column] = unit
@@ -454,11 +504,16 @@ def _written(cell: Cell, folder: Path | None) -> str | int | float:
     return str(cell) if isinstance(cell, str) else cell
 
 
-def table_frame(sources: Sequence[Source], folder: Path | None = None, cost_unit: str = COST_UNITS) -> pd.DataFrame:
-    """Return the sources as a tolerance table in the layout that `load_tolerance_table` reads."""
+def table_frame(
+    sources: Sequence[Source],
+    folder: Path | None = None,
+    cost_unit: str = COST_UNITS,
+    called: Mapping[str, str] = MappingProxyType({}),
+) -> pd.DataFrame:
+    """Return the sources as a tolerance table in the layout that `load_tolerance_table` reads, heads as an office's."""
     import pandas as pd
 
-    heads = [*headers_in(cost_unit).values(), *own_heads_of(sources)]
+    heads = [*headers_in(cost_unit, sources, called).values(), *own_heads_of(sources)]
     return pd.DataFrame(table_rows(sources, folder), columns=heads)
 
 
@@ -484,11 +539,17 @@ def with_own_words(frame: pd.DataFrame, named: str, members: Mapping[str, Sequen
     return frame
 
 
-def table_text(sources: Sequence[Source], folder: Path | None = None, currency: str = "") -> str:
+def table_text(
+    sources: Sequence[Source],
+    folder: Path | None = None,
+    currency: str = "",
+    called: Mapping[str, str] = MappingProxyType({}),
+) -> str:
     """Return the sources as the CSV file that `load_tolerance_table` reads, costs in a currency if they are in one."""
     text = StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(map(no_formula, [*headers_in(currency or COST_UNITS).values(), *own_heads_of(sources)]))
+    heads = headers_in(currency or COST_UNITS, sources, called).values()
+    writer.writerow(map(no_formula, [*heads, *own_heads_of(sources)]))
     writer.writerows(map(no_formula, row) for row in table_rows(sources, folder))
     return text.getvalue()
 

@@ -10,6 +10,7 @@ from math import pi
 
 MILLIMETRE = 1e-3
 MICROMETRE = 1e-6
+INCH = 25.4e-3
 MICRORADIAN = 1e-6
 DEGREE = pi / 180.0
 ARCMINUTE = DEGREE / 60.0

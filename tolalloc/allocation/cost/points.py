@@ -113,7 +113,7 @@ def load_shop_points(path: Path) -> ShopPoints:
     for place, row in read_rows(path, ShopPrice, "process", _UNITS):
         zone = row.tolerance * UNITS[row.unit]
         if zone > LARGEST_ZONE:
-            raise InputError.at(place, "tolerance", f"{row.tolerance:g} {row.unit}", f"{LARGEST_ZONE:g} µm or less")
+            raise InputError.at(place, "tolerance", f"{row.tolerance:g} {row.unit}", f"{LARGEST_ZONE:.0f} µm or less")
         prices.setdefault((row.process, row.feature), []).append((zone, row.cost))
     found = {}
     for (process, feature), pairs in prices.items():

@@ -22,10 +22,10 @@ from openpyxl.worksheet.worksheet import Worksheet
 from tolalloc.allocation.cost.model import Combined, Exponential, Reciprocal, ReciprocalPower, SumOfCosts, Weighted
 from tolalloc.allocation.cost.points import Spline, Tabulated
 from tolalloc.allocation.result import AllocationResult
-from tolalloc.drawings.sources import STEPS, Source, rounded_down
-from tolalloc.reading.units import MICROMETRE, MILLIMETRE, unit_of
+from tolalloc.drawings.sources import LENGTHS, STEPS, Source, rounded_down
+from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.excel import Formula, keep_values
-from tolalloc.reports.feature_frame import STEP, FeatureFrame, callout
+from tolalloc.reports.feature_frame import FINEST, FeatureFrame, callout, writing_unit
 from tolalloc.reports.header import Header
 from tolalloc.reports.tellers.allocation_answer_sheet import NAME, add_answer
 from tolalloc.reports.templates import Sentences
@@ -85,7 +85,7 @@ def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
                 for process, row, scale in zip(made, rows, scales, strict=True)
             ],
             "characteristic": [_characteristic(_first_member(result, name)) for name in space.groups],
-            "write [mm]": [
+            _write_head(result): [
                 _written(_first_member(result, name), row, zone)
                 for row, name, zone in zip(rows, space.groups, zones.tolist(), strict=True)
             ],
@@ -104,13 +104,21 @@ def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     return pd.concat([table, *_further_lines(result), *_other_lines(result)], ignore_index=True)
 
 
+def _write_head(result: AllocationResult) -> str:
+    """Return the head of what the drawing states."""
+    return f"write [{writing_unit(result.drawn_sources)}]"
+
+
 def _characteristic(source: Source) -> str:
     """Return symbol and name of a characteristic, and the length, radius or middle that its zone belongs to."""
     frame = callout(source)
-    _, _, length = frame.zone.partition("/") if frame.is_framed else ("", "", "")
-    where = f"over {length} mm" if length else f"{frame.place} mm" if frame.place else ""
+    unit = source.length_name
+    _, _, length = frame.zone.removesuffix(f" {unit}").partition("/") if frame.is_framed else ("", "", "")
+    where = (
+        f"over {length} {unit}" if length else f"{frame.place.removesuffix(f' {unit}')} {unit}" if frame.place else ""
+    )
     if frame.is_deviation and source.middle:
-        where = f"about nominal {signed(source.middle / MILLIMETRE, '+.5f')} mm"
+        where = f"about nominal {signed(source.middle / LENGTHS[unit], '+.5f')} {unit}"
     return " ".join(filter(None, (frame.symbol, frame.characteristic, where)))
 
 
@@ -144,7 +152,7 @@ def _others(result: AllocationResult) -> list[tuple[str, tuple[Source, ...]]]:
 
 def _other_lines(result: AllocationResult) -> list[pd.DataFrame]:
     """Return one row for every line whose zones are locked, for the drawing to be whole; nothing without any."""
-    rows = []
+    rows, head = [], _write_head(result)
     for line in _others(result):
         own = line[1][0]
         half = own.zone / 2 if callout(own).is_deviation else own.zone
@@ -154,7 +162,7 @@ def _other_lines(result: AllocationResult) -> list[pd.DataFrame]:
                 "zone to change [µm]": own.zone / MICROMETRE,
                 "inside": _say("workbook_locked"),
                 "characteristic": _characteristic(own),
-                "write [mm]": rounded_down(half, STEP) / MILLIMETRE,
+                head: rounded_down(half, FINEST[own.length_name][0]) / LENGTHS[own.length_name],
                 "datum": " ".join(callout(own).datums),
             }
         )
@@ -167,7 +175,7 @@ def _further_lines(result: AllocationResult) -> list[pd.DataFrame]:
     Nothing without any.
     """
     first = {name: _FIRST + at for at, name in enumerate(result.drawn.groups)}
-    rows = []
+    rows, head = [], _write_head(result)
     for row, line in enumerate(_further(result), start=_FIRST + len(first)):
         name, members = line
         own, zone = callout(members[0]), members[0].zone / MICROMETRE
@@ -177,7 +185,7 @@ def _further_lines(result: AllocationResult) -> list[pd.DataFrame]:
                 "group": result.line_name(line),
                 "zone to change [µm]": Formula(f"=B{first[name]}*{ratio}", zone),
                 "characteristic": _characteristic(members[0]),
-                "write [mm]": _written(members[0], row, zone),
+                head: _written(members[0], row, zone),
                 "datum": " ".join(own.datums),
             }
         )
@@ -185,19 +193,25 @@ def _further_lines(result: AllocationResult) -> list[pd.DataFrame]:
 
 
 def _written(source: Source, row: int, zone: float) -> Formula:
-    """Return what the drawing states of a zone [µm] in a row: rounded down to its step, half of it for a size [mm]."""
+    """Return what the drawing states of a zone [µm] in a row: rounded down to its step, half of it for a size.
+
+    In the length of its drawing, mm or in.
+    """
     halved = callout(source).is_deviation
     size = f"B{row}/2" if halved else f"B{row}"
-    step = number(source.step / MICROMETRE)
-    if not source.step:
+    length, (finest, _) = LENGTHS[source.length_name], FINEST[source.length_name]
+    step = number((source.step or finest) / MICROMETRE)
+    if not source.step and length == LENGTHS["mm"]:
         step = number(STEPS[-1][1])
         for end, own in reversed(STEPS[:-1]):
             step = f"IF({size}<{number(end)},{number(own)},{step})"
     half = zone / 2 if halved else zone
     # What was verified is stated as it is, a grade or a smallest zone too.
-    value = rounded_down(half * MICROMETRE, STEP) / MILLIMETRE
+    value = rounded_down(half * MICROMETRE, finest) / length
     verified = f"AND({size}>{number(half - _AS_VERIFIED)},{size}<{number(half + _AS_VERIFIED)})"
-    return Formula(f"=IF({verified},{number(round(value, 8))},INT({size}/{step}+0.000001)*{step}/1000)", value)
+    return Formula(
+        f"=IF({verified},{number(round(value, 8))},INT({size}/{step}+0.000001)*{step}/{length / MICROMETRE:.0f})", value
+    )
 
 
 def _without_weight(result: AllocationResult) -> tuple[str, ...]:
@@ -322,7 +336,8 @@ def _mark(result: AllocationResult, drawing: Worksheet) -> None:
 def _written_as(frame: FeatureFrame) -> str:
     """Return the format of a number that looks as on the drawing, whatever the language of its reader."""
     sign = "±" if frame.is_deviation else "⌀" if frame.zone.startswith("⌀") else ""
-    return f'"{sign}"0.0000#' if sign else "0.0000#"
+    number = '0.00000#" in"' if frame.zone.endswith(" in") else "0.0000#"
+    return f'"{sign}"{number}' if sign else number
 
 
 def _below(drawing: Worksheet, watched: pd.DataFrame, rows: int, notes: tuple[str, ...]) -> dict[str, float | str]:
