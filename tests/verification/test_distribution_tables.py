@@ -175,7 +175,7 @@ def test_bad_rows_are_refused_in_one_sentence(row, sentence, tmp_path):
 BAD_PARTS = [
     ("deviation [µm]", range(19), "number of measured parts is 19; allowed is 20 or more"),
     ("deviation [µm]", [*range(19), "x"], r"parts.csv, row 21: deviation \[µm\] is 'x'; allowed is a number"),
-    ("deviation [µm]", [*range(19), 9000], "row 21: .* is '9000'; allowed is a number from -2000 to 2000 µm"),
+    ("deviation [µm]", [*range(19), 9e6], "row 21: .* is '9000000.0'; allowed is a number from -1000000 to 1000000 µm"),
     ("deviation [µm]", [*range(19), "nan"], "row 21: .* is 'nan'"),
     ("deviation", range(30), "the unit of column 'deviation' is ''"),
     ("radius [µm]", range(30), "columns for feature size is .*; allowed is deviation"),

@@ -13,10 +13,9 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from tolalloc.drawings.distributions import Distribution, batches_text, parsed_batches, parsed_shapes, require_shapes
 from tolalloc.drawings.measured_parts import LARGEST_DEVIATION, MeasuredParts, load_measured_parts
 from tolalloc.drawings.sources import INCHES, LENGTHS, PERCENT, Source, is_angular
-from tolalloc.drawings.table_file import usual_signs
 from tolalloc.drawings.zones import Feature, parsed_spectrum, parsed_systematic, spectrum_text, systematic_text
 from tolalloc.reading.files import Record
-from tolalloc.reading.units import COST_UNITS, MICROMETRE
+from tolalloc.reading.units import COST_UNITS, MICROMETRE, usual_signs
 
 LARGEST_ZONE = LARGEST_DEVIATION
 """Largest zone that is believed [µm]; a model may ask for less, as a reducer does."""

@@ -44,7 +44,7 @@ from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.file_content import is_file
 from tolalloc.reading.files import Record, as_toml, no_formula, read_toml, shipped_or_path, validated
-from tolalloc.reading.units import COST_UNITS, MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import COST_UNITS, MICROMETRE, MILLIMETRE, number_in
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -351,19 +351,22 @@ def load_tolerance_table(
     stated = [split_header(header) for header in first]
     own = own_heads(path, [name for name, _ in stated])
     headers = tuple(name for name, _ in stated)
+    unit = "" if "unit" in headers else _unit_of_heads(stated)
     plus = headers.index("plus") if "plus" in headers else 0
     both = others and "minus" not in headers and all(_says_both(cells[plus]) for _, cells in others)
     kept = tuple(name for name in headers if name not in own)
-    require_columns(path, (*kept, "minus") if both else kept, ToleranceRow)
+    require_columns(path, (*kept, *["minus"] * bool(both), *["unit"] * bool(unit)), ToleranceRow)
     if len(set(own)) < len(own):
         twice = next(name for name in own if own.count(name) > 1)
         raise InputError(f"{path}: the column {twice!r} is there twice; each has one.")
     if not others:
         raise InputError(f"{path}: the table has no rows; one row per source is needed.")
-    rows = [(number, dict(zip(headers, cells, strict=True))) for number, cells in others]
+    if unit:
+        others, kept = [(number, (*cells, unit)) for number, cells in others], (*kept, "unit")
+    rows = [(number, dict(zip((*headers, *["unit"] * bool(unit)), cells, strict=True))) for number, cells in others]
     _require_units(path, [(name, unit) for name, unit in stated if name not in own], rows)
     known = [
-        (number, _both_ways({name: row[name] for name in kept}, f"{path}, row {number} ({row['id'] or 'no id'})"))
+        (number, _as_numbers({name: row[name] for name in kept}, f"{path}, row {number} ({row['id'] or 'no id'})"))
         for number, row in rows
     ]
     sources = sources_of_rows(known, capabilities, str(path), path.parent)
@@ -372,6 +375,11 @@ def load_tolerance_table(
         replace(source, own_cells=tuple((full[name], row[name]) for name in own))
         for source, (_, row) in zip(sources, rows, strict=True)
     )
+
+
+def _as_numbers(row: dict[str, str], place: str) -> dict[str, str]:
+    """Return a row with its two deviations, all numbers without units."""
+    return _both_ways(_without_units(row, place), place)
 
 
 _BOTH = re.compile(r"(?:±|\+/-|\+-)\s*")
@@ -412,6 +420,31 @@ def _both_ways(row: dict[str, str], place: str) -> dict[str, str]:
     length = abs(width) / 100.0 if unit == PERCENT else UNITS.get(unit, 1.0) * MICROMETRE
     upper, lower = (f"{round(one / length, 9):.9g}" for one in deviations)
     return {**row, "plus": upper, "minus": lower}
+
+
+def _unit_of_heads(stated: Sequence[tuple[str, str]]) -> str:
+    """Return the one unit of all zones where every head of them states it, for a table without a column of units."""
+    units = {usual_unit(unit) for name, unit in stated if name in COLUMNS and COLUMNS[name].unit == "unit"}
+    return units.pop() if len(units) == 1 and units <= {*UNITS, PERCENT} else ""
+
+
+def _without_units(row: dict[str, str], place: str) -> dict[str, str]:
+    """Return a row whose numbers stand without the units behind them, which must be those of their columns.
+
+    Raises
+    ------
+    InputError
+        A number in another unit.
+    """
+    found, unit = dict(row), usual_unit(row["unit"])
+    for name, cell in row.items():
+        own = {"unit": unit, "mm": INCHES if unit == INCHES else "mm"}.get(COLUMNS[name].unit, "")
+        if own and cell:
+            try:
+                found[name] = number_in(cell, own)
+            except ValueError as error:
+                raise InputError.at(place, name, cell, str(error)) from None
+    return found
 
 
 def _require_units(path: Path, stated: Sequence[tuple[str, str]], rows: Sequence[tuple[int, dict[str, str]]]) -> None:

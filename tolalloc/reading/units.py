@@ -50,3 +50,52 @@ def in_cost_units(unit: str) -> str:
     ('cost units µm^n', 'µm')
     """
     return _CURRENCY.sub(COST_UNITS, unit, count=1)
+
+
+WRITTEN_UNITS = ("mm", "µm", "um", "in", "inch", "%", "cm", "m", "nm")
+"""Units that a cell may state behind its number."""
+_NUMBER = r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?"
+WITH_UNIT = re.compile(rf"((?:±\s*|\+/-\s*|\+-\s*)?{_NUMBER})\s*({'|'.join(WRITTEN_UNITS)}|″|\")")
+"""Number, or one behind ±, with a unit behind it."""
+
+
+def usual_signs(unit: str) -> str:
+    """Return a unit with the one µ and the one dot that are meant; others are typed too, and look alike."""
+    return unit.replace("\u03bc", "µ").replace("\u22c5", "·")
+
+
+def is_unit(text: str) -> bool:
+    """Return whether a text is the unit of a column of a tolerance table."""
+    text = text.strip()
+    return (
+        usual_signs(text) in (*WRITTEN_UNITS, "-", "unit", "half zone", COST_UNITS) or currency_in(text) == text != ""
+    )
+
+
+def number_in(cell: str, unit: str) -> str:
+    """Return what a cell states without the unit behind its number.
+
+    Parameters
+    ----------
+    cell
+        A number, or one behind ±, with or without a unit.
+    unit
+        The unit that it may state.
+
+    Raises
+    ------
+    ValueError
+        It states another unit.
+
+    Examples
+    --------
+    >>> number_in("0.05 mm", "mm"), number_in("5%", "%"), number_in("0.05", "mm")
+    ('0.05', '5', '0.05')
+    """
+    found = WITH_UNIT.fullmatch(usual_signs(cell))
+    if found is None:
+        return cell
+    stated = {"um": "µm", "inch": "in", "″": "in", '"': "in"}.get(found[2], found[2])
+    if stated != unit:
+        raise ValueError(f"a number in {unit}, as the row says; numbers are not converted")
+    return found[1]

@@ -82,7 +82,7 @@ class ShopPrice(Record):
     process: Annotated[str, Field(min_length=1)]
     feature: Feature | None = None
     tolerance: Annotated[float, Field(ge=SMALLEST_ZONE)]
-    unit: Literal["µm", "um", "mm"]
+    unit: Literal["µm", "um", "mm", "in", "inch"]
     cost: Annotated[float, Field(ge=SMALLEST_COST, le=1e9)]
     note: str = ""
 
