@@ -25,10 +25,10 @@ from tolalloc.reading.files import Record, validated
 from tolalloc.reading.units import (
     COST_UNITS,
     WITH_UNIT,
-    WRITTEN_UNITS,
     currency_in,
     in_cost_units,
     is_unit,
+    shown_number,
     usual_signs,
 )
 
@@ -44,8 +44,6 @@ _MOST_CELLS = 100_000
 
 _BLANKS, _UNSEEN = re.compile(r"[\u00a0\u2007\u2009\u202f]"), re.compile(r"[\u200b-\u200d\u2060\ufeff\u00ad]")
 """Blanks of other widths, and signs that nobody sees."""
-_LITERAL = re.compile(r'"\s*([^"]*?)\s*"|\\ ?([^\W\d_]+)')
-"""Words in the format of a number."""
 
 
 class DateText(str):
@@ -178,24 +176,8 @@ def _text(path: Path, cell: Any, written: Any) -> str:
     if isinstance(value, date | time | timedelta):
         return DateText(str(value).removesuffix(" 00:00:00"))
     if isinstance(value, int | float) and not isinstance(value, bool):
-        return _shown(value, str(cell.number_format))
+        return shown_number(value, str(cell.number_format))
     return "" if value is None else _plain(str(value))
-
-
-def _shown(value: float, form: str) -> str:
-    """Return a number with what its format adds to it: leading zeros, per cent, the name of a unit.
-
-    >>> _shown(7, "000"), _shown(0.05, "0.00%"), _shown(0.02, '0.00" mm"'), _shown(25.0, "General")
-    ('007', '5%', '0.02 mm', '25')
-    """
-    if re.fullmatch(r"0{2,}", form) and float(value).is_integer():
-        return f"{int(value):0{len(form)}d}"
-    if "%" in re.sub(r'"[^"]*"', "", form):
-        return f"{100 * value:.12g}%"
-    named = (usual_signs(quoted or bare) for quoted, bare in _LITERAL.findall(form.split(";")[0]))
-    unit = next((name for name in named if name in WRITTEN_UNITS), "")
-    number = str(int(value) if float(value).is_integer() else value)
-    return f"{number} {unit}" if unit else number
 
 
 def _plain(cell: str) -> str:
@@ -205,7 +187,9 @@ def _plain(cell: str) -> str:
     ('-0.05', '10−20 mm', 'hub seat')
     """
     cell = normalize("NFC", _UNSEEN.sub("", _BLANKS.sub(" ", cell))).strip()
-    return "-" + cell[1:].lstrip() if _TRUE_MINUS.fullmatch(cell) else cell
+    negative = "-" + cell[1:].lstrip()
+    is_number = _TRUE_MINUS.fullmatch(cell) or (cell[:1] == "\u2212" and WITH_UNIT.fullmatch(negative))
+    return negative if is_number else cell
 
 
 DATA = Path(__file__).parent / "data"
@@ -214,7 +198,7 @@ DATA = Path(__file__).parent / "data"
 NumberedRow = tuple[int, tuple[str, ...]]
 """Row as an editor counts it, from 1, and its cells."""
 
-_DECIMAL = re.compile(r"[+-]?\d*[.,]\d+([eE][+-]?\d+)?")
+_DECIMAL = re.compile(r"[+-]?\d*[.,]\d+([eE][+-]?\d+)?", re.ASCII)
 """Number with one decimal sign, whichever."""
 
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
@@ -317,6 +301,10 @@ def read_table_file(path: Path, heads: Heads = _ANY, sheet: str = "") -> tuple[N
     (first, header), *others = (
         (number, tuple(cells[at] for at in used)) for (number, _), cells in zip(rows, full, strict=True)
     )
+    if again := [number for number, cells in others if heads.known and cells == header]:
+        raise InputError(
+            f"{path}, row {again[0]}: the heads stand here again; allowed is one table with its heads once."
+        )
     return _with_units(path, ((first, tuple(map(heads.meant, header))), *others), heads)
 
 
@@ -340,7 +328,8 @@ def _with_units(path: Path, rows: tuple[NumberedRow, ...], heads: Heads) -> tupl
         name, stated = split_header(head)
         if stated and unit and usual_signs(unit) != stated:
             raise InputError.at(f"{path}, row {number}", name, unit, f"{stated} as in the head {head}")
-        found.append(f"{name} [{unit}]" if unit and not stated and name in heads.known and name != "unit" else head)
+        is_said = unit not in ("", "-") and not stated and name in heads.known and name != "unit"
+        found.append(f"{name} [{unit}]" if is_said else head)
     return ((first, tuple(found)), *others)
 
 
@@ -354,10 +343,10 @@ def _records(path: Path, heads: Heads = _ANY) -> list[NumberedRow]:
     """Return the records of a CSV file; what separates them is seen from the header, # starts a comment."""
     text = read_text(path, "a table in CSV")
     lines = _without_comments(StringIO(text))
-    split = ((line, re.split(r"[;,\t]", line.strip())) for line in lines)
+    split = ((line, re.split(r"[;,\t|]", line.strip())) for line in lines)
     header = next((line for line, cells in split if heads.needed and heads.named(cells).issuperset(heads.needed)), "")
     header = header or next((line for line in lines if line.strip()), "")
-    separator = next((mark for mark in ";\t" if mark in header), ",")
+    separator = next((mark for mark in ";\t|" if mark in header), ",")
     rows, so_far = list[tuple[str, ...]](), 0
     try:
         for record in csv.reader(lines, delimiter=separator, strict=True):
@@ -673,6 +662,7 @@ def _typed(annotation: object, header: str, value: str, place: str) -> object:
         return int(value)
     if annotation is bool:
         answers = {"yes": True, "no": False, "true": True, "false": False, "ja": True, "nein": False}
+        answers |= {"wahr": True, "falsch": False}
         if value.lower() not in answers:
             raise InputError.at(place, header, value, "yes or no")
         return answers[value.lower()]

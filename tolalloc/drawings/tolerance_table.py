@@ -418,7 +418,7 @@ def _both_ways(row: dict[str, str], place: str) -> dict[str, str]:
     except InputError as error:
         raise InputError(f"{place}: {error}") from None
     length = abs(width) / 100.0 if unit == PERCENT else UNITS.get(unit, 1.0) * MICROMETRE
-    upper, lower = (f"{round(one / length, 9):.9g}" for one in deviations)
+    upper, lower = (f"{round(one / length, 12):.12g}" for one in deviations)
     return {**row, "plus": upper, "minus": lower}
 
 
@@ -490,6 +490,7 @@ def sources_of_rows(
         identity = str(row.get("id", "")).strip()
         where = f"{place}, row {number} ({identity or 'no id'})"
         with faults.kept():
+            _require_filled(row, where)
             cells = with_process(typed_cells(ToleranceRow, row, where), processes, where)
             source = validated(ToleranceRow, cells, where).as_source(folder)
             if source.name in sources:
@@ -503,6 +504,16 @@ def sources_of_rows(
             sources[source.name] = source
     faults.require_none()
     return tuple(sources.values())
+
+
+def _require_filled(row: Mapping[str, object], where: str) -> None:
+    """Raise if several cells are empty that a source needs, as in the row of a sum."""
+    needed = [name for name, field in ToleranceRow.model_fields.items() if field.is_required()]
+    missing = [name for name in needed if row.get(name) in ("", None)]
+    if len(missing) > 1:
+        raise InputError(
+            f"{where}: {', '.join(missing)} are missing; a row that is no source, such as a sum, begins with # or goes."
+        )
 
 
 def table_rows(sources: Sequence[Source], folder: Path | None = None) -> list[list[str | int | float]]:

@@ -55,7 +55,7 @@ def in_cost_units(unit: str) -> str:
 WRITTEN_UNITS = ("mm", "µm", "um", "in", "inch", "%", "cm", "m", "nm")
 """Units that a cell may state behind its number."""
 _NUMBER = r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?"
-WITH_UNIT = re.compile(rf"((?:±\s*|\+/-\s*|\+-\s*)?{_NUMBER})\s*({'|'.join(WRITTEN_UNITS)}|″|\")")
+WITH_UNIT = re.compile(rf"((?:±\s*|\+/-\s*|\+-\s*)?{_NUMBER})\s*({'|'.join(WRITTEN_UNITS)}|″|\")", re.ASCII)
 """Number, or one behind ±, with a unit behind it."""
 
 
@@ -99,3 +99,27 @@ def number_in(cell: str, unit: str) -> str:
     if stated != unit:
         raise ValueError(f"a number in {unit}, as the row says; numbers are not converted")
     return found[1]
+
+
+_LITERAL = re.compile(r'"\s*([^"]*?)\s*"|\\ ?([^\W\d_]+)')
+"""Words in the format of a number."""
+_THOUSANDTH = re.compile(r"[0#?],+(?![0#?])")
+"""Format of a number that shows it in thousands."""
+
+
+def shown_number(value: float, form: str) -> str:
+    """Return a number with what its format adds to it: leading zeros, per cent, the name of a unit.
+
+    >>> shown_number(7, "000"), shown_number(0.05, "0.00%"), shown_number(0.02, '0.00" mm"')
+    ('007', '5%', '0.02 mm')
+    """
+    if re.fullmatch(r"0{2,}", form) and float(value).is_integer():
+        return f"{int(value):0{len(form)}d}"
+    if "%" in re.sub(r'"[^"]*"', "", form):
+        return f"{100 * value:.12g}%"
+    named = (usual_signs(quoted or bare) for quoted, bare in _LITERAL.findall(form.split(";")[0]))
+    unit = next((name for name in named if name in WRITTEN_UNITS), "")
+    if _THOUSANDTH.search(form):
+        return f"{value:g} shown in thousands"
+    number = str(int(value) if float(value).is_integer() else value)
+    return f"{number} {unit}" if unit else number
