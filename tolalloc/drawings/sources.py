@@ -434,6 +434,12 @@ def zone_unit(sources: Iterable[Source]) -> str:
     return stated.pop() if len(stated) == 1 and stated <= {INCHES, PERCENT} else "µm"
 
 
+def length_unit(sources: Iterable[Source]) -> tuple[str, float]:
+    """Return the unit in which a report shows lengths of zones, and its length [m]: in where all are stated so."""
+    unit = INCHES if zone_unit(sources) == INCHES else "µm"
+    return unit, LENGTHS[unit]
+
+
 def zone_in(source: Source, unit: str, zone: float | None = None) -> float:
     """Return the zone of a source, or another one [m], in such a unit."""
     length = source.unit_length if unit == PERCENT else LENGTHS[unit]

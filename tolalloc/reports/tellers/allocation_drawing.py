@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.allocation.space.requirement import AtYield
-from tolalloc.drawings.sources import Source, zone_in, zone_unit
+from tolalloc.drawings.sources import Source, length_unit, zone_in, zone_unit
 from tolalloc.drawings.table_file import setting_line
 from tolalloc.drawings.tolerance_table import heads_file, heads_text, table_frame
 from tolalloc.reading.units import COST_UNITS, MICROMETRE, unit_of
@@ -55,6 +55,7 @@ def sources_table(result: AllocationResult) -> Table[_Source]:
     shares, changes, unit = _shares(result), result.process_changes, unit_of(result.leading)
     by_deviation, by_zone = (_by_source(result, own) for own in (result.chosen.by_deviation, result.chosen.by_zone))
     none, zone = float("nan"), zone_unit(result.space.errors.sources)
+    length, _ = length_unit(result.space.errors.sources)
     columns: list[Column[_Source]] = [
         Column(header="source", value=lambda row: row[0].name),
         *own_words(lambda row: row[:1]),
@@ -67,9 +68,9 @@ def sources_table(result: AllocationResult) -> Table[_Source]:
         Column(header="share of variance [%]", value=lambda row: shares.get(row[0].name, none)),
     ]
     if by_deviation:
-        columns.append(Column(header=f"Sens [{unit}/µm]", value=lambda row: by_deviation.get(row[0].name, none)))
+        columns.append(Column(header=f"Sens [{unit}/{length}]", value=lambda row: by_deviation.get(row[0].name, none)))
     if by_zone:
-        header = f"kept value per zone [{unit}/µm]"
+        header = f"kept value per zone [{unit}/{length}]"
         columns.append(Column(header=header, value=lambda row: by_zone.get(row[0].name, none)))
     columns.append(Column(header="cost before [{cost}]", value=lambda row: row[0].cost))
     columns.append(Column(header="cost [{cost}]", value=lambda row: row[1].cost))
@@ -159,11 +160,15 @@ def _parts(result: AllocationResult) -> dict[str, float]:
 
 
 def _by_source(result: AllocationResult, derivatives: Float[np.ndarray, " source"] | None) -> dict[str, float]:
-    """Return derivatives of the chosen design by the name of the source, none where there are none [output per µm]."""
+    """Return derivatives of the chosen design by the name of the source, none where there are none.
+
+    Per unit of length that a report shows zones in [output per µm, or in].
+    """
     if derivatives is None:
         return {}
     names = [source.name for source in result.drawn.errors.active]
-    return dict(zip(names, (derivatives * MICROMETRE).tolist(), strict=True))
+    _, length = length_unit(result.space.errors.sources)
+    return dict(zip(names, (derivatives * length).tolist(), strict=True))
 
 
 def _shares(result: AllocationResult) -> dict[str, float]:
