@@ -302,7 +302,7 @@ def test_what_is_given_in_python_comes_before_the_file(tmp_path):
         (TOML + '"broken', "zones.toml: not complete TOML"),
         (TOML + 'Merkmal = "part"\n', "zones.toml: not complete TOML"),
         (TOML.replace('"Zeichn.-Nr." = "drawing"', 'Kommentar = "plus"\nMerkmal2 = "id"'), None),
-        ("", "columns is missing"),
+        (TOML + "[rows]\n", "zones.toml: .*'rows' is not known"),
     ],
 )
 def test_a_file_of_heads_that_is_wrong_is_refused_in_one_sentence(tmp_path, text, words):
@@ -320,3 +320,8 @@ def test_two_heads_for_one_column_are_refused(tmp_path):
     (tmp_path / "zones.toml").write_text(TOML.replace('"drawing"', '"part"'), encoding="utf-8")
     with pytest.raises(InputError, match="the column 'part' is there twice"):
         ta.drawing(written(tmp_path, office_text()))
+
+
+def test_a_file_of_another_kind_beside_the_table_says_nothing_of_its_heads(tmp_path):
+    (tmp_path / "zones.toml").write_text('#:schema x\n[reducer]\nname = "mine"\n', encoding="utf-8")
+    assert ta.drawing(written(tmp_path, PLAIN)).sources == plain(tmp_path)

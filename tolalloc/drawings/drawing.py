@@ -23,6 +23,7 @@ from tolalloc.drawings.table_file import (
 )
 from tolalloc.drawings.tolerance_table import (
     doubts,
+    heads_beside,
     heads_file,
     heads_of,
     heads_text,
@@ -264,7 +265,7 @@ def _read_beside(table: Path, sheet: str, columns: Mapping[str, str]) -> tuple[t
     stated, units = [split_header(name) for name in names], {name: own.unit for name, own in COLUMNS.items()}
     own = own_heads(table, [name for name, _ in stated])
     meant = ", ".join(f"{head} is {name}" for head, name in heads.called.items())
-    said = (f"{table.name}: heads as {heads_file(table).name} says: {meant}",) if is_file(heads_file(table)) else ()
+    said = (f"{table.name}: heads as {heads_file(table).name} says: {meant}",) if heads_beside(table) else ()
     return (*_notes(table, header, sheet, own), *said), stated_currency(table, stated, units)
 
 

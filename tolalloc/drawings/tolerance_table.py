@@ -287,8 +287,7 @@ def heads_of(path: Path, columns: Mapping[str, str] = MappingProxyType({})) -> H
         A head stands for what is no column, or two heads for one; or the file is no such file.
     """
     beside, places = heads_file(path), dict.fromkeys(columns, "drawing, columns")
-    if is_file(beside):
-        stated = validated(HeadsFile, read_toml(beside), beside).columns
+    if stated := heads_beside(path):
         columns, places = {**stated, **columns}, {**dict.fromkeys(stated, f"{beside}, columns"), **places}
     for head, name in columns.items():
         if name not in ToleranceRow.model_fields:
@@ -303,6 +302,21 @@ def heads_file(table: Path) -> Path:
     ('zones.toml', 'mine.tolerances.toml')
     """
     return table.with_suffix(".toml")
+
+
+def heads_beside(table: Path) -> Mapping[str, str]:
+    """Return what the file beside a tolerance table says, nothing where there is none or it is of another kind.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The field and value that are not allowed.
+    """
+    path = heads_file(table)
+    content = read_toml(path) if is_file(path) else {}
+    if not get_close_matches("columns", content):
+        return {}
+    return validated(HeadsFile, content, path).columns
 
 
 def heads_text(called: Mapping[str, str]) -> str:
