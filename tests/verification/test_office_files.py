@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 from openpyxl import Workbook
+from openpyxl.cell.rich_text import CellRichText, TextBlock
+from openpyxl.cell.text import InlineFont
 from openpyxl.styles import Font
 
 import tolalloc as ta
@@ -81,6 +83,12 @@ def form(place: str, value: object, number_format: str) -> Callable:
         sheet[place].number_format = number_format
 
     return change
+
+
+def raised(place: str, text: str, end: str, **font: object) -> Callable:
+    """Return what sets a cell to a text whose end is raised, or in another font."""
+    block = TextBlock(InlineFont(**(font or {"vertAlign": "superscript"})), end)
+    return cells(**{place: CellRichText(text, block)})
 
 
 def hidden(sheet) -> None:
@@ -365,6 +373,29 @@ FILES = [
         suffix=".xlsx",
     ),
     OfficeFile("heads of two lines", book(cells(C1="plus\n[mm]", D1="minus\n(mm)")), suffix=".xlsx"),
+    OfficeFile(
+        "footnote that is raised", book(raised("C2", "0.02", "1")), suffix=".xlsx", refused=r"plus is '0.02\^1'"
+    ),
+    OfficeFile(
+        "digit that is struck out",
+        book(raised("H3", "2.5", "5", strike=True)),
+        suffix=".xlsx",
+        refused="cost is '2.5~5'",
+    ),
+    OfficeFile("words in two fonts", book(raised("A3", "hu", "b", b=True)), suffix=".xlsx"),
+    OfficeFile(
+        "capability in other words",
+        text(head=(*HEAD, "Cp (kurz)"), rows=tuple((*row, 1.33) for row in ROWS)),
+        refused=r"'Cp \(kurz\)' \(Cp\?\)",
+    ),
+    OfficeFile("cost per currency", text().replace("cost\n", "cost (EUR)\n")),
+    OfficeFile("cost in words", text().replace("cost\n", "cost / part\n"), refused=r"'cost / part' \(cost\?\)"),
+    OfficeFile(
+        "section in the middle",
+        text().replace("lid;", "Deckelseite;;;;;;;\nlid;"),
+        refused=r"row 4 \(Deckelseite\): plus, minus, unit, min, max, cost are missing",
+    ),
+    OfficeFile("plus and minus in one column of text", book(cells(C4="± 0,05", D4=None)), suffix=".xlsx"),
     # Other kinds of files
     OfficeFile(
         "old workbook",

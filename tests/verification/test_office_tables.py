@@ -325,3 +325,28 @@ def test_two_heads_for_one_column_are_refused(tmp_path):
 def test_a_file_of_another_kind_beside_the_table_says_nothing_of_its_heads(tmp_path):
     (tmp_path / "zones.toml").write_text('#:schema x\n[reducer]\nname = "mine"\n', encoding="utf-8")
     assert ta.drawing(written(tmp_path, PLAIN)).sources == plain(tmp_path)
+
+
+@pytest.mark.slow
+def test_inches_heads_and_own_columns_come_back_from_an_allocation(tmp_path):
+    text = office_text().replace(";mm;", ";in;").replace("[mm]", "[in]") + "\n"
+    (tmp_path / "zones.toml").write_text(TOML, encoding="utf-8")
+    study = ta.Study(
+        ta.model(lambda shaft, hub, lid: hub - shaft + 0.1 * lid, ("shaft", "hub", "lid"), ("gap [in]",)),
+        ta.drawing(written(tmp_path, text.replace("Zeichn.-Nr.", "Zeichn.-Nr.;Bemerkung").replace(";1\n", ";1;neu\n"))),
+        limits={"gap [in]": ta.Limit(lower=0.4)},
+        questions=[ta.Allocation(front=False, what_if=False)],
+        name="inches",
+    )
+    answer = study.allocate(effort="quick")
+    answer.save(tmp_path / "report")
+    table = pd.read_csv(tmp_path / "report" / "allocation.csv", comment="#")
+    assert list(table["unit"]) == ["in"] * 3 and list(table["nominal [in]"]) == [25, 25.1, 4]
+    assert list(table["Merkmal"]) == ["shaft", "hub", "lid"] and list(table["Zeichn.-Nr."]) == [1, 2, 3]
+    assert list(table["Bemerkung"].fillna("")) == ["neu", "", ""]
+    zones = answer.to_frame("drawing")["zone [in]"]
+    np.testing.assert_allclose(table["oberes Abmaß [unit]"] - table["UNTERES Abmaß [unit]"], zones, atol=2e-10)
+    again = ta.drawing(tmp_path / "report" / "allocation.csv")
+    np.testing.assert_allclose([own.zone for own in again.sources], zones * 0.0254, atol=5e-12)
+    written_as = list(answer.to_frame("dimensions")["write [in]"].map(str))
+    assert all(own.endswith(" in") for own in written_as)

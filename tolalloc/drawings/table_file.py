@@ -126,7 +126,7 @@ def _loaded(path: Path, content: bytes, data_only: bool, sheet: str) -> Any:
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of what is lost on writing it again, which nobody does
-        sheets = load_workbook(BytesIO(content), data_only=data_only, keep_links=False).worksheets
+        sheets = load_workbook(BytesIO(content), data_only=data_only, keep_links=False, rich_text=data_only).worksheets
     named = {own.title: own for own in sheets}
     if sheet and sheet not in named:
         shown = [repr(title) for title, own in named.items() if own.sheet_state == "visible"]
@@ -177,7 +177,14 @@ def _text(path: Path, cell: Any, written: Any) -> str:
         return DateText(str(value).removesuffix(" 00:00:00"))
     if isinstance(value, int | float) and not isinstance(value, bool):
         return shown_number(value, str(cell.number_format))
-    return "" if value is None else _plain(str(value))
+    return "" if value is None else _plain("".join(map(_marked, value)) if isinstance(value, list) else str(value))
+
+
+def _marked(run: Any) -> str:
+    """Return a run of letters of one font, marked where it is raised, lowered or struck out: a footnote is no digit."""
+    font = getattr(run, "font", None)
+    mark = ("^" if font.vertAlign else "") + ("~" if font.strike else "") if font else ""
+    return f"{mark}{run}"
 
 
 def _plain(cell: str) -> str:

@@ -276,6 +276,14 @@ class HeadsFile(Record):
     columns: Mapping[str, str]  # Head as it is written, without its unit → name of the column that it is
 
 
+_FIRST_WORD = re.compile(r"\s*(\w+)\s*[(/,:*]")
+"""First word of a head that goes on in brackets or behind a stroke."""
+_NUMBERS = tuple(
+    name for name, own in COLUMNS.items() if own.unit and name not in ("batches", "spectrum", "systematic")
+)
+"""Columns of numbers, of which a head such as ``Cp (short)`` is one in other words."""
+
+
 def heads_of(path: Path, columns: Mapping[str, str] = MappingProxyType({})) -> Heads:
     """Return how the heads of a tolerance table are read, some of them called as an office does.
 
@@ -336,6 +344,10 @@ def own_heads(path: Path, names: Sequence[str]) -> tuple[str, ...]:
     spelt = {name.lower(): name for name in ToleranceRow.model_fields}
     own = [name for name in names if name and name not in ToleranceRow.model_fields]
     near = {name: get_close_matches(name.lower(), spelt, n=1, cutoff=_NEAR) for name in own}
+    for name in own:
+        first = _FIRST_WORD.match(name)
+        if first and spelt.get(first[1].lower()) in _NUMBERS:
+            near[name] = [first[1].lower()]
     if slips := [f"{name!r} ({spelt[found[0]]}?)" for name, found in near.items() if found]:
         raise InputError(
             f"{path}: no such column: {', '.join(slips)}; rename each, or say what it is in "
