@@ -345,7 +345,7 @@ def test_inches_heads_and_own_columns_come_back_from_an_allocation(tmp_path):
     assert list(table["Merkmal"]) == ["shaft", "hub", "lid"] and list(table["Zeichn.-Nr."]) == [1, 2, 3]
     assert list(table["Bemerkung"].fillna("")) == ["neu", "", ""]
     zones = answer.to_frame("drawing")["zone [in]"]
-    np.testing.assert_allclose(table["oberes Abmaß [unit]"] - table["UNTERES Abmaß [unit]"], zones, atol=2e-10)
+    np.testing.assert_allclose(table["oberes Abmaß [unit]"] - table["unteres Abmaß [unit]"], zones, atol=2e-10)
     again = ta.drawing(tmp_path / "report" / "allocation.csv")
     np.testing.assert_allclose([own.zone for own in again.sources], zones * 0.0254, atol=5e-12)
     written_as = list(answer.to_frame("dimensions")["write [in]"].map(str))

@@ -20,6 +20,9 @@ from tolalloc.reading.units import COST_UNITS, MICROMETRE, usual_signs
 LARGEST_ZONE = LARGEST_DEVIATION
 """Largest zone that is believed [µm]; a model may ask for less, as a reducer does."""
 
+LARGEST_WAVE = 2000.0
+"""Largest amplitude of a wave that all parts share, of pitch or run-out, that is believed [µm]."""
+
 SMALLEST_ZONE = 1e-6
 """Smallest zone that is believed unless it is 0; below, a zone is lost beside its nominal size [µm]."""
 
@@ -467,8 +470,8 @@ class ToleranceRow(Record):
             if order not in orders:
                 allowed = ", ".join(map(str, sorted(orders))) or "none, as the row has no spectrum"
                 raise ValueError(f"systematic has order {order}; allowed are the orders of its spectrum: {allowed}")
-            if amplitude * self.micrometres > LARGEST_ZONE:
-                allowed = f"0 to {LARGEST_ZONE:.0f} µm"
+            if amplitude * self.micrometres > LARGEST_WAVE:
+                allowed = f"0 to {LARGEST_WAVE / 1e3:g} mm"
                 raise ValueError(f"systematic has an amplitude of {amplitude:g} {self.unit}; allowed is {allowed}")
         return self
 

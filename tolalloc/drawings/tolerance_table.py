@@ -624,16 +624,25 @@ def table_text(
     return text.getvalue()
 
 
+_MEASURED = 10.0
+"""Largest deviation of a measured part over the largest zone that a model believes [-]."""
+
+
 def require_small_zones(sources: Sequence[Source], largest: float, place: str | Path) -> None:
-    """Raise unless all zones, and those that may be asked for, are as small as a model believes [m].
+    """Raise unless all zones, those that may be asked for and measured parts are as small as a model believes [m].
 
     Raises
     ------
     InputError
         The source with a larger one.
     """
-    limit = largest / MICROMETRE
+    limit, farthest = largest / MICROMETRE, _MEASURED * largest / MICROMETRE
     for source in sources:
+        if source.measured and (own := max(map(abs, source.measured.values)) / MICROMETRE) > farthest:
+            file = source.measured.path.name
+            raise InputError(
+                f"{place} ({source.name}): {file} has a deviation of {own:g} µm; allowed is {farthest:g} µm."
+            )
         zone, smallest, most = (length / MICROMETRE for length in (source.zone, source.minimum, source.maximum))
         if zone > limit:
             raise InputError(
