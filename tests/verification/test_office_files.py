@@ -133,6 +133,7 @@ WITHOUT = tuple(row[:4] + row[5:] for row in ROWS)
 FILES = [
     # Layout of a CSV file
     OfficeFile("title rows", "Firma Muster GmbH;;;;;;;\nStand 2026;;;;;;;\n\n" + text(), notes=("left out",)),
+    OfficeFile("title that names an id", "ID;4711;;;;;;\n" + text(), notes=("row 2",)),
     OfficeFile("separator stated for Excel", "sep=;\n" + text()),
     OfficeFile("empty rows between", text().replace("hub", "\n;;;;;;;\n\nhub")),
     OfficeFile("empty column in front", "\n".join(f";{line}" for line in text().splitlines()) + "\n"),

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date, time, timedelta
 from enum import StrEnum
+from functools import cached_property
 from io import BytesIO, StringIO
 from pathlib import Path
 from types import MappingProxyType
@@ -248,18 +249,23 @@ class Heads:
         ('id', 'Cp [-]', 'Bemerkung')
         """
         name, unit = split_header(head)
-        spelt = {_spelt(own): own for own in self.known} | {_spelt(own): name for own, name in self.called.items()}
+        spelt = self._names
         bracket = _BRACKET.fullmatch(name)
         if bracket and not unit and _spelt(bracket[1]) in spelt and is_unit(bracket[2]):
             name, unit = bracket[1], usual_signs(bracket[2].strip())
         found = spelt.get(_spelt(name), name)
         return f"{found} [{unit}]" if unit else found
 
+    @cached_property
+    def _names(self) -> dict[str, str]:
+        """Head without its capitals → name of the column."""
+        return {_spelt(own): own for own in self.known} | {_spelt(own): name for own, name in self.called.items()}
+
     def row_in(self, rows: Sequence[Sequence[str]]) -> int:
-        """Return the position of the first row that names all needed columns, 0 where none does."""
-        return next(
-            (at for at, cells in enumerate(rows) if self.needed and self.named(cells).issuperset(self.needed)), 0
-        )
+        """Return the position of the row that names all needed columns and most others, 0 where none does."""
+        named = {at: self.named(cells) for at, cells in enumerate(rows[:_MOST_TITLES])} if self.needed else {}
+        found = {at: len(own & {*self.known}) for at, own in named.items() if own.issuperset(self.needed)}
+        return max(found, key=lambda at: found[at], default=0)
 
     def kind(self, head: str) -> str:
         """Return what stands under a head of a table: number, text (of ours), or words that nothing is read from."""
@@ -279,6 +285,8 @@ def _spelt(head: str) -> str:
 
 
 _ANY = Heads()
+_MOST_TITLES = 200
+"""Rows among which the heads of a table are looked for [-]."""
 
 
 def read_table_file(path: Path, heads: Heads = _ANY, sheet: str = "") -> tuple[NumberedRow, ...]:
@@ -350,9 +358,8 @@ def _records(path: Path, heads: Heads = _ANY) -> list[NumberedRow]:
     """Return the records of a CSV file; what separates them is seen from the header, # starts a comment."""
     text = read_text(path, "a table in CSV")
     lines = _without_comments(StringIO(text))
-    split = ((line, re.split(r"[;,\t|]", line.strip())) for line in lines)
-    header = next((line for line, cells in split if heads.needed and heads.named(cells).issuperset(heads.needed)), "")
-    header = header or next((line for line in lines if line.strip()), "")
+    at = heads.row_in([re.split(r"[;,\t|]", line.strip()) for line in lines[:_MOST_TITLES]])
+    header = lines[at] if at else next((line for line in lines if line.strip()), "")
     separator = next((mark for mark in ";\t|" if mark in header), ",")
     rows, so_far = list[tuple[str, ...]](), 0
     try:
