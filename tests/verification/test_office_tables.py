@@ -220,6 +220,28 @@ def test_units_that_contradict_each_other_are_refused(tmp_path, heads, row, word
         ta.drawing(written(tmp_path, f"{UNIT_HEADS.replace('nominal;', heads)}\n{row}\n"))
 
 
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        (
+            "pin;50;2;-2;%;0.1;5;1",
+            "4 % of the nominal size, 2,000 µm, full width between the limits: normal, σ = 333 µm",
+        ),
+        (
+            "pin;1.25;0.001;-0.001;in;0.0002;0.01;1",
+            "0.002 in, full width between the limits: normal, σ = 0.000333 in at",
+        ),
+        (
+            "pin;900;0;-12.5;mm;1;20;1",
+            "12,500 µm, full width between the limits, its middle −6,250 µm from the nominal",
+        ),
+    ],
+)
+def test_a_sentence_says_a_zone_in_the_unit_of_its_row(tmp_path, row, words):
+    (pin,) = load_tolerance_table(written(tmp_path, f"{UNIT_HEADS}\n{row}\n"))
+    assert pin.mapping.startswith(words)
+
+
 def test_a_wide_zone_without_a_nominal_size_is_doubted(tmp_path):
     drawing = ta.drawing(written(tmp_path, f"{UNIT_HEADS}\npin;;3;-3;mm;1;9;1\n"))
     assert any("the zone of 6 mm is wide, and no nominal size" in note for note in drawing.notes)
@@ -350,3 +372,31 @@ def test_inches_heads_and_own_columns_come_back_from_an_allocation(tmp_path):
     np.testing.assert_allclose([own.zone for own in again.sources], zones * 0.0254, atol=5e-12)
     written_as = list(answer.to_frame("dimensions")["write [in]"].map(str))
     assert all(own.endswith(" in") for own in written_as)
+
+
+@pytest.mark.slow
+def test_beta_trapezoid_and_rayleigh_are_ranked_and_allocated(tmp_path):
+    """Shares of a sum are those of the closed variances; the allocation keeps its limits at a lower cost."""
+    head = "id;nominal;plus;minus;unit;min;max;cost;distribution;shape"
+    rows = (
+        "a;30.1;0.02;-0.02;mm;0.004;0.2;1;Beta;2 5",
+        "b;25;0.02;-0.02;mm;0.004;0.2;1;trapezoid;0.5",
+        "c;5;0.02;0;mm;0.004;0.2;1;rayleigh;",
+    )
+    study = ta.Study(
+        ta.model(lambda a, b, c: a - b - c, ("a", "b", "c"), ("gap [mm]",)),
+        ta.drawing(written(tmp_path, "\n".join((head, *rows, "")))),
+        limits={"gap [mm]": ta.Limit(lower=0.05, upper=0.12)},
+        name="three kinds",
+    )
+    variances = np.array(
+        [
+            0.04**2 * 2 * 5 / (7**2 * 8),
+            0.02**2 * (1 + 0.5**2) / 6,
+            (0.02**2 / (-2 * np.log(0.0027))) * (2 - np.pi / 2),
+        ]
+    )
+    ranking = study.rank(effort="quick").to_frame("ranking").set_index("source")["total index ST [-]"]
+    assert ranking[["a", "b", "c"]].to_numpy() == pytest.approx(variances / variances.sum(), abs=2e-3)
+    found = study.allocate(effort="quick").result
+    assert found.met and found.bound <= found.cost < 3.0

@@ -206,7 +206,10 @@ class Source:
 
     def said(self, length: float, spec: str = ".3g") -> str:
         """Return a deviation as a sentence says it: in inches where its row does, else in micrometres."""
-        return f"{length / LENGTHS[self._told]:{spec}} {self._told}"
+        text = f"{length / LENGTHS[self._told]:{spec}}"
+        if "e+" in text:
+            text = f"{float(text):{'+' * spec.startswith('+')},.0f}"
+        return f"{text} {self._told}"
 
     @property
     def _told(self) -> str:
