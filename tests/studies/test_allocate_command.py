@@ -416,7 +416,7 @@ SHOP = "process,tolerance,unit,cost\n"
         (HEAD + "housing.pitch,ground,reciprocal,0,-3,,,x\n", None, ["factor is -3.0", "greater than or equal to"]),
         (POINTED, None, ["row 2", "points shop.csv", "CSV file in"]),
         (POINTED, SHOP + "ground,10,µm,2\nground,20,µm,3\n", ["shop.csv", "costs that fall"]),
-        (POINTED, SHOP + "ground,10,inch,3\nground,20,µm,2\n", ["unit is 'inch'", "mm"]),
+        (POINTED, SHOP + "ground,10,cubit,3\nground,20,µm,2\n", ["unit is 'cubit'", "mm"]),
         (POINTED, SHOP + "ground,10,µm,3\n", ["two zones or more"]),
         (POINTED, SHOP + "milled,10,µm,3\nmilled,20,µm,2\n", ["row 2", "'ground'", "milled"]),
     ],

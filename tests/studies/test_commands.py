@@ -225,8 +225,8 @@ def test_a_run_folder_with_something_in_it_is_refused(tmp_path):
     ("change", "words"),
     [
         (set_cell(3, "id", "disc2.bore9.position"), ["disc2.bore9.position.x", "not known", "disc2.bore2.position"]),
-        (set_cell(0, "plus [unit]", "-4"), ["row 2", "disc1.bore1.position", "-4", "must be 0 to 2000 µm"]),
-        (set_cell(4, "plus [unit]", "900000"), ["row 6", "900000 µm", "must be 0 to 2000 µm"]),
+        (set_cell(0, "plus [unit]", "-4"), ["row 2", "disc1.bore1.position", "-4", "must be 0 to 1000000 µm"]),
+        (set_cell(4, "plus [unit]", "900000"), ["row 6", "zone 900000, max"]),
         (set_cell(1, "max [unit]", "300"), ["disc1.bore2.position", "up to 200 µm", "zone 3.8, max 300 µm"]),
         (set_cell(2, "Cp [-]", "good"), ["row 4", "Cp", "good", "a number"]),
         (set_cell(5, "distribution", "gausss"), ["row 7", "distribution", "gausss", "normal, uniform"]),

@@ -53,6 +53,10 @@ def test_every_column_survives_writing_and_reading_at_other_zones_and_from_anoth
             {"id": "c", "distribution": "empirical", "measured": "parts.csv"},
             {"id": "d", "process": "honed to limit"},
             {"id": "e", **PITCH, "spectrum": "1:9.2 3:0.123456789 random:1.0/40"},
+            {"id": "f", "distribution": "Beta", "shape": "2.25 5", "Cp": "1.2"},
+            {"id": "g", "distribution": "trapezoid", "shape": "0.35", "shift": "-0.2"},
+            {"id": "h", "distribution": "RAYLEIGH", "sorted": "yes"},
+            {"id": "i", **POSITION, "distribution": "beta", "shape": "3 2"},
         )
     )
     moved = with_zones(sources, [0.8 * own.zone for own in sources])
@@ -109,7 +113,23 @@ def test_measured_positions_are_read_as_axes_or_as_radii(tmp_path):
 
 BAD_ROWS = [
     ({"distribution": "truncated"}, "allowed is one of normal, .*; a truncated one is written .* sorted = yes"),
-    ({"distribution": "beta"}, "distribution is 'beta'; allowed is one of normal, uniform"),
+    ({"distribution": "gamma"}, "distribution is 'gamma'; allowed is one of normal, uniform"),
+    ({"distribution": "beta"}, "beta needs 2 shapes such as '2 5', each from 1 to 50: none"),
+    ({"distribution": "beta", "shape": "2"}, "beta needs 2 shapes such as '2 5', each from 1 to 50: 2"),
+    ({"distribution": "beta", "shape": "2 0.5"}, "each from 1 to 50: 2 0.5"),
+    (
+        {"distribution": "beta", "shape": "2:5"},
+        "shape is '2:5'; allowed is a number with a decimal point, or for beta two",
+    ),
+    ({"distribution": "trapezoid"}, "trapezoid needs a shape from 0.01 to 0.99: none"),
+    ({"distribution": "trapezoid", "shape": "1"}, "trapezoid needs a shape from 0.01 to 0.99: 1"),
+    ({"distribution": "trapezoid", "shape": "0.2 0.4"}, "trapezoid needs a shape from 0.01 to 0.99: 0.2 0.4"),
+    (
+        {"distribution": "rayleigh", "shape": "2"},
+        "rayleigh has no shape; lognormal, weibull, beta and trapezoid have one",
+    ),
+    (POSITION | {"distribution": "rayleigh"}, "rayleigh is for radial sizes; for feature position allowed is normal"),
+    (PITCH | {"distribution": "rayleigh"}, "rayleigh is for radial sizes; for feature pitch allowed is normal"),
     ({"distribution": "weibull"}, "needs a shape from 0.3 to 20: none"),
     ({"distribution": "lognormal", "shape": "9"}, "needs a shape from 0.02 to 1.5: 9"),
     ({"shape": "2"}, "normal has no shape"),
@@ -155,7 +175,7 @@ def test_bad_rows_are_refused_in_one_sentence(row, sentence, tmp_path):
 BAD_PARTS = [
     ("deviation [µm]", range(19), "number of measured parts is 19; allowed is 20 or more"),
     ("deviation [µm]", [*range(19), "x"], r"parts.csv, row 21: deviation \[µm\] is 'x'; allowed is a number"),
-    ("deviation [µm]", [*range(19), 9000], "row 21: .* is '9000'; allowed is a number from -2000 to 2000 µm"),
+    ("deviation [µm]", [*range(19), 9e6], "row 21: .* is '9000000.0'; allowed is a number from -1000000 to 1000000 µm"),
     ("deviation [µm]", [*range(19), "nan"], "row 21: .* is 'nan'"),
     ("deviation", range(30), "the unit of column 'deviation' is ''"),
     ("radius [µm]", range(30), "columns for feature size is .*; allowed is deviation"),

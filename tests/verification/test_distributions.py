@@ -31,9 +31,13 @@ KINDS = {
     "triangular": {"distribution": Distribution.TRIANGULAR},
     "lognormal": {"distribution": Distribution.LOGNORMAL, "shape": 0.5},
     "weibull": {"distribution": Distribution.WEIBULL, "shape": 1.5},
+    "beta": {"distribution": Distribution.BETA, "shape": (2.0, 5.0)},
+    "trapezoid": {"distribution": Distribution.TRAPEZOID, "shape": 0.4},
+    "rayleigh": {"distribution": Distribution.RAYLEIGH},
     "mixture": {"distribution": Distribution.MIXTURE},
     "empirical": {"distribution": Distribution.EMPIRICAL},
 }
+BOUNDED = (Distribution.UNIFORM, Distribution.TRIANGULAR, Distribution.BETA, Distribution.TRAPEZOID)
 SHIFTED = (Batch(weight=7.0, shift=-0.3, spread=0.8), Batch(weight=3.0, shift=0.5, spread=0.6))
 CENTRED = (Batch(weight=0.7, shift=0.0, spread=0.6), Batch(weight=0.3, shift=0.0, spread=1.2))
 PARTS = 0.5e-6 + 0.6e-6 * stats.weibull_min(2.5).ppf((np.arange(60) + 0.5) / 60)
@@ -42,7 +46,9 @@ CASES = [
     (kind, feature)
     for kind in KINDS
     for feature in SPECTRA
-    if not (kind == "empirical" and SPECTRA[feature]) and not (kind == "mixture" and feature is Feature.PITCH)
+    if not (kind == "rayleigh" and feature is not Feature.SIZE)
+    and not (kind == "empirical" and SPECTRA[feature])
+    and not (kind == "mixture" and feature is Feature.PITCH)
 ]
 
 
@@ -98,7 +104,7 @@ def rayleigh_share() -> float:
 def test_share_inside_the_zone_at_cp_1(kind, feature, generator):
     own = source(kind, feature)
     inside = (limited(own, own.standard_values(generator.random((SAMPLES, len(own.columns))))) <= 1 + 1e-12).mean()
-    share = {"uniform": 1.0, "triangular": 1.0}.get(kind, 0.9973)
+    share = 1.0 if own.distribution in BOUNDED else 0.9973
     if kind == "mixture":
         share = mixture_share() if feature is Feature.SIZE else rayleigh_share()
     if kind == "empirical":
@@ -301,3 +307,54 @@ def test_the_random_part_prints_the_deviation_of_one_tooth(generator):
     assert deviation[:, 7].std() == pytest.approx(expected, rel=4 / np.sqrt(2 * SAMPLES) + 5e-3)
     inside = (np.ptp(deviation, axis=1) <= ZONE * 1e6).mean()
     assert inside == pytest.approx(0.9973, abs=4 * np.sqrt(0.0027 * (1 / SAMPLES + 1 / 2**15)))
+
+
+@pytest.mark.parametrize(
+    ("kind", "more", "mean", "deviation"),
+    [
+        ("beta", {}, 2 * 2 / 7 - 1, 2 * np.sqrt(2 * 5 / (7**2 * 8))),
+        ("beta", {"shape": (3.0, 3.0), "cp": 2.0}, 0.0, np.sqrt(1 / 7) / 2),
+        ("beta", {"shape": (4.0, 1.5), "shift": -0.1}, 2 * 4 / 5.5 - 1.1, 2 * np.sqrt(4 * 1.5 / (5.5**2 * 6.5))),
+        ("trapezoid", {}, 0.0, np.sqrt((1 + 0.4**2) / 6)),
+        ("trapezoid", {"shape": 0.8, "cp": 1.25, "shift": 0.3}, 0.3, np.sqrt((1 + 0.8**2) / 6) / 1.25),
+        ("rayleigh", {}, -1 + 2 * np.sqrt(np.pi / 2) / RAYLEIGH.reach, 2 * np.sqrt(2 - np.pi / 2) / RAYLEIGH.reach),
+        (
+            "rayleigh",
+            {"cp": 1.6},
+            -1 + np.sqrt(np.pi / 2) / 0.8 / RAYLEIGH.reach,
+            np.sqrt(2 - np.pi / 2) / 0.8 / RAYLEIGH.reach,
+        ),
+    ],
+)
+def test_moments_of_a_size_are_those_of_the_closed_forms(kind, more, mean, deviation):
+    """In half zones; of a trapezoid on −1…1 with a plateau p the variance is (1 + p²)/6."""
+    own = source(kind, Feature.SIZE, **more).zone_mapping
+    assert moments(own.marginal) == pytest.approx((mean, deviation), abs=3e-6)
+
+
+@pytest.mark.parametrize(
+    ("kind", "more", "like", "other"),
+    [
+        ("beta", {"shape": (1.0, 1.0)}, "uniform", {}),
+        ("rayleigh", {}, "weibull", {"shape": 2.0}),
+        ("rayleigh", {"cp": 1.4, "sorted": True}, "weibull", {"shape": 2.0, "cp": 1.4, "sorted": True}),
+    ],
+)
+def test_a_distribution_that_is_a_special_case_of_another_gives_its_samples(kind, more, like, other, generator):
+    uniform = generator.random((1000, 1))
+    one, another = source(kind, Feature.SIZE, **more), source(like, Feature.SIZE, **other)
+    np.testing.assert_allclose(one.standard_values(uniform), another.standard_values(uniform), rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize(("plateau", "limit"), [(0.01, "triangular"), (0.99, "uniform")])
+def test_a_trapezoid_lies_between_triangular_and_uniform(plateau, limit, generator):
+    uniform = generator.random((1000, 1))
+    one, another = source("trapezoid", Feature.SIZE, shape=plateau), source(limit, Feature.SIZE)
+    np.testing.assert_allclose(one.standard_values(uniform), another.standard_values(uniform), atol=0.01)
+
+
+@pytest.mark.parametrize("cp", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("kind", ["beta", "trapezoid"])
+def test_cp_divides_the_width_of_a_bounded_size(kind, cp):
+    ends = source(kind, Feature.SIZE, cp=cp).zone_mapping.marginal.probability(np.array([-1 / cp, 1 / cp]))
+    assert ends == pytest.approx([0.0, 1.0])

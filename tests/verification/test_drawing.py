@@ -124,12 +124,12 @@ def test_a_notebook_shows_the_table():
         ({"zone": 0.2}, UnknownNameError, r"drawing, row 1 \(hub\): column 'zone' is not known"),
         ({"unit": None}, InputError, r"drawing, row 1 \(hub\): unit is missing"),
         ({"plus": "wide"}, InputError, r"row 1 \(hub\): plus is 'wide'; allowed is a number"),
-        ({"plus": 3.0}, InputError, "the zone plus − minus is 3100 µm and must be 0 to 2000 µm"),
+        ({"plus": 3000.0}, InputError, "the zone plus − minus is 3000100 µm and must be 0 to 1000000 µm"),
         (
             {"plus": 0.0, "minus": 0.0},
             InputError,
             r"^drawing, row 1 \(hub\): the zone is 0 but the row is not locked; allowed is 0 with locked = yes, which "
-            "neglects the source, or a zone above 0 up to 2000 µm\\.$",
+            "neglects the source, or a zone above 0 up to 1000000 µm\\.$",
         ),
         ({"feature": "weight"}, InputError, "feature is 'weight'; allowed is one of size"),
         ({"process": "grond"}, UnknownNameError, "process for feature size 'grond' is not known"),

@@ -260,7 +260,7 @@ def test_all_faults_of_a_table_are_said_row_by_row(tmp_path):
         ", row 3 (b): plus is 'x'; allowed is a number with a decimal point.",
         ", row 3 (b): cost is 'y'; allowed is a number with a decimal point.",
         ", row 5 (a): id is 'a' for the second time; each source has one row.",
-        ", row 6 (d): the zone must lie between min and max, above 0 and up to 2000 µm: min 0.3, zone 0.2, max 0.5, "
+        ", row 6 (d): the zone must lie between min and max, above 0 and up to 1000000 µm: min 0.3, zone 0.2, max 0.5, "
         "all in the mm of the row.",
     ]
 

@@ -19,12 +19,16 @@ from tolalloc.drawings.zones import Feature
 UNIFORM, TRIANGULAR = {"distribution": Distribution.UNIFORM}, {"distribution": Distribution.TRIANGULAR}
 SHIFTED = {"shift": 0.3, "cp": 1.3}
 WEIBULL = {"distribution": Distribution.WEIBULL, "shape": 2.0}
+BETA = {"distribution": Distribution.BETA, "shape": (2.0, 5.0)}
+TRAPEZOID = {"distribution": Distribution.TRAPEZOID, "shape": 0.4, "cp": 1.2}
 MIXES = {
     "normal": [{}, {}, {}],
     "uniform": [UNIFORM, UNIFORM],
     "with a shift": [SHIFTED, {}, TRIANGULAR],
     "sorted and one-sided": [{"sorted": True}, {}, WEIBULL],
     "position": [{"feature": Feature.POSITION}, {}, UNIFORM],
+    "skewed and bounded": [BETA, TRAPEZOID, {}],
+    "radial": [{"distribution": Distribution.RAYLEIGH}, TRAPEZOID, {}],
 }
 
 
@@ -132,6 +136,9 @@ def test_symmetric_log_concave_deviations_alone_make_a_convex_set():
     slopes = np.ones(2)
     assert law_of(errors_of([UNIFORM, {"sorted": True}]), slopes).is_convex
     assert not law_of(errors_of([{}, WEIBULL]), slopes).is_convex
+    assert law_of(errors_of([TRAPEZOID, {**BETA, "shape": (3.0, 3.0)}]), slopes).is_convex
+    assert not law_of(errors_of([{}, BETA]), slopes).is_convex
+    assert not law_of(errors_of([{}, {"distribution": Distribution.RAYLEIGH}]), slopes).is_convex
 
 
 def test_units_that_leave_the_law_count_as_rejected():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -157,3 +158,245 @@ def test_all_heads_that_are_slips_are_named_at_once(tmp_path, suffix):
 def test_a_dimension_that_a_report_prints_means_its_sources(tmp_path):
     assert meant("seat", plain(tmp_path)) == ["shaft", "hub"]
     assert meant("lid", plain(tmp_path)) == ["lid"]
+
+
+UNIT_HEADS = "id;nominal;plus;minus;unit;min;max;cost"
+
+
+@pytest.mark.parametrize(
+    ("row", "zone", "middle", "nominal"),
+    [
+        ("pin;1.25;0.001;-0.001;in;0.0002;0.01;1", 0.002 * 25.4, 0.0, 1.25 * 25.4),
+        ("pin;0.5;0.0012;0.0004;inch;0.0002;0.01;1", 0.0008 * 25.4, 0.0008 * 25.4, 12.7),
+        ("pin;2;± 0.0005;;in;0.0002;0.01;1", 0.001 * 25.4, 0.0, 50.8),
+        ("pin;1;h7;;in;0.0001;0.01;1", 0.021, -0.0105, 25.4),  # ISO 286-2 prints 0/−21 µm for 18 to 30 mm
+        ("pin;50;2;-2;%;0.1;5;1", 2.0, 0.0, 50.0),
+        ("pin;8;1.5;-0.5;%;0.1;5;1", 0.16, 0.04, 8.0),
+        ("pin;-8;1.5;-0.5;%;0.1;5;1", 0.16, 0.04, -8.0),
+        ("pin;20;± 0.25 %;;%;0.1;5;1", 0.1, 0.0, 20.0),
+        ("pin;900;5;-5;mm;1;12;1", 10.0, 0.0, 900.0),
+        ("pin;900;3500;-1500;µm;100;9000;1", 5.0, 1.0, 900.0),
+    ],
+)
+def test_inches_and_per_cent_are_read_and_written_as_they_stand(tmp_path, row, zone, middle, nominal):
+    drawing = ta.drawing(written(tmp_path, f"{UNIT_HEADS}\n{row}\n"))
+    (pin,) = drawing.sources
+    assert [1e3 * pin.zone, 1e3 * pin.middle, 1e3 * pin.nominal] == pytest.approx([zone, middle, nominal], abs=1e-9)
+    again = drawing.to_csv(tmp_path / "again.csv")
+    table, unit = pd.read_csv(again), row.split(";")[4].replace("inch", "in")
+    head = "nominal [in]" if unit == "in" else "nominal [mm]"
+    assert (table["unit"][0], table[head][0]) == (unit, float(row.split(";")[1]))
+    assert [table["min [unit]"][0], table["max [unit]"][0]] == pytest.approx(
+        [float(own) for own in row.split(";")[5:7]]
+    )
+    (read,) = load_tolerance_table(again)
+    assert [read.zone, read.nominal, read.minimum] == pytest.approx([pin.zone, pin.nominal, pin.minimum], abs=3e-12)
+    assert read.middle == pytest.approx(pin.middle, abs=2e-11)
+
+
+@pytest.mark.parametrize(
+    ("heads", "row", "words"),
+    [
+        (
+            "nominal;",
+            "pin;0;2;-2;%;0.1;5;1",
+            "unit is %, which is of the nominal size; allowed is a nominal size other",
+        ),
+        ("nominal [%];", "pin;50;2;-2;%;0.1;5;1", r"the unit of column nominal is '%'; allowed is mm"),
+        ("nominal [mm];", "pin;1.25;1;-1;in;0.2;9;1", "unit is 'in'; allowed is mm as in the header nominal"),
+        ("nominal [in];", "pin;1.25;0.1;-0.1;mm;0.02;9;1", "unit is 'mm'; allowed is in as in the header nominal"),
+        ("nominal;", "pin;1.25;0.1;-0.1;ft;0.02;9;1", "unit is 'ft'; allowed is µm, um, mm, in, inch or %"),
+        (
+            "nominal;",
+            "pin;1.25;1.251;1.249;in;0.0002;0.01;1",
+            "are limits of a size of 1.25 in; allowed are deviations",
+        ),
+        ("nominal;", "pin;9000;1200;-1200;mm;1;2500;1", "2400000 µm and must be 0 to 1000000 µm"),
+        ("nominal;", "pin;1.25;1/16;0;in;0.0002;0.01;1", "plus is '1/16'; allowed is a number"),
+    ],
+)
+def test_units_that_contradict_each_other_are_refused(tmp_path, heads, row, words):
+    with pytest.raises(InputError, match=words):
+        ta.drawing(written(tmp_path, f"{UNIT_HEADS.replace('nominal;', heads)}\n{row}\n"))
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        (
+            "pin;50;2;-2;%;0.1;5;1",
+            "4 % of the nominal size, 2,000 µm, full width between the limits: normal, σ = 333 µm",
+        ),
+        (
+            "pin;1.25;0.001;-0.001;in;0.0002;0.01;1",
+            "0.002 in, full width between the limits: normal, σ = 0.000333 in at",
+        ),
+        (
+            "pin;900;0;-12.5;mm;1;20;1",
+            "12,500 µm, full width between the limits, its middle −6,250 µm from the nominal",
+        ),
+    ],
+)
+def test_a_sentence_says_a_zone_in_the_unit_of_its_row(tmp_path, row, words):
+    (pin,) = load_tolerance_table(written(tmp_path, f"{UNIT_HEADS}\n{row}\n"))
+    assert pin.mapping.startswith(words)
+
+
+def test_a_wide_zone_without_a_nominal_size_is_doubted(tmp_path):
+    drawing = ta.drawing(written(tmp_path, f"{UNIT_HEADS}\npin;;3;-3;mm;1;9;1\n"))
+    assert any("the zone of 6 mm is wide, and no nominal size" in note for note in drawing.notes)
+
+
+def test_an_own_function_gets_inches_where_its_rows_are_in_inches(tmp_path):
+    rows = ("bore;1.253;0.001;-0.001;in;0.0002;0.005;1", "shaft;31.75;0.02;-0.02;mm;0.005;0.1;1", "n;4;5;-5;%;1;15;1")
+    drawing = ta.drawing(written(tmp_path, "\n".join((UNIT_HEADS, *rows, ""))))
+    seen = ta.model(lambda *inputs: inputs, ("bore", "shaft", "n"), ("a [in]", "b [mm]", "c [mm]"))
+    bound = seen.bound(drawing.errors, "test")
+    deviations = np.array([[25.4e-6, -0.01e-3, 0.05 * 4e-3]])
+    assert bound(deviations).values[0] == pytest.approx([1.254, 31.74, 4.2])
+    slopes = bound.derivatives("a [in]", deviations).by_column[0]
+    assert slopes == pytest.approx([1 / 0.0254, 0, 0])  # [in per m]
+    assert bound.content != seen.bound(drawing.with_table(mm_of(tmp_path)).errors, "test").content
+
+
+def mm_of(folder):
+    rows = ("bore;31.8262;0.0254;-0.0254;mm;0.01;0.1;1", "shaft;31.75;0.02;-0.02;mm;0.005;0.1;1", "n;4;5;-5;%;1;15;1")
+    return written(folder, "\n".join((UNIT_HEADS, *rows, "")), name="mm.csv")
+
+
+TOML = """[columns]
+"Merkmal" = "id"
+"Teil" = "part"
+"oberes Abmaß" = "plus"
+"unteres Abmaß" = "minus"
+"Zeichn.-Nr." = "drawing"
+"""
+
+
+def office_text():
+    text = (
+        PLAIN.replace("id;part", "Merkmal;Teil")
+        .replace("plus [", "oberes Abmaß [")
+        .replace("minus [", "UNTERES Abmaß [")
+    )
+    lines = [f"{line};{last}" for line, last in zip(text.splitlines(), ("Zeichn.-Nr.", *"123"), strict=True)]
+    return "\n".join((*lines, ""))
+
+
+def frame_of(text, path):
+    rows = [line.split(";") for line in text.splitlines()]
+    pd.DataFrame(rows[1:], columns=rows[0]).to_excel(path, index=False)
+    return path
+
+
+@pytest.mark.parametrize("name", ["zones.csv", "zones.xlsx", "Teil 3.tolerances.csv"])
+def test_a_file_beside_the_table_says_what_its_heads_mean(tmp_path, name):
+    path = tmp_path / name
+    path.with_suffix(".toml").write_text(TOML, encoding="utf-8")
+    path = frame_of(office_text(), path) if name.endswith("xlsx") else written(tmp_path, office_text(), name=name)
+    drawing = ta.drawing(path)
+    assert [own.drawing for own in drawing.sources] == ["1", "2", "3"]
+    assert [(own.name, own.part, own.zone) for own in drawing.sources] == [
+        (own.name, own.part, own.zone) for own in plain(tmp_path)
+    ]
+    assert any("heads as " in note and "Merkmal is id" in note for note in drawing.notes)
+    again = drawing.to_csv(tmp_path / "again.csv")
+    assert list(pd.read_csv(again).columns)[:6] == [
+        *("Merkmal", "Teil", "feature", "nominal [mm]", "oberes Abmaß [unit]", "unteres Abmaß [unit]"),
+    ]
+    assert ta.drawing(again).sources == drawing.sources
+
+
+def test_what_is_given_in_python_comes_before_the_file(tmp_path):
+    (tmp_path / "zones.toml").write_text(TOML.replace('"drawing"', '"label"'), encoding="utf-8")
+    path = written(tmp_path, office_text())
+    assert ta.drawing(path).sources[0].label == "1"
+    assert ta.drawing(path, columns={"Zeichn.-Nr.": "note"}).sources[0].note == "1"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (TOML.replace('"plus"', '"pluss"'), r"zones.toml, columns: 'oberes Abmaß' stands for column 'pluss'.*plus"),
+        (TOML.replace("[columns]", "[colums]"), "zones.toml: field 'colums' is not known.*columns"),
+        ("columns = 3\n", "zones.toml: columns is"),
+        (TOML.replace('"plus"', "5"), "zones.toml: columns.oberes Abmaß is 5"),
+        (TOML + '"broken', "zones.toml: not complete TOML"),
+        (TOML + 'Merkmal = "part"\n', "zones.toml: not complete TOML"),
+        (TOML.replace('"Zeichn.-Nr." = "drawing"', 'Kommentar = "plus"\nMerkmal2 = "id"'), None),
+        (TOML + "[rows]\n", "zones.toml: .*'rows' is not known"),
+    ],
+)
+def test_a_file_of_heads_that_is_wrong_is_refused_in_one_sentence(tmp_path, text, words):
+    (tmp_path / "zones.toml").write_text(text, encoding="utf-8")
+    path = written(tmp_path, office_text())
+    if words is None:
+        assert len(ta.drawing(path).sources) == 3
+        return
+    with pytest.raises((InputError, UnknownNameError), match=words) as caught:
+        ta.drawing(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_two_heads_for_one_column_are_refused(tmp_path):
+    (tmp_path / "zones.toml").write_text(TOML.replace('"drawing"', '"part"'), encoding="utf-8")
+    with pytest.raises(InputError, match="the column 'part' is there twice"):
+        ta.drawing(written(tmp_path, office_text()))
+
+
+def test_a_file_of_another_kind_beside_the_table_says_nothing_of_its_heads(tmp_path):
+    (tmp_path / "zones.toml").write_text('#:schema x\n[reducer]\nname = "mine"\n', encoding="utf-8")
+    assert ta.drawing(written(tmp_path, PLAIN)).sources == plain(tmp_path)
+
+
+@pytest.mark.slow
+def test_inches_heads_and_own_columns_come_back_from_an_allocation(tmp_path):
+    text = office_text().replace(";mm;", ";in;").replace("[mm]", "[in]") + "\n"
+    (tmp_path / "zones.toml").write_text(TOML, encoding="utf-8")
+    study = ta.Study(
+        ta.model(lambda shaft, hub, lid: hub - shaft + 0.1 * lid, ("shaft", "hub", "lid"), ("gap [in]",)),
+        ta.drawing(written(tmp_path, text.replace("Zeichn.-Nr.", "Zeichn.-Nr.;Bemerkung").replace(";1\n", ";1;neu\n"))),
+        limits={"gap [in]": ta.Limit(lower=0.4)},
+        questions=[ta.Allocation(front=False, what_if=False)],
+        name="inches",
+    )
+    answer = study.allocate(effort="quick")
+    answer.save(tmp_path / "report")
+    table = pd.read_csv(tmp_path / "report" / "allocation.csv", comment="#")
+    assert list(table["unit"]) == ["in"] * 3 and list(table["nominal [in]"]) == [25, 25.1, 4]
+    assert list(table["Merkmal"]) == ["shaft", "hub", "lid"] and list(table["Zeichn.-Nr."]) == [1, 2, 3]
+    assert list(table["Bemerkung"].fillna("")) == ["neu", "", ""]
+    zones = answer.to_frame("drawing")["zone [in]"]
+    np.testing.assert_allclose(table["oberes Abmaß [unit]"] - table["unteres Abmaß [unit]"], zones, atol=2e-10)
+    again = ta.drawing(tmp_path / "report" / "allocation.csv")
+    np.testing.assert_allclose([own.zone for own in again.sources], zones * 0.0254, atol=5e-12)
+    written_as = list(answer.to_frame("dimensions")["write [in]"].map(str))
+    assert all(own.endswith(" in") for own in written_as)
+
+
+@pytest.mark.slow
+def test_beta_trapezoid_and_rayleigh_are_ranked_and_allocated(tmp_path):
+    """Shares of a sum are those of the closed variances; the allocation keeps its limits at a lower cost."""
+    head = "id;nominal;plus;minus;unit;min;max;cost;distribution;shape"
+    rows = (
+        "a;30.1;0.02;-0.02;mm;0.004;0.2;1;Beta;2 5",
+        "b;25;0.02;-0.02;mm;0.004;0.2;1;trapezoid;0.5",
+        "c;5;0.02;0;mm;0.004;0.2;1;rayleigh;",
+    )
+    study = ta.Study(
+        ta.model(lambda a, b, c: a - b - c, ("a", "b", "c"), ("gap [mm]",)),
+        ta.drawing(written(tmp_path, "\n".join((head, *rows, "")))),
+        limits={"gap [mm]": ta.Limit(lower=0.05, upper=0.12)},
+        name="three kinds",
+    )
+    variances = np.array(
+        [
+            0.04**2 * 2 * 5 / (7**2 * 8),
+            0.02**2 * (1 + 0.5**2) / 6,
+            (0.02**2 / (-2 * np.log(0.0027))) * (2 - np.pi / 2),
+        ]
+    )
+    ranking = study.rank(effort="quick").to_frame("ranking").set_index("source")["total index ST [-]"]
+    assert ranking[["a", "b", "c"]].to_numpy() == pytest.approx(variances / variances.sum(), abs=2e-3)
+    found = study.allocate(effort="quick").result
+    assert found.met and found.bound <= found.cost < 3.0

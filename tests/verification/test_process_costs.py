@@ -227,8 +227,8 @@ def test_unknown_and_missing_columns_are_refused(tmp_path):
 @pytest.mark.parametrize(
     ("text", "wrong", "sentence"),
     [
-        ("30,µm", "3,mm", r"row 2 \(hobbed\): tolerance is '3 mm'; allowed is 2000 µm or less"),
-        ("30,µm", "30,inch", "unit is 'inch'"),
+        ("30,µm", "3000,mm", r"row 2 \(hobbed\): tolerance is '3000 mm'; allowed is 1000000 µm or less"),
+        ("30,µm", "30,cubit", "unit is 'cubit'"),
         ("30,µm", "-30,µm", "tolerance is -30.0; input should be greater than or equal to 0.000001"),
         ("hobbed,,30", ",,30", r"row 2 \(no process\): process is missing"),
         ("µm,1.2", "µm,cheap", "cost is 'cheap'; allowed is a number"),

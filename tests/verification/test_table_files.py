@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 
 import pandas as pd
 import pytest
@@ -213,7 +214,10 @@ def test_an_empty_header_is_refused_by_its_number(tmp_path):
 WRONG = {
     "": ("[mm]", "none"),
     "mm": ("[µm]", "mm; numbers are not converted"),
-    "unit": ("[inch]", "unit, where the column unit says it row by row; or µm, um or mm, the same as in all rows"),
+    "unit": (
+        "[cm]",
+        "unit, where the column unit says it row by row; or µm, um, mm, in, inch or %, the same as in all rows",
+    ),
     "-": ("[%]", "-; numbers are not converted"),
     "half zone": ("[µm]", "half zone; numbers are not converted"),
     "weight:shift:spread": ("[µm]", "weight:shift:spread; numbers are not converted"),
@@ -243,7 +247,7 @@ def test_a_header_with_another_unit_is_refused(column, sources, tmp_path):
 
 @pytest.mark.parametrize("column", [name for name, column in COLUMNS.items() if column.unit == "unit"])
 def test_the_header_of_a_zone_states_the_unit_of_all_rows_or_is_refused(column, sources, tmp_path):
-    written_frame = table_frame(sources)
+    written_frame = table_frame([replace(own, unit="µm") for own in sources])
     written_frame.to_csv(tmp_path / "t.csv", index=False)
     again = load_tolerance_table(tmp_path / "t.csv")
     for unit in ("µm", "um", "\u03bcm"):
@@ -254,9 +258,12 @@ def test_the_header_of_a_zone_states_the_unit_of_all_rows_or_is_refused(column, 
     refused(tmp_path / "t.csv", rf"row 2 \(a\): unit is 'µm'; allowed is mm as in the header {column} \[mm\]; numbers")
 
 
-def test_the_unit_of_a_row_is_one_of_three(tmp_path):
+def test_the_unit_of_a_row_is_one_of_those_known(tmp_path):
     text = f"{HEADER}\n{ROW}\n"
-    refused(written(tmp_path, text.replace("mm", "cm")), r"row 2 \(a\): unit is 'cm'; allowed is µm, um or mm\.$")
+    refused(
+        written(tmp_path, text.replace("mm", "cm")),
+        r"row 2 \(a\): unit is 'cm'; allowed is µm, um, mm, in, inch or %\.$",
+    )
     micro = text.replace("mm", "um"), text.replace("mm", "\u03bcm")
     one, other = (load_tolerance_table(written(tmp_path, text)) for text in micro)
     assert one == other

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from tests.builders import baseline_errors
 from tolalloc.drawings.distributions import Distribution
 from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.measured_parts import MeasuredParts
 from tolalloc.drawings.seeds import CHUNK, SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import load_tolerance_table, require_small_zones, table_frame, with_zones
@@ -140,6 +142,10 @@ def test_zones_take_the_costs_that_they_were_bought_at_and_else_cost_1_over_zone
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
+        (
+            {"measured": MeasuredParts(path=Path("p.csv"), values=(3e-3,), are_radii=False, zone=1e-4, middle=0.0)},
+            r"mine.csv \(s\): p.csv has a deviation of 3000 µm; allowed is 2000 µm\.",
+        ),
         ({"zone": 3e-4}, r"mine.csv \(s\): the zone plus − minus is 300 µm and must be 0 to 200 µm\."),
         ({"maximum": 3e-4}, "between min and max, above 0 and up to 200 µm: min 0, zone 4, max 300 µm"),
     ],

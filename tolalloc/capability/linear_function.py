@@ -150,8 +150,7 @@ class LinearLaw:
 
         So it is where every density is symmetric and its logarithm concave (Lagoa, Li & Sznaier 2005).
         """
-        symmetric = (Distribution.NORMAL, Distribution.UNIFORM, Distribution.TRIANGULAR)
-        return all(source.distribution in symmetric and source.feature in _KNOWN for source in self.errors.active)
+        return all(_is_symmetric(source) and source.feature in _KNOWN for source in self.errors.active)
 
     @property
     def is_normal(self) -> bool:
@@ -432,3 +431,13 @@ def _is_normal(source: Source) -> bool:
     if source.feature is Feature.SIZE:
         return mapping.base == NORMAL and not mapping.sorted
     return mapping.marginal == RAYLEIGH
+
+
+_SYMMETRIC = (Distribution.NORMAL, Distribution.UNIFORM, Distribution.TRIANGULAR, Distribution.TRAPEZOID)
+
+
+def _is_symmetric(source: Source) -> bool:
+    """Return whether a density is symmetric and its logarithm concave, as a beta density of equal shapes is."""
+    if source.distribution is Distribution.BETA:
+        return len(set(source.shapes)) == 1
+    return source.distribution in _SYMMETRIC

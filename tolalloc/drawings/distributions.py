@@ -21,6 +21,8 @@ NUMBER = r"[0-9]+(?:\.[0-9]*)?(?:e-?[0-9]+)?"
 INSIDE_AT_CP_1 = 0.9973
 ABOVE_ZERO, BELOW_ONE = float(np.finfo(float).tiny), float(np.nextafter(1.0, 0.0))
 """Smallest and largest probability whose quantile is finite [-]."""
+_RAREST = 1e-50
+"""Smallest probability whose quantile is searched, as the search of a beta distribution ends without one below [-]."""
 LEVELS = np.linspace(-8.2, 8.2, 4097)
 """Standard normal numbers that cover all probabilities between 0 and the float below 1 [-]."""
 LEVELS.setflags(write=False)
@@ -48,40 +50,86 @@ class Distribution(StrEnum):
     TRIANGULAR = "triangular"
     LOGNORMAL = "lognormal"
     WEIBULL = "weibull"
+    BETA = "beta"
+    TRAPEZOID = "trapezoid"
+    RAYLEIGH = "rayleigh"
     MIXTURE = "mixture"
     EMPIRICAL = "empirical"
 
     @property
     def is_one_sided(self) -> bool:
         """Whether a size starts at the lower limit of its zone rather than spreading around the middle."""
-        return self in SHAPES
+        return self in (Distribution.LOGNORMAL, Distribution.WEIBULL, Distribution.RAYLEIGH)
 
     @property
     def is_bounded(self) -> bool:
         """Whether it ends, at Cp = 1 at the limit of the zone."""
-        return self in (Distribution.UNIFORM, Distribution.TRIANGULAR)
+        return self in (
+            Distribution.UNIFORM,
+            Distribution.TRIANGULAR,
+            Distribution.BETA,
+            Distribution.TRAPEZOID,
+        )
 
 
-SHAPES = {Distribution.LOGNORMAL: (0.02, 1.5), Distribution.WEIBULL: (0.3, 20.0)}
-"""Smallest and largest shape that is believed, for the distributions that have one [-]."""
+@dataclass(frozen=True)
+class Shapes:
+    """How many shapes a distribution has, and between which each is believed [-]."""
+
+    count: int
+    smallest: float
+    largest: float
+
+    @property
+    def needed(self) -> str:
+        """What a row must state, in words."""
+        what = "a shape" if self.count == 1 else f"{self.count} shapes such as '2 5', each"
+        return f"{what} from {self.smallest:g} to {self.largest:g}"
 
 
-def require_shape(distribution: Distribution, shape: float | None) -> None:
-    """Raise unless a distribution has the shape that it needs, and no other has one.
+SHAPES = {
+    Distribution.LOGNORMAL: Shapes(1, 0.02, 1.5),
+    Distribution.WEIBULL: Shapes(1, 0.3, 20.0),
+    Distribution.BETA: Shapes(2, 1.0, 50.0),
+    Distribution.TRAPEZOID: Shapes(1, 0.01, 0.99),
+}
+"""The shapes of the distributions that have any. Without a plateau a trapezoid is triangular, without sides uniform;
+with a shape below 1 a beta density has no end at a limit."""
+
+
+def parsed_shapes(text: str) -> tuple[float, ...]:
+    """Return the shapes that a cell states, separated by blanks.
+
+    >>> parsed_shapes("2 5"), parsed_shapes("0.4"), parsed_shapes("")
+    ((2.0, 5.0), (0.4,), ())
+
+    Raises
+    ------
+    ValueError
+        The text does not read like that.
+    """
+    if not all(re.fullmatch(NUMBER, item) for item in text.split()):
+        raise ValueError("allowed is a number with a decimal point, or for beta two such as '2 5'")
+    return tuple(map(float, text.split()))
+
+
+def require_shapes(distribution: Distribution, stated: tuple[float, ...]) -> None:
+    """Raise unless a distribution has the shapes that it needs, and no other has any.
 
     Raises
     ------
     ValueError
         What is wrong, for the record that holds both.
     """
-    if distribution not in SHAPES:
-        if shape is not None:
-            raise ValueError(f"distribution {distribution.value} has no shape; {' and '.join(SHAPES)} have one")
+    own = SHAPES.get(distribution)
+    if own is None:
+        if stated:
+            *others, last = SHAPES
+            raise ValueError(f"distribution {distribution.value} has no shape; {', '.join(others)} and {last} have one")
         return
-    smallest, largest = SHAPES[distribution]
-    if shape is None or not smallest <= shape <= largest:
-        stated = "none" if shape is None else f"{shape:g}"
-        raise ValueError(f"distribution {distribution.value} needs a shape from {smallest:g} to {largest:g}: {stated}")
+    if len(stated) != own.count or not all(own.smallest <= shape <= own.largest for shape in stated):
+        said = " ".join(f"{shape:g}" for shape in stated) or "none"
+        raise ValueError(f"distribution {distribution.value} needs {own.needed}: {said}")
 
 
 @runtime_checkable
@@ -124,7 +172,7 @@ class Family:
 
     def quantile(self, probability: Numbers) -> Numbers:
         """Return the values that are not exceeded with these probabilities in (0, 1) [own unit]."""
-        return np.asarray(self._scipy.ppf(probability, *self.arguments))
+        return np.asarray(self._scipy.ppf(np.maximum(probability, _RAREST), *self.arguments))
 
     def probability(self, value: Numbers) -> Numbers:
         """Return the probabilities of not exceeding these values [-]."""

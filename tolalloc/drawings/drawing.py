@@ -23,7 +23,10 @@ from tolalloc.drawings.table_file import (
 )
 from tolalloc.drawings.tolerance_table import (
     doubts,
+    heads_beside,
+    heads_file,
     heads_of,
+    heads_text,
     load_tolerance_table,
     own_heads,
     sources_of_rows,
@@ -150,8 +153,9 @@ class Drawing:
         """
         path = found_from_here(table)
         notes, currency = _read_beside(path, "", {})
-        sources = load_tolerance_table(path)
+        sources, called = load_tolerance_table(path), heads_of(path).called
         notes, changed = (*notes, *doubts(sources, path.name)), self.with_sources(sources, str(table))
+        changed = replace(changed, errors=replace(changed.errors, called=called))
         settings = {**self.settings, **_settings_of(path)}
         return replace(changed, notes=notes, currency=currency or self.currency, settings=settings)
 
@@ -164,11 +168,12 @@ class Drawing:
 
     def to_frame(self) -> pd.DataFrame:
         """Return the tolerance table, units in the headers."""
-        return table_frame(self.sources, cost_unit=self.currency or COST_UNITS)
+        return table_frame(self.sources, cost_unit=self.currency or COST_UNITS, called=self.errors.called)
 
     def to_csv(self, path: str | Path) -> Path:
         """Write the tolerance table, which `load_drawing` reads again, into a new file, and return its path.
 
+        Heads of an office's are written again, and what they mean into a TOML file beside the table.
         Process costs are not in the table: whoever reads it gives them again by ``costs=``. Nor are correlations.
 
         Raises
@@ -176,8 +181,10 @@ class Drawing:
         InputError
             The file is there already or cannot be made.
         """
-        written = Path(path)
-        write_new(written, table_text(self.sources, written.parent, self.currency))
+        written, called = Path(path), self.errors.called
+        write_new(written, table_text(self.sources, written.parent, self.currency, called))
+        if called:
+            write_new(heads_file(written), heads_text(called))
         return written
 
     def _repr_html_(self) -> str:
@@ -214,7 +221,8 @@ def load_drawing(
         Sheet of a workbook that holds the tolerance table; the first unless given.
     columns
         Head of a table as an office writes it, without its unit → name of the column that it is, such as
-        ``{"Zeichn.-Nr.": "drawing"}``. Other heads that are no column's are kept with their cells.
+        ``{"Zeichn.-Nr.": "drawing"}``; a TOML file beside the table, of the same stem, may say it as well, under
+        ``[columns]``. Other heads that are no column's are kept with their cells.
 
     Raises
     ------
@@ -233,7 +241,9 @@ def load_drawing(
     notes, currency = _read_beside(path, sheet, columns)
     return Drawing(
         name=str(table),
-        errors=ErrorModel(sources, correlation=correlation, table=str(table)),
+        errors=ErrorModel(
+            sources, correlation=correlation, table=str(table), called=dict(heads_of(path, columns).called)
+        ),
         costs=_placed(costs if isinstance(costs, Mapping) else beside(folder, costs)),
         notes=(*notes, *doubts(sources, path.name)),
         currency=currency,
@@ -251,10 +261,12 @@ def _read_beside(table: Path, sheet: str, columns: Mapping[str, str]) -> tuple[t
     """Return what a reader of a tolerance table must know, and the currency of its costs."""
     if not table.suffix:
         return (), ""  # a shipped one
-    header, names = read_table_file(table, heads_of(columns), sheet=sheet)[0]
+    header, names = read_table_file(table, heads := heads_of(table, columns), sheet=sheet)[0]
     stated, units = [split_header(name) for name in names], {name: own.unit for name, own in COLUMNS.items()}
     own = own_heads(table, [name for name, _ in stated])
-    return _notes(table, header, sheet, own), stated_currency(table, stated, units)
+    meant = ", ".join(f"{head} is {name}" for head, name in heads.called.items())
+    said = (f"{table.name}: heads as {heads_file(table).name} says: {meant}",) if heads_beside(table) else ()
+    return (*_notes(table, header, sheet, own), *said), stated_currency(table, stated, units)
 
 
 def _notes(table: Path, header: int, sheet: str, own: Sequence[str]) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -36,6 +36,8 @@ class ErrorModel:
     table: str = field(default="", compare=False, repr=False)
     # What is chosen at assembly for the units that are drawn, of those that act
     compensators: tuple[Compensator, ...] = ()
+    # What its user's table calls the columns, head → column, so that it is written again as it was
+    called: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         self.correlation.require_sound(self.sources)

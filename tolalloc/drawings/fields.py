@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from tolalloc.drawings.distributions import Distribution, batches_text, parsed_batches, require_shape
-from tolalloc.drawings.measured_parts import MeasuredParts, load_measured_parts
-from tolalloc.drawings.sources import Source, is_angular
-from tolalloc.drawings.table_file import usual_signs
+from tolalloc.drawings.distributions import Distribution, batches_text, parsed_batches, parsed_shapes, require_shapes
+from tolalloc.drawings.measured_parts import LARGEST_DEVIATION, MeasuredParts, load_measured_parts
+from tolalloc.drawings.sources import INCHES, LENGTHS, PERCENT, Source, is_angular
 from tolalloc.drawings.zones import Feature, parsed_spectrum, parsed_systematic, spectrum_text, systematic_text
 from tolalloc.reading.files import Record
-from tolalloc.reading.units import COST_UNITS, MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import COST_UNITS, MICROMETRE, usual_signs
 
-LARGEST_ZONE = 2000.0
-"""Largest zone that is believed [µm]; a metre typed for a millimetre is far above it, and a model may ask for less."""
+LARGEST_ZONE = LARGEST_DEVIATION
+"""Largest zone that is believed [µm]; a model may ask for less, as a reducer does."""
+
+LARGEST_WAVE = 2000.0
+"""Largest amplitude of a wave that all parts share, of pitch or run-out, that is believed [µm]."""
 
 SMALLEST_ZONE = 1e-6
 """Smallest zone that is believed unless it is 0; below, a zone is lost beside its nominal size [µm]."""
@@ -36,13 +39,17 @@ of ISO 286 reach about 10 [-]."""
 _DECIMALS = 12
 """Decimals of a zone in its unit, more than any drawing has and fewer than a difference keeps [-]."""
 
-_WRITTEN_DECIMALS = 5
-"""Decimals of a micrometre that a written table has: half a zone of four decimals [-]."""
+_WRITTEN_DECIMALS = {"µm": 5, "mm": 8, INCHES: 10, PERCENT: 10}
+"""Decimals that a written table has in each unit: half a zone of four decimals of a micrometre, or finer [-]."""
 
-UNITS = {"µm": 1.0, "um": 1.0, "mm": 1000.0}
+UNITS = {"µm": 1.0, "um": 1.0, "mm": 1000.0, "in": 25400.0, "inch": 25400.0}
+"""Unit of a length → micrometres."""
 
-ALLOWED_UNITS = "µm, um or mm"
-"""`UNITS` in a sentence."""
+ALLOWED_UNITS = "µm, um, mm, in, inch or %"
+"""`UNITS` in a sentence, with the per cent of the nominal size."""
+
+_CALLED = {"um": "µm", "inch": INCHES}
+"""Other spelling of a unit → the one that is written."""
 
 Cell = str | int | float | Path | None
 """What a source writes: a flag as yes or no, a path as seen from the table, nothing as an empty cell."""
@@ -73,19 +80,55 @@ class Column:
 
 
 def _plus(source: Source) -> float:
-    """Return the upper limit of a size, or the zone of everything else [µm]."""
-    zone = _micrometres(source.zone)
+    """Return the upper limit of a size, or the zone of everything else [unit of the row]."""
+    zone = _written(source, source.zone)
     if source.feature is not Feature.SIZE:
         return zone
-    return round(source.middle / MICROMETRE + zone / 2, _WRITTEN_DECIMALS)
+    return round(source.middle / source.unit_length + zone / 2, _WRITTEN_DECIMALS[source.unit])
 
 
 def _known_unit(text: str) -> str:
     """Return the unit of a row."""
-    unit = usual_signs(text)
-    if unit not in UNITS:
+    unit = usual_unit(text)
+    if unit not in UNITS and unit != PERCENT:
         raise ValueError(f"allowed is {ALLOWED_UNITS}")
     return unit
+
+
+def usual_unit(text: str) -> str:
+    """Return the unit of a row in its one spelling.
+
+    >>> usual_unit("inch"), usual_unit("um"), usual_unit("mm")
+    ('in', 'µm', 'mm')
+    """
+    unit = usual_signs(text.strip())
+    return _CALLED.get(unit, unit)
+
+
+def _length_written(source: Source, length: float) -> float:
+    """Return a nominal size or a length as a table writes it [mm, or in]."""
+    unit = LENGTHS[source.length_name]
+    return length / unit if unit == LENGTHS["mm"] else round(length / unit, _WRITTEN_DECIMALS[INCHES])
+
+
+def shapes_text(stated: object) -> object:
+    """Return shapes as a cell states them, one number or several, as text."""
+    if isinstance(stated, int | float) and not isinstance(stated, bool):
+        return repr(stated)
+    if isinstance(stated, list | tuple):
+        return " ".join(map(repr, stated))
+    return "" if stated is None else stated
+
+
+def shapes_cell(shapes: tuple[float, ...]) -> Cell:
+    """Return shapes as a table writes them: one as the number that it is."""
+    return shapes[0] if len(shapes) == 1 else " ".join(map(repr, shapes)) or None
+
+
+def _known_shapes(text: str) -> str:
+    """Return the shapes of a row, as they were stated."""
+    parsed_shapes(text)
+    return text
 
 
 def _no_comment(text: str) -> str:
@@ -95,9 +138,9 @@ def _no_comment(text: str) -> str:
     return text
 
 
-def _micrometres(length: float) -> float:
-    """Return a length as a table writes it [µm]."""
-    return round(length / MICROMETRE, _WRITTEN_DECIMALS)
+def _written(source: Source, length: float) -> float:
+    """Return a length as a table writes it [unit of the row]."""
+    return round(length / source.unit_length, _WRITTEN_DECIMALS[source.unit])
 
 
 class ToleranceRow(Record):
@@ -122,23 +165,33 @@ class ToleranceRow(Record):
             attribute="feature",
         ),
     ] = Feature.SIZE
-    nominal: Annotated[float, Column("nominal size, for grades and for you", "mm", "nominal", MILLIMETRE)] = 0.0
+    nominal: Annotated[
+        float,
+        Column(
+            "nominal size, for grades, for you and for an own model; in inches where the unit is in",
+            "mm",
+            write=lambda source: _length_written(source, source.nominal),
+        ),
+    ] = 0.0
     plus: Annotated[float, Column("upper limit; the zone is plus − minus", "unit", write=_plus)]
     minus: Annotated[
         float,
         Column(
             "lower limit; 0 for all but sizes",
             "unit",
-            write=lambda source: round(_plus(source) - _micrometres(source.zone), _WRITTEN_DECIMALS),
+            write=lambda source: round(_plus(source) - _written(source, source.zone), _WRITTEN_DECIMALS[source.unit]),
         ),
     ]
     unit: Annotated[
-        str, AfterValidator(_known_unit), Column("µm or mm, for plus, minus, min and max", write=lambda _: "µm")
+        str,
+        AfterValidator(_known_unit),
+        Column("µm, mm, in or % (of the nominal size), for plus, minus, min and max", attribute="unit"),
     ]
     distribution: Annotated[
         Distribution,
         Column(
-            "`normal`, `uniform`, `triangular`, `lognormal`, `weibull`, `mixture` or `empirical`; normal unless given",
+            "`normal`, `uniform`, `triangular`, `trapezoid`, `beta`, `lognormal`, `weibull`, `rayleigh`, `mixture` or "
+            "`empirical`; normal unless given",
             attribute="distribution",
         ),
     ] = Distribution.NORMAL
@@ -147,8 +200,15 @@ class ToleranceRow(Record):
         float, Field(ge=-1, le=1), Column("mean shift over half the zone, sizes only", "half zone", "shift")
     ] = 0.0
     shape: Annotated[
-        float | None, Column("of lognormal and Weibull", "-", write=lambda source: source.shape or None)
-    ] = None
+        str,
+        BeforeValidator(shapes_text),
+        AfterValidator(_known_shapes),
+        Column(
+            "of lognormal and Weibull; of a trapezoid its plateau over its width; of beta both, as `2 5`",
+            "-",
+            write=lambda source: shapes_cell(source.shapes),
+        ),
+    ] = ""
     batches: Annotated[
         str,
         Column(
@@ -171,7 +231,7 @@ class ToleranceRow(Record):
         Column(
             "the zone that the measured parts were made to; today's unless given",
             "unit",
-            write=lambda source: source.measured.zone / MICROMETRE if source.measured else None,
+            write=lambda source: source.measured.zone / source.unit_length if source.measured else None,
         ),
     ] = None
     sorted: Annotated[
@@ -202,12 +262,12 @@ class ToleranceRow(Record):
     min: Annotated[
         float,
         Field(ge=0),
-        Column("smallest zone that may be asked for", "unit", write=lambda source: _micrometres(source.minimum)),
+        Column("smallest zone that may be asked for", "unit", write=lambda source: _written(source, source.minimum)),
     ]
     max: Annotated[
         float,
         Field(ge=0),
-        Column("largest zone that may be asked for", "unit", write=lambda source: _micrometres(source.maximum)),
+        Column("largest zone that may be asked for", "unit", write=lambda source: _written(source, source.maximum)),
     ]
     cost: Annotated[
         float,
@@ -228,7 +288,7 @@ class ToleranceRow(Record):
             "a size its deviations; 0.01 µm below 1 µm, 0.1 below 10, 0.5 below 100, then 1 unless given, for a "
             "reducer; an own model's zones stay as found",
             "unit",
-            write=lambda source: _micrometres(source.step) or None,
+            write=lambda source: _written(source, source.step) or None,
         ),
     ] = 0.0
     spectrum: Annotated[
@@ -247,7 +307,7 @@ class ToleranceRow(Record):
             "for pitch and run-out: waves that all parts share beside the random ones, as `2:5.0@30`: order of the "
             "spectrum, amplitude in the unit of the row, direction of a crest",
             "order:amplitude@°",
-            write=lambda source: systematic_text(source.systematic, MICROMETRE),
+            write=lambda source: systematic_text(source.systematic, source.unit_length),
         ),
     ] = ""
     each: Annotated[
@@ -263,9 +323,10 @@ class ToleranceRow(Record):
         float | None,
         Field(ge=0.001, le=1000),
         Column(
-            "for tilt, phase and rotation: the length over which the zone limits the deviation",
+            "for tilt, phase and rotation: the length over which the zone limits the deviation; in inches where the "
+            "unit is in",
             "mm",
-            write=lambda source: source.over / MILLIMETRE if source.over else None,
+            write=lambda source: _length_written(source, source.over) or None,
         ),
     ] = None
     drawing: Annotated[
@@ -295,27 +356,43 @@ class ToleranceRow(Record):
         return self.source or self.id
 
     @property
+    def length_unit(self) -> str:
+        """Unit of the nominal size and of over."""
+        return INCHES if self.unit == INCHES else "mm"
+
+    @property
+    def micrometres(self) -> float:
+        """Micrometres of one unit of the row [µm]."""
+        return abs(self.nominal) * 10.0 if self.unit == PERCENT else UNITS[self.unit]
+
+    @property
     def zone(self) -> float:
         """Full width; a difference of two decimal numbers is no decimal number [unit]."""
         return round(self.plus - self.minus, _DECIMALS)
 
     @model_validator(mode="after")
+    def _unit_makes_sense(self) -> ToleranceRow:
+        if self.unit == PERCENT and not self.nominal:
+            raise ValueError("unit is %, which is of the nominal size; allowed is a nominal size other than 0")
+        return self
+
+    @model_validator(mode="after")
     def _zone_makes_sense(self) -> ToleranceRow:
-        zone, factor = self.zone, UNITS[self.unit]
+        zone, factor = self.zone, self.micrometres
         if not 0 <= zone * factor <= LARGEST_ZONE:
-            raise ValueError(f"the zone plus − minus is {zone * factor:g} µm and must be 0 to {LARGEST_ZONE:g} µm")
+            raise ValueError(f"the zone plus − minus is {zone * factor:.9g} µm and must be 0 to {LARGEST_ZONE:.0f} µm")
         self._require_deviations()
         if self.plus == self.minus and not self.locked and (self.min > 0 or self.cost > 0):
             sign = f"; if ± {self.plus:g} is meant, minus is −{self.plus:g}" if self.plus > 0 else ""
             raise ValueError(
                 "the zone is 0 but the row is not locked; allowed is 0 with locked = yes, which neglects the source, "
-                f"or a zone above 0 up to {LARGEST_ZONE:g} µm{sign}"
+                f"or a zone above 0 up to {LARGEST_ZONE:.0f} µm{sign}"
             )
         if self.feature is not Feature.SIZE and (self.minus != 0 or self.shift != 0):
             raise ValueError(f"minus and shift must be 0 for feature {self.feature.value}, whose zone is plus")
         if zone > 0 and not self.locked and not 0 < self.min <= zone <= self.max <= LARGEST_ZONE / factor:
             raise ValueError(
-                f"the zone must lie between min and max, above 0 and up to {LARGEST_ZONE:g} µm: "
+                f"the zone must lie between min and max, above 0 and up to {LARGEST_ZONE:.0f} µm: "
                 f"min {self.min:g}, zone {zone:g}, max {self.max:g}, all in the {self.unit} of the row"
             )
         if self.plus != self.minus and zone * factor < SMALLEST_ZONE:
@@ -345,12 +422,14 @@ class ToleranceRow(Record):
         """Raise if plus and minus are limits of size, or far from any deviation of a zone of this width."""
         if self.feature is not Feature.SIZE:
             return
-        nominal, middle = self.nominal * 1e3 / UNITS[self.unit], (self.plus + self.minus) / 2
+        inside = UNITS[self.length_unit] / self.micrometres if self.nominal else 0.0
+        nominal, middle = self.nominal * inside, (self.plus + self.minus) / 2
         near = abs(middle - nominal) <= max(self.zone, _LIMITS * abs(nominal))
         if nominal and near and abs(middle) > self.zone:
             plus, minus = round(self.plus - nominal, _DECIMALS), round(self.minus - nominal, _DECIMALS)
             raise ValueError(
-                f"plus {self.plus:g} and minus {self.minus:g} are limits of a size of {self.nominal:g} mm; allowed are "
+                f"plus {self.plus:g} and minus {self.minus:g} are limits of a size of {self.nominal:g} "
+                f"{self.length_unit}; allowed are "
                 f"deviations from it, here plus {plus:g} and minus {minus:g} {self.unit}"
             )
         if self.zone > 0 and abs(middle) > _FARTHEST * self.zone:
@@ -362,7 +441,12 @@ class ToleranceRow(Record):
     @model_validator(mode="after")
     def _distribution_makes_sense(self) -> ToleranceRow:
         kind, batches = self.distribution, parsed_batches(self.batches)
-        require_shape(kind, self.shape)
+        require_shapes(kind, parsed_shapes(self.shape))
+        if kind is Distribution.RAYLEIGH and self.feature is not Feature.SIZE:
+            raise ValueError(
+                f"distribution rayleigh is for radial sizes; for feature {self.feature.value} allowed is normal, whose "
+                "vectors have such a length"
+            )
         if (kind is Distribution.MIXTURE) != bool(batches):
             raise ValueError("distribution mixture and batches such as '0.7:-0.3:0.8 0.3:0.5:0.6' go together")
         if (kind is Distribution.EMPIRICAL) != bool(self.measured) or (self.measured_zone and not self.measured):
@@ -386,8 +470,9 @@ class ToleranceRow(Record):
             if order not in orders:
                 allowed = ", ".join(map(str, sorted(orders))) or "none, as the row has no spectrum"
                 raise ValueError(f"systematic has order {order}; allowed are the orders of its spectrum: {allowed}")
-            if amplitude * UNITS[self.unit] > LARGEST_ZONE:
-                raise ValueError(f"systematic has an amplitude of {amplitude:g} {self.unit}; allowed is 0 to 2 mm")
+            if amplitude * self.micrometres > LARGEST_WAVE:
+                allowed = f"0 to {LARGEST_WAVE / 1e3:g} mm"
+                raise ValueError(f"systematic has an amplitude of {amplitude:g} {self.unit}; allowed is {allowed}")
         return self
 
     def _require_sensible_waves(self) -> None:
@@ -405,9 +490,10 @@ class ToleranceRow(Record):
 
     def as_source(self, folder: Path) -> Source:
         """Return the source in SI units; its file of measured parts is looked for in the folder."""
-        factor = UNITS[self.unit] * MICROMETRE
+        factor, length = self.micrometres * MICROMETRE, LENGTHS[self.length_unit]
         middle = (self.plus + self.minus) / 2 * factor if self.feature is Feature.SIZE else 0.0
         spectrum, teeth = parsed_spectrum(self.spectrum)
+        shapes = parsed_shapes(self.shape)
         plain = {name: column for name, column in COLUMNS.items() if column.attribute}
         stated: dict[str, Any] = {column.attribute: column.read(getattr(self, name)) for name, column in plain.items()}
         return Source(
@@ -418,20 +504,21 @@ class ToleranceRow(Record):
             middle=middle,
             minimum=self.min * factor,
             maximum=self.max * factor,
+            nominal=self.nominal * length,
             step=self.step * factor,
-            shape=self.shape or 0.0,
+            shape=shapes[0] if len(shapes) == 1 else shapes or 0.0,
             batches=parsed_batches(self.batches),
             measured=self._measured_parts(folder, middle),
             spectrum=spectrum,
             systematic=tuple((order, size * factor, at) for order, size, at in parsed_systematic(self.systematic)),
             teeth=teeth,
-            over=(self.over or 0.0) * MILLIMETRE,
+            over=(self.over or 0.0) * length,
         )
 
     def _measured_parts(self, folder: Path, middle: float) -> MeasuredParts | None:
         if not self.measured:
             return None
-        zone = (self.measured_zone or self.zone) * (UNITS[self.unit] * MICROMETRE)
+        zone = (self.measured_zone or self.zone) * (self.micrometres * MICROMETRE)
         return load_measured_parts((folder / self.measured).resolve(), self.feature, zone, middle)
 
 
@@ -442,10 +529,27 @@ COLUMNS = {
 """Field → what a table knows of it."""
 
 
-def headers_in(cost_unit: str) -> dict[str, str]:
-    """Return field → header of its column, in a table whose costs are in cost units or a currency."""
-    units = {name: cost_unit if own.unit == COST_UNITS else own.unit for name, own in COLUMNS.items()}
-    return {name: f"{name} [{unit}]" if unit else name for name, unit in units.items()}
+def headers_in(
+    cost_unit: str, sources: Sequence[Source] = (), called: Mapping[str, str] = MappingProxyType({})
+) -> dict[str, str]:
+    """Return field → header of its column, in a table whose costs are in cost units or a currency.
+
+    Parameters
+    ----------
+    cost_unit
+        What costs are in.
+    sources
+        The rows: nominal sizes are in inches where all of them are, and state no unit where some are.
+    called
+        Head as the user's table writes it → field.
+    """
+    lengths = {own.length_name for own in sources} or {"mm"}
+    said = {COST_UNITS: cost_unit, "mm": lengths.pop() if len(lengths) == 1 else ""}
+    heads = {name: head for head, name in reversed(tuple(called.items()))}  # the first of several
+    units = {name: said.get(own.unit, own.unit) for name, own in COLUMNS.items()}
+    return {
+        name: f"{heads.get(name, name)} [{unit}]" if unit else heads.get(name, name) for name, unit in units.items()
+    }
 
 
 HEADERS = headers_in(COST_UNITS)

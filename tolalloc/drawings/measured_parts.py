@@ -19,7 +19,7 @@ from tolalloc.exceptions import Faults, InputError
 from tolalloc.reading.units import MICROMETRE
 
 FEWEST_PARTS = 20
-LARGEST_DEVIATION = 2000.0
+LARGEST_DEVIATION = 1e6
 """Largest deviation that is believed, as large as a zone may be [µm]."""
 
 _FACTORS = {"µm": 1.0, "um": 1.0, "mm": 1000.0}
@@ -187,7 +187,7 @@ def _column(table: TextTable, at: int) -> list[float]:
             value = float("nan")
         if not (isfinite(value) and abs(value) <= LARGEST_DEVIATION):
             with faults.kept():
-                allowed = f"a number from {-LARGEST_DEVIATION:g} to {LARGEST_DEVIATION:g} µm"
+                allowed = f"a number from {-LARGEST_DEVIATION:.0f} to {LARGEST_DEVIATION:.0f} µm"
                 raise InputError.at(f"{table.path}, row {row}", header, cells[at], allowed)
         values.append(value)
     faults.require_none()

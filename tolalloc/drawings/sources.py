@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from functools import cached_property
 from math import degrees
@@ -25,10 +25,16 @@ from tolalloc.drawings.distributions import (
 )
 from tolalloc.drawings.measured_parts import MeasuredParts
 from tolalloc.drawings.zones import Feature, Spectrum, Systematic, ZoneMapping
-from tolalloc.reading.units import MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import INCH, MICROMETRE, MILLIMETRE
 
 ANGULAR = ("tilt", "phase", "rotation")
 """Last part of the name of a source whose columns are angles."""
+
+
+INCHES, PERCENT = "in", "%"
+"""Units of a row beside the metric ones; a per cent is one of the nominal size."""
+LENGTHS = {"µm": MICROMETRE, "mm": MILLIMETRE, INCHES: INCH}
+"""Unit of a length → its length [m]."""
 
 
 def is_angular(source: str) -> bool:
@@ -129,7 +135,7 @@ class Source:
     shift
         Mean shift over half the zone, for sizes only [-].
     shape
-        Shape of a lognormal or Weibull distribution, else 0 [-].
+        Shape of a lognormal, Weibull or trapezoidal distribution, both of a beta distribution, else 0 [-].
     spectrum
         Order → relative amplitude of pitch and run-out deviations [-].
     systematic
@@ -142,6 +148,8 @@ class Source:
         Step of the numbers that the drawing states; 0: the usual one, if its model has such [m].
     over
         For an angle, the length over which the zone limits the deviation; 0 for everything else [m].
+    unit
+        Unit in which the user's table states its zone: µm, mm, in, or % of the nominal size.
     own_id
         What the user's table calls it, if that is not its name.
     own_cells
@@ -163,7 +171,7 @@ class Source:
     distribution: Distribution = Distribution.NORMAL
     cp: float = 1.0
     shift: float = 0.0
-    shape: float = 0.0
+    shape: float | tuple[float, ...] = 0.0
     batches: tuple[Batch, ...] = ()
     measured: MeasuredParts | None = None
     sorted: bool = False
@@ -183,6 +191,30 @@ class Source:
     own_id: str = ""
     note: str = ""
     own_cells: tuple[tuple[str, str], ...] = ()
+    # How a table says it, which changes nothing that is computed but the inputs of an own function, which knows it
+    unit: str = field(default="µm", repr=False)
+
+    @property
+    def length_name(self) -> str:
+        """Unit of its nominal size in a table, and of the input of an own function that it is: mm or in."""
+        return INCHES if self.unit == INCHES else "mm"
+
+    @property
+    def unit_length(self) -> float:
+        """One unit of its row [m]."""
+        return abs(self.nominal) / 100.0 if self.unit == PERCENT else LENGTHS[self.unit]
+
+    def said(self, length: float, spec: str = ".3g") -> str:
+        """Return a deviation as a sentence says it: in inches where its row does, else in micrometres."""
+        text = f"{length / LENGTHS[self._told]:{spec}}"
+        if "e+" in text:
+            text = f"{float(text):{'+' * spec.startswith('+')},.0f}"
+        return f"{text} {self._told}"
+
+    @property
+    def _told(self) -> str:
+        """Unit in which sentences say a deviation."""
+        return INCHES if self.unit == INCHES else "µm"
 
     @cached_property
     def columns(self) -> tuple[str, ...]:
@@ -236,6 +268,11 @@ class Source:
         return self.over or 1.0
 
     @property
+    def shapes(self) -> tuple[float, ...]:
+        """Shapes of the distribution, none where it has none [-]."""
+        return self.shape if isinstance(self.shape, tuple) else (self.shape,) if self.shape else ()
+
+    @property
     def _base(self) -> Marginal:
         """Deviation of a size, from the middle of its zone or its lower limit; radius or amplitude of all others."""
         is_size = self.feature is Feature.SIZE
@@ -245,14 +282,23 @@ class Source:
             return smoothed(relative, smoothing_width(relative)) if is_size else smoothed_magnitude(relative)
         if self.distribution is Distribution.MIXTURE:
             return Mixture(normal, self.batches)
+        if self.distribution in (Distribution.NORMAL, Distribution.RAYLEIGH):
+            return normal if self.distribution is Distribution.NORMAL else RAYLEIGH
         start = -1.0 if is_size else 0.0
-        return {
-            Distribution.NORMAL: normal,
-            Distribution.UNIFORM: Family("uniform", (start, 1.0 - start), 1.0),
-            Distribution.TRIANGULAR: Family("triang", (0.5, start, 1.0 - start), 1.0),
-            Distribution.LOGNORMAL: Family("lognorm", (self.shape,)),
-            Distribution.WEIBULL: Family("weibull_min", (self.shape,)),
+        name, shapes = {
+            Distribution.UNIFORM: ("uniform", ()),
+            Distribution.TRIANGULAR: ("triang", (0.5,)),
+            Distribution.TRAPEZOID: (
+                "trapezoid",
+                tuple((1.0 + sign * own) / 2.0 for own in self.shapes for sign in (-1, 1)),
+            ),
+            Distribution.BETA: ("beta", self.shapes),
+            Distribution.LOGNORMAL: ("lognorm", self.shapes),
+            Distribution.WEIBULL: ("weibull_min", self.shapes),
         }[self.distribution]
+        return (
+            Family(name, (*shapes, start, 1.0 - start), 1.0) if self.distribution.is_bounded else Family(name, shapes)
+        )
 
     @cached_property
     def zone_mapping(self) -> ZoneMapping:
@@ -281,16 +327,18 @@ class Source:
     @property
     def mapping(self) -> str:
         """Sentence that says how the zone became a distribution."""
-        reading = f"{self.zone / MICROMETRE:.3g} µm, {self.feature.zone_meaning}"
+        reading = f"{self.said(self.zone)}, {self.feature.zone_meaning}"
+        if self.unit == PERCENT:
+            reading = f"{self.zone / self.unit_length:.3g} % of the nominal size, {reading}"
         if self.teeth:
             reading += f", taken at {self.teeth} teeth"
         if self.over:
-            reading += f" over a length of {self.over / MILLIMETRE:g} mm"
+            reading += f" over a length of {self.over / LENGTHS[self.length_name]:g} {self.length_name}"
         if abs(self.middle) > _ROUNDING * self.zone:
-            reading += f", its middle {self.middle / MICROMETRE:+.3g} µm from the nominal size".replace("-", "−")
+            reading += f", its middle {self.said(self.middle, '+.3g')} from the nominal size".replace("-", "−")
         for order, amplitude, at in self.systematic:
             reading += (
-                f", beside a wave of order {order} that all parts share, {amplitude / MICROMETRE:.3g} µm high at "
+                f", beside a wave of order {order} that all parts share, {self.said(amplitude)} high at "
                 f"{degrees(at):.3g}°"
             )
         if self.each > 1:
@@ -302,32 +350,38 @@ class Source:
     @property
     def _normal(self) -> str:
         """What the zone became, where it became normal numbers."""
-        deviation = self.zone_mapping.wave_deviation * self.zone / MICROMETRE
+        deviation = self.zone_mapping.wave_deviation * self.zone
         if self.teeth:
-            return f"normal, σ = {deviation:.3g} µm per unit of the spectrum {self.written_spectrum} at Cp {self.cp:g}"
+            return (
+                f"normal, σ = {self.said(deviation)} per unit of the spectrum {self.written_spectrum} at Cp {self.cp:g}"
+            )
         if self.spectrum:
-            waves = ", ".join(f"{deviation * amplitude:.3g} (order {order})" for order, amplitude in self.spectrum)
-            return f"normal cosine and sine waves, σ = {waves} µm at Cp {self.cp:g}"
+            sizes = (
+                f"{self.said(deviation * amplitude).split()[0]} (order {order})" for order, amplitude in self.spectrum
+            )
+            return f"normal cosine and sine waves, σ = {', '.join(sizes)} {self._told} at Cp {self.cp:g}"
         if self.feature is Feature.POSITION:
-            return f"normal, σ = {deviation:.3g} µm on each axis at Cp {self.cp:g}"
-        shift = f", mean shifted by {self.shift * self.zone / MICROMETRE / 2:.3g} µm" if self.shift else ""
-        return f"normal, σ = {deviation:.3g} µm at Cp {self.cp:g}{shift}"
+            return f"normal, σ = {self.said(deviation)} on each axis at Cp {self.cp:g}"
+        shift = f", mean shifted by {self.said(self.shift * self.zone / 2)}" if self.shift else ""
+        return f"normal, σ = {self.said(deviation)} at Cp {self.cp:g}{shift}"
 
     @property
     def _other(self) -> str:
         """What the zone became, where it became anything else."""
-        mean, deviation = (number * self.zone / MICROMETRE for number in self.zone_mapping.moments)
+        mean, deviation = (number * self.zone for number in self.zone_mapping.moments)
         if self.feature is Feature.SIZE:
-            off = f"{mean:+.3g}" if abs(mean) > _ROUNDING * self.zone / MICROMETRE else "0"
-            spread = f"{self._kind}, mean {off} µm off the middle, σ = {deviation:.3g} µm"
+            is_off = abs(mean) > _ROUNDING * self.zone
+            off = self.said(mean, "+.3g") if is_off else self.said(0.0)
+            spread = f"{self._kind}, mean {off} off the middle, σ = {self.said(deviation)}"
         elif self.feature is Feature.POSITION:
-            spread = f"radius {self._kind}, mean {mean:.3g} µm, σ = {deviation:.3g} µm, any phase"
+            spread = f"radius {self._kind}, mean {self.said(mean)}, σ = {self.said(deviation)}, any phase"
         else:
+            length = LENGTHS[self._told]
             waves = ", ".join(
-                f"{mean * amplitude:.3g} ± {deviation * amplitude:.3g} (order {order})"
+                f"{mean * amplitude / length:.3g} ± {deviation * amplitude / length:.3g} (order {order})"
                 for order, amplitude in self.spectrum
             )
-            spread = f"amplitude of every order {self._kind}, mean ± σ = {waves} µm, any phase"
+            spread = f"amplitude of every order {self._kind}, mean ± σ = {waves} {self._told}, any phase"
         if self.distribution is not Distribution.EMPIRICAL:
             spread += f", at Cp {self.cp:g}"
         if len(self.spectrum) > 1:
@@ -346,7 +400,10 @@ class Source:
                 f"{batch.weight:g} of all with shift {batch.shift:g} and spread {batch.spread:g}"
                 for batch in self.batches
             )
-        return f"{self.distribution.value}, shape {self.shape:g}" if self.shape else self.distribution.value
+        shapes = " and ".join(f"{own:g}" for own in self.shapes)
+        if len(self.shapes) > 1:
+            return f"{self.distribution.value}, shapes {shapes}"
+        return f"{self.distribution.value}, shape {shapes}" if shapes else self.distribution.value
 
 
 def limited_measure(source: Source, columns: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, " sample"]:
@@ -372,3 +429,21 @@ def limited_measure(source: Source, columns: Float[np.ndarray, "sample column"])
         wave = length @ np.column_stack([np.cos(orders * turn), np.sin(orders * turn)]).ravel()
         high, low = np.maximum(high, wave), np.minimum(low, wave)
     return np.asarray(high - low)
+
+
+def zone_unit(sources: Iterable[Source]) -> str:
+    """Return the unit in which a report shows zones: in or % where all sources are stated so, else µm."""
+    stated = {own.unit for own in sources}
+    return stated.pop() if len(stated) == 1 and stated <= {INCHES, PERCENT} else "µm"
+
+
+def length_unit(sources: Iterable[Source]) -> tuple[str, float]:
+    """Return the unit in which a report shows lengths of zones, and its length [m]: in where all are stated so."""
+    unit = INCHES if zone_unit(sources) == INCHES else "µm"
+    return unit, LENGTHS[unit]
+
+
+def zone_in(source: Source, unit: str, zone: float | None = None) -> float:
+    """Return the zone of a source, or another one [m], in such a unit."""
+    length = source.unit_length if unit == PERCENT else LENGTHS[unit]
+    return (source.zone if zone is None else zone) / length

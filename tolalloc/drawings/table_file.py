@@ -8,19 +8,30 @@ from __future__ import annotations
 import csv
 import re
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import date, time, timedelta
 from enum import StrEnum
+from functools import cached_property
 from io import BytesIO, StringIO
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, TypeVar, get_args, get_origin
+from unicodedata import normalize
 from zipfile import ZipFile
 
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
-from tolalloc.reading.file_content import read_bytes, read_text, require_believable
+from tolalloc.reading.file_content import read_bytes, read_text, require_believable, require_table
 from tolalloc.reading.files import Record, validated
-from tolalloc.reading.units import COST_UNITS, currency_in, in_cost_units
+from tolalloc.reading.units import (
+    COST_UNITS,
+    WITH_UNIT,
+    currency_in,
+    in_cost_units,
+    is_unit,
+    shown_number,
+    usual_signs,
+)
 
 _LARGEST_CONTENT = 16 * 2**20
 """Largest content of a workbook when unpacked, all parts together [B]."""
@@ -32,14 +43,27 @@ _MOST_CELLS = 100_000
 """Most cells of the rectangle from the first cell to the last one [-]."""
 
 
+_BLANKS, _UNSEEN = re.compile(r"[\u00a0\u2007\u2009\u202f]"), re.compile(r"[\u200b-\u200d\u2060\ufeff\u00ad]")
+"""Blanks of other widths, and signs that nobody sees."""
+
+
+class DateText(str):
+    """Date or time of a workbook, into which a spreadsheet turns numbers: kept in a note, refused elsewhere."""
+
+    __slots__ = ()
+
+
 class AmbiguousText(str):
     """Text that is another number where its sign separates thousands: no matter in a note, refused as a number."""
 
     __slots__ = ()
 
 
-def sheet_texts(path: Path, sheet: str = "") -> list[tuple[str, ...]]:
+def sheet_texts(path: Path, sheet: str, heads: Heads) -> list[tuple[str, ...]]:
     """Return the cells of the named sheet as text, of the first one unless named; whole numbers without decimals.
+
+    Titles above the head may be merged. A number is followed by the unit that its format
+    shows, and per cent are per cent.
 
     Raises
     ------
@@ -48,11 +72,13 @@ def sheet_texts(path: Path, sheet: str = "") -> list[tuple[str, ...]]:
         merged cells, an error, or a formula whose value was not kept.
     """
     content = read_bytes(path, "a workbook (XLSX)")
+    require_table(path, content, is_workbook=True)
     try:
         _require_small(path, content)
         # Values do not say which cells were formulas, and formulas do not say their values.
         values, formulas = (_loaded(path, content, data_only, sheet) for data_only in (True, False))
         texts = _texts(path, values, formulas)
+        _require_single(path, values, 1 + heads.row_in(texts))
     except InputError:
         raise
     except Exception as error:  # whatever the libraries raise on a damaged file: of zlib, XML, types, indices
@@ -62,13 +88,20 @@ def sheet_texts(path: Path, sheet: str = "") -> list[tuple[str, ...]]:
 
 
 def hidden_cells(path: Path, sheet: str = "") -> tuple[str, ...]:
-    """Return a sentence for the hidden rows and one for the hidden columns of a sheet, which are read too."""
+    """Return a sentence each for hidden rows, hidden columns and rows that are struck out, which are read too."""
+    from openpyxl.utils import get_column_letter
+
     loaded = _loaded(path, read_bytes(path, "a workbook (XLSX)"), data_only=True, sheet=sheet)
     rows = [str(at) for at, row in loaded.row_dimensions.items() if row.hidden]
-    columns = [at for at, column in loaded.column_dimensions.items() if column.hidden]
+    columns = [
+        f"{at} to {get_column_letter(column.max)}" if column.max > column.min else at
+        for at, column in loaded.column_dimensions.items()
+        if column.hidden
+    ]
+    struck = [str(row[0].row) for row in loaded.iter_rows() if any(cell.font.strike for cell in row if cell.value)]
     return tuple(
-        f"{path.name}: hidden {what} of the sheet are read like the others: {', '.join(found)}"
-        for what, found in (("rows", rows), ("columns", columns))
+        f"{path.name}: {what} of the sheet are read like the others: {', '.join(found)}"
+        for what, found in (("hidden rows", rows), ("hidden columns", columns), ("rows that are struck out", struck))
         if found
     )
 
@@ -94,7 +127,7 @@ def _loaded(path: Path, content: bytes, data_only: bool, sheet: str) -> Any:
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of what is lost on writing it again, which nobody does
-        sheets = load_workbook(BytesIO(content), data_only=data_only, keep_links=False).worksheets
+        sheets = load_workbook(BytesIO(content), data_only=data_only, keep_links=False, rich_text=data_only).worksheets
     named = {own.title: own for own in sheets}
     if sheet and sheet not in named:
         shown = [repr(title) for title, own in named.items() if own.sheet_state == "visible"]
@@ -107,9 +140,6 @@ def _texts(path: Path, values: Any, formulas: Any) -> list[tuple[str, ...]]:
     place = f"{path}, sheet {values.title!r}"
     if values.sheet_state != "visible":
         raise InputError(f"{place}: the sheet is hidden; allowed is a table in a sheet that is shown.")
-    if values.merged_cells.ranges:
-        where = next(iter(values.merged_cells.ranges))
-        raise InputError(f"{place}: the cells {where} are merged; allowed is one value in each cell.")
     rows, columns = values.max_row, values.max_column
     if rows * columns > _MOST_CELLS:
         raise InputError(
@@ -126,6 +156,14 @@ def _texts(path: Path, values: Any, formulas: Any) -> list[tuple[str, ...]]:
     ]
 
 
+def _require_single(path: Path, values: Any, first: int) -> None:
+    """Raise if cells are merged from the first row of the table on."""
+    for where in values.merged_cells.ranges:
+        if where.max_row >= first:
+            place = f"{path}, sheet {values.title!r}"
+            raise InputError(f"{place}: the cells {where} are merged; allowed is one value in each cell.")
+
+
 def _text(path: Path, cell: Any, written: Any) -> str:
     """Return the text of a cell, or say that it has no value."""
     value = cell.value
@@ -136,18 +174,30 @@ def _text(path: Path, cell: Any, written: Any) -> str:
         raise InputError.at(f"{path}, row {cell.row}", f"cell {cell.coordinate}", written.value, allowed)
     if isinstance(value, str) and _GROUPED.fullmatch(value.strip()):
         return AmbiguousText(value.strip())
-    if isinstance(value, float) and value.is_integer():
-        value = int(value)
-    return "" if value is None else _minus(str(value).strip())
+    if isinstance(value, date | time | timedelta):
+        return DateText(str(value).removesuffix(" 00:00:00"))
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return shown_number(value, str(cell.number_format))
+    return "" if value is None else _plain("".join(map(_marked, value)) if isinstance(value, list) else str(value))
 
 
-def _minus(cell: str) -> str:
-    """Return a cell with the keyboard's minus where a number has a true one.
+def _marked(run: Any) -> str:
+    """Return a run of letters of one font, marked where it is raised, lowered or struck out: a footnote is no digit."""
+    font = getattr(run, "font", None)
+    mark = ("^" if font.vertAlign else "") + ("~" if font.strike else "") if font else ""
+    return f"{mark}{run}"
 
-    >>> _minus("\u22120.05"), _minus("10\u221220 mm")
-    ('-0.05', '10−20 mm')
+
+def _plain(cell: str) -> str:
+    """Return a cell with the keyboard's blanks and accents, and its minus where a number has a true one.
+
+    >>> _plain("\u22120.05"), _plain("10\u221220 mm"), _plain("hub\u00a0seat\u200b ")
+    ('-0.05', '10−20 mm', 'hub seat')
     """
-    return "-" + cell[1:].lstrip() if _TRUE_MINUS.fullmatch(cell) else cell
+    cell = normalize("NFC", _UNSEEN.sub("", _BLANKS.sub(" ", cell))).strip()
+    negative = "-" + cell[1:].lstrip()
+    is_number = _TRUE_MINUS.fullmatch(cell) or (cell[:1] == "\u2212" and WITH_UNIT.fullmatch(negative))
+    return negative if is_number else cell
 
 
 DATA = Path(__file__).parent / "data"
@@ -156,15 +206,19 @@ DATA = Path(__file__).parent / "data"
 NumberedRow = tuple[int, tuple[str, ...]]
 """Row as an editor counts it, from 1, and its cells."""
 
-_DECIMAL = re.compile(r"[+-]?\d*[.,]\d+([eE][+-]?\d+)?")
+_DECIMAL = re.compile(r"[+-]?\d*[.,]\d+([eE][+-]?\d+)?", re.ASCII)
 """Number with one decimal sign, whichever."""
 
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 """Number that is a thousand times as large where the sign separates thousands."""
 
 
-_TEXTS = ("id", "part", "group", "process", "grade", "drawing", "label", "note", "sources")
+_TEXTS = ("id", "part", "feature", "unit", "distribution", "group", "process", "grade", "sources", "source", "measured")
 """Columns whose cells are no numbers, whatever they look like."""
+_WORDS = ("drawing", "label", "note")
+"""Columns that are carried through, dates too."""
+_BRACKET = re.compile(r"(.*?)\s*\(([^()]*)\)")
+"""Head with its unit in round brackets."""
 _APOSTROPHE = re.compile(r"^'(?=[=+\-@])")
 """What `tolalloc.reading.files.no_formula` writes before a text."""
 
@@ -191,20 +245,48 @@ class Heads:
         """Return a head as a column is named, with the unit that it states.
 
         >>> heads = Heads(known=("id", "Cp"), called={"Merkmal": "id"})
-        >>> heads.meant("Merkmal"), heads.meant("CP [-]"), heads.meant("Bemerkung")
+        >>> heads.meant("MERKMAL"), heads.meant("CP [-]"), heads.meant("Bemerkung")
         ('id', 'Cp [-]', 'Bemerkung')
         """
         name, unit = split_header(head)
-        spelt = {own.lower(): own for own in self.known}
-        found = self.called.get(name.strip()) or spelt.get(name.strip().lower(), name)
+        spelt = self._names
+        bracket = _BRACKET.fullmatch(name)
+        if bracket and not unit and _spelt(bracket[1]) in spelt and is_unit(bracket[2]):
+            name, unit = bracket[1], usual_signs(bracket[2].strip())
+        found = spelt.get(_spelt(name), name)
         return f"{found} [{unit}]" if unit else found
+
+    @cached_property
+    def _names(self) -> dict[str, str]:
+        """Head without its capitals → name of the column."""
+        return {_spelt(own): own for own in self.known} | {_spelt(own): name for own, name in self.called.items()}
+
+    def row_in(self, rows: Sequence[Sequence[str]]) -> int:
+        """Return the position of the row that names all needed columns and most others, 0 where none does."""
+        named = {at: self.named(cells) for at, cells in enumerate(rows[:_MOST_TITLES])} if self.needed else {}
+        found = {at: len(own & {*self.known}) for at, own in named.items() if own.issuperset(self.needed)}
+        return max(found, key=lambda at: found[at], default=0)
+
+    def kind(self, head: str) -> str:
+        """Return what stands under a head of a table: number, text (of ours), or words that nothing is read from."""
+        name = split_header(self.meant(head))[0]
+        if name in _WORDS or (self.known and name not in self.known):
+            return "words"
+        return "text" if name in _TEXTS else "number"
 
     def named(self, cells: Sequence[str]) -> set[str]:
         """Return the names that a row would give to columns."""
         return {split_header(self.meant(cell))[0] for cell in cells}
 
 
+def _spelt(head: str) -> str:
+    """Return a head without its capitals and line breaks."""
+    return " ".join(head.split()).lower()
+
+
 _ANY = Heads()
+_MOST_TITLES = 200
+"""Rows among which the heads of a table are looked for [-]."""
 
 
 def read_table_file(path: Path, heads: Heads = _ANY, sheet: str = "") -> tuple[NumberedRow, ...]:
@@ -219,9 +301,9 @@ def read_table_file(path: Path, heads: Heads = _ANY, sheet: str = "") -> tuple[N
         The file is missing, no table, or without that sheet; or cells stand under no header.
     """
     if path.suffix.lower() in (".xlsx", ".xlsm"):
-        rows = _under_headers(path, _without_titles(sheet_texts(path, sheet), heads), "each needs one")
-        texts = [split_header(heads.meant(name))[0] in _TEXTS for name in rows[0][1]] if rows else []
-        rows = rows[:1] + [_with_points(path, number, cells, texts) for number, cells in rows[1:]]
+        rows = _under_headers(path, _without_titles(sheet_texts(path, sheet, heads), heads), "each needs one")
+        kinds = [heads.kind(name) for name in rows[0][1]] if rows else []
+        rows = rows[:1] + [_with_points(path, number, cells, kinds) for number, cells in rows[1:]]
     elif sheet:
         raise InputError.at(path, "sheet", sheet, "none, since only a workbook (XLSX) has sheets")
     else:
@@ -229,29 +311,60 @@ def read_table_file(path: Path, heads: Heads = _ANY, sheet: str = "") -> tuple[N
     if not rows:
         raise InputError(f"{path}: the table is empty; a header and rows are needed.")
     width = len(rows[0][1])
-    (first, header), *others = ((number, (*cells, *[""] * width)[:width]) for number, cells in rows)
-    return ((first, tuple(map(heads.meant, header))), *others)
+    full = [(*cells, *[""] * width)[:width] for _, cells in rows]
+    used = [at for at in range(width) if any(cells[at] for cells in full)]  # a sheet may begin in its second column
+    (first, header), *others = (
+        (number, tuple(cells[at] for at in used)) for (number, _), cells in zip(rows, full, strict=True)
+    )
+    if again := [number for number, cells in others if heads.known and cells == header]:
+        raise InputError(
+            f"{path}, row {again[0]}: the heads stand here again; allowed is one table with its heads once."
+        )
+    return _with_units(path, ((first, tuple(map(heads.meant, header))), *others), heads)
+
+
+def _with_units(path: Path, rows: tuple[NumberedRow, ...], heads: Heads) -> tuple[NumberedRow, ...]:
+    """Return a table whose first row states the units of its columns with these in its heads.
+
+    Raises
+    ------
+    InputError
+        A head states another unit than the cell below it.
+    """
+    if len(rows) < 2 or not heads.known:
+        return rows
+    (first, header), (number, cells), *others = rows
+    units = [cell.strip("[]()").strip() for cell in cells]
+    named = [unit for head, unit in zip(header, units, strict=True) if split_header(head)[0] in heads.needed]
+    if not any(units) or not all(is_unit(unit) for unit in units if unit) or {*named} - {"", "-"}:
+        return rows
+    found = list[str]()
+    for head, unit in zip(header, units, strict=True):
+        name, stated = split_header(head)
+        if stated and unit and usual_signs(unit) != stated:
+            raise InputError.at(f"{path}, row {number}", name, unit, f"{stated} as in the head {head}")
+        is_said = unit not in ("", "-") and not stated and name in heads.known and name != "unit"
+        found.append(f"{name} [{unit}]" if is_said else head)
+    return ((first, tuple(found)), *others)
 
 
 def _without_titles(rows: Sequence[tuple[str, ...]], heads: Heads) -> list[tuple[str, ...]]:
     """Return rows in which those above the first with all names are blank, so that the others keep their numbers."""
-    needed = heads.needed
-    first = next((at for at, cells in enumerate(rows) if needed and heads.named(cells).issuperset(needed)), 0)
+    first = heads.row_in(rows)
     return [()] * first + list(rows[first:])
 
 
 def _records(path: Path, heads: Heads = _ANY) -> list[NumberedRow]:
     """Return the records of a CSV file; what separates them is seen from the header, # starts a comment."""
     text = read_text(path, "a table in CSV")
-    lines = ["" if line.startswith("#") else line for line in StringIO(text)]
-    split = ((line, re.split(r"[;,\t]", line.strip())) for line in lines)
-    header = next((line for line, cells in split if heads.needed and heads.named(cells).issuperset(heads.needed)), "")
-    header = header or next((line for line in lines if line.strip()), "")
-    separator = next((mark for mark in ";\t" if mark in header), ",")
+    lines = _without_comments(StringIO(text))
+    at = heads.row_in([re.split(r"[;,\t|]", line.strip()) for line in lines[:_MOST_TITLES]])
+    header = lines[at] if at else next((line for line in lines if line.strip()), "")
+    separator = next((mark for mark in ";\t|" if mark in header), ",")
     rows, so_far = list[tuple[str, ...]](), 0
     try:
         for record in csv.reader(lines, delimiter=separator, strict=True):
-            rows.append(tuple(_minus(_APOSTROPHE.sub("", cell.strip())) for cell in record))
+            rows.append(tuple(_plain(_APOSTROPHE.sub("", cell.strip())) for cell in record))
             so_far += len(record)
             require_believable(path, len(rows), len(record), so_far)
     except csv.Error as error:
@@ -269,7 +382,18 @@ def _records(path: Path, heads: Heads = _ANY) -> list[NumberedRow]:
         raise InputError(
             f"{path}, row {number}: {len(cells)} of {len(kept[0][1])} cells are there; is the file truncated?"
         )
-    return kept if separator == "," else kept[:1] + _with_decimal_points(path, kept[1:])
+    if separator == "," or not kept:
+        return kept
+    return kept[:1] + _with_decimal_points(path, kept[1:], [heads.kind(name) for name in kept[0][1]], bool(heads.known))
+
+
+def _without_comments(lines: Iterable[str]) -> list[str]:
+    """Return lines with those blank that begin with #, unless within quotation marks."""
+    found, is_quoted = list[str](), False
+    for line in lines:
+        found.append(line if is_quoted or not line.startswith("#") else "")
+        is_quoted ^= found[-1].count('"') % 2 == 1
+    return found
 
 
 def _under_headers(path: Path, rows: Sequence[tuple[str, ...]], hint: str) -> list[NumberedRow]:
@@ -290,33 +414,55 @@ def _under_headers(path: Path, rows: Sequence[tuple[str, ...]], hint: str) -> li
     return [(number, cells[:width]) for number, cells in kept]
 
 
-def _with_points(path: Path, number: int, cells: Sequence[str], texts: Sequence[bool]) -> NumberedRow:
+def _with_points(path: Path, number: int, cells: Sequence[str], kinds: Sequence[str]) -> NumberedRow:
     """Return a row of a workbook whose numbers, where they were kept as text, have decimal points.
 
     Raises
     ------
     InputError
-        A number kept as text whose sign may separate thousands.
+        A number kept as text whose sign may separate thousands, or what a spreadsheet made a date of.
     """
     found = list[str]()
-    for cell, is_text in zip(cells, (*texts, *[False] * len(cells)), strict=False):
-        if isinstance(cell, AmbiguousText) and not is_text:
+    for cell, kind in zip(cells, (*kinds, *["number"] * len(cells)), strict=False):
+        if isinstance(cell, AmbiguousText) and kind == "number":
             allowed = "a number as Excel keeps it, since as text it may separate thousands"
             raise InputError.at(f"{path}, row {number}", "a number kept as text", cell, allowed)
-        found.append(cell.replace(",", ".") if _DECIMAL.fullmatch(cell) and not is_text else cell)
+        if isinstance(cell, DateText) and kind != "words":
+            allowed = "what was typed before the workbook made a date or time of it (format the cell as text first)"
+            raise InputError.at(f"{path}, row {number}", "a cell", cell, allowed)
+        found.append(_with_point(cell) if kind == "number" else cell)
     return number, tuple(found)
 
 
-def _with_decimal_points(path: Path, rows: Sequence[NumberedRow]) -> list[NumberedRow]:
-    """Return rows whose numbers may have decimal commas with points; refused is what may separate thousands."""
-    decimals = {cell: number for number, cells in rows for cell in cells if _DECIMAL.fullmatch(cell)}
-    if any("," in cell for cell in decimals) and any("." in cell for cell in decimals):
-        for cell, number in decimals.items():
-            if _THOUSANDS.fullmatch(cell):
-                allowed = "decimal commas or decimal points in the whole file, and nothing between thousands"
-                raise InputError.at(f"{path}, row {number}", "a cell", cell, allowed)
+def _with_point(cell: str) -> str:
+    """Return a number that may have a decimal comma, with or without ± and a unit, with a point."""
+    return cell.replace(",", ".") if _DECIMAL.fullmatch(cell) or WITH_UNIT.fullmatch(cell) else cell
+
+
+def _with_decimal_points(
+    path: Path, rows: Sequence[NumberedRow], kinds: Sequence[str], is_careful: bool
+) -> list[NumberedRow]:
+    """Return rows whose numbers may have decimal commas with points; refused is what may separate thousands.
+
+    A careful reader asks for one number at least whose sign can only be the decimal one.
+    """
+    numbers = [at for at, kind in enumerate(kinds) if kind == "number"]
+    decimals = {
+        cells[at]: number
+        for number, cells in rows
+        for at in numbers[: len(cells)]
+        if at < len(cells) and _DECIMAL.fullmatch(cells[at])
+    }
+    grouped = {cell: number for cell, number in decimals.items() if _THOUSANDS.fullmatch(cell)}
+    both = any("," in cell for cell in decimals) and any("." in cell for cell in decimals)
+    if grouped and (both or (is_careful and len(grouped) == len(decimals))):
+        cell, number = next(iter(grouped.items()))
+        allowed = "decimal commas or decimal points in the whole file, and nothing between thousands"
+        if not both:
+            allowed = f"a number that shows what its sign means, such as {cell}0 or {re.sub('[.,]', '', cell)}"
+        raise InputError.at(f"{path}, row {number}", "a cell", cell, allowed)
     return [
-        (number, tuple(cell.replace(",", ".") if cell in decimals else cell for cell in cells))
+        (number, tuple(_with_point(cell) if at in numbers else cell for at, cell in enumerate(cells)))
         for number, cells in rows
     ]
 
@@ -395,11 +541,6 @@ def split_header(header: str) -> tuple[str, str]:
     if match is None:
         return header, ""
     return match[1], usual_signs(match[2].strip())
-
-
-def usual_signs(unit: str) -> str:
-    """Return a unit with the one µ and the one dot that are meant; others are typed too, and look alike."""
-    return unit.replace("\u03bc", "µ").replace("\u22c5", "·")
 
 
 Row = TypeVar("Row", bound=Record)
@@ -535,6 +676,7 @@ def _typed(annotation: object, header: str, value: str, place: str) -> object:
         return int(value)
     if annotation is bool:
         answers = {"yes": True, "no": False, "true": True, "false": False, "ja": True, "nein": False}
+        answers |= {"wahr": True, "falsch": False}
         if value.lower() not in answers:
             raise InputError.at(place, header, value, "yes or no")
         return answers[value.lower()]

@@ -14,12 +14,21 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
-from tolalloc.drawings.distributions import Distribution, require_shape
-from tolalloc.drawings.fields import ALLOWED_UNITS, COLUMNS, UNITS, Cell, ToleranceRow, headers_in
+from tolalloc.drawings.distributions import Distribution, parsed_shapes, require_shapes
+from tolalloc.drawings.fields import (
+    ALLOWED_UNITS,
+    COLUMNS,
+    UNITS,
+    Cell,
+    ToleranceRow,
+    headers_in,
+    shapes_text,
+    usual_unit,
+)
 from tolalloc.drawings.ladder import RADII, fit_deviations, is_fit
-from tolalloc.drawings.sources import Source, known_as
+from tolalloc.drawings.sources import INCHES, LENGTHS, PERCENT, Source, known_as
 from tolalloc.drawings.table_file import (
     DATA,
     Heads,
@@ -30,12 +39,12 @@ from tolalloc.drawings.table_file import (
     require_units,
     split_header,
     typed_cells,
-    usual_signs,
 )
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
-from tolalloc.reading.files import Record, no_formula, shipped_or_path, validated
-from tolalloc.reading.units import COST_UNITS, MICROMETRE, MILLIMETRE
+from tolalloc.reading.file_content import is_file
+from tolalloc.reading.files import Record, as_toml, no_formula, read_toml, shipped_or_path, validated
+from tolalloc.reading.units import COST_UNITS, MICROMETRE, MILLIMETRE, number_in
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -54,7 +63,7 @@ class ProcessCapability(Record):
     Cp: Annotated[float, Field(ge=0.1, le=10)]
     shift: Annotated[float, Field(ge=-1, le=1)] = 0.0
     distribution: Distribution = Distribution.NORMAL
-    shape: float | None = None
+    shape: Annotated[str, BeforeValidator(shapes_text)] = ""
     sorted: bool = False
     note: Annotated[str, Field(min_length=1)]
 
@@ -67,7 +76,7 @@ class ProcessCapability(Record):
             )
         if self.feature is not Feature.SIZE and self.shift != 0:
             raise ValueError(f"shift must be 0 for feature {self.feature.value}: {self.shift:g}")
-        require_shape(self.distribution, self.shape)
+        require_shapes(self.distribution, parsed_shapes(self.shape))
         return self
 
     @property
@@ -136,6 +145,8 @@ _SMALLEST_SIZE = 0.1 * MILLIMETRE
 """Nominal size below which it is doubted, where one is stated [m]."""
 _FINEST_ZONE = 0.1 * MICROMETRE
 """Zone of a feature without a nominal size below which it is doubted [m]."""
+_WIDEST_ZONE = 2.0 * MILLIMETRE
+"""Zone of a feature without a nominal size above which it is doubted: a metre may be meant as a millimetre [m]."""
 _LARGEST_SIZE = 3150.0 * MILLIMETRE
 """Largest nominal size of ISO 286-1 [m]."""
 _OFF = 3.0
@@ -207,6 +218,8 @@ def _of_zone(source: Source) -> list[str]:
     found, zone = [], source.zone
     if zone < _FINEST_ZONE:
         found.append(f"the zone of {_length(zone)} is finer than any process holds")
+    elif not source.nominal and zone > _WIDEST_ZONE:
+        found.append(f"the zone of {_length(zone)} is wide, and no nominal size is stated beside it")
     elif source.nominal > 0 and source.feature is Feature.SIZE and not source.over:
         factor = zone / _tolerance_factor(source.nominal)
         if not _FINEST <= factor <= _COARSEST:
@@ -257,18 +270,67 @@ _NEAR = 0.75
 """Likeness of a head to the name of a column from which on it is a slip rather than a column of the user's own [-]."""
 
 
-def heads_of(columns: Mapping[str, str] = MappingProxyType({})) -> Heads:
+class HeadsFile(Record):
+    """What an office calls the columns of its table, as a TOML file beside it says it."""
+
+    columns: Mapping[str, str]  # Head as it is written, without its unit → name of the column that it is
+
+
+_FIRST_WORD = re.compile(r"\s*(\w+)\s*[(/,:*]")
+"""First word of a head that goes on in brackets or behind a stroke."""
+_NUMBERS = tuple(
+    name for name, own in COLUMNS.items() if own.unit and name not in ("batches", "spectrum", "systematic")
+)
+"""Columns of numbers, of which a head such as ``Cp (short)`` is one in other words."""
+
+
+def heads_of(path: Path, columns: Mapping[str, str] = MappingProxyType({})) -> Heads:
     """Return how the heads of a tolerance table are read, some of them called as an office does.
+
+    What is given comes before what the file `heads_file` beside the table says.
 
     Raises
     ------
-    UnknownNameError
-        A head stands for what is no column.
+    InputError, UnknownNameError
+        A head stands for what is no column, or two heads for one; or the file is no such file.
     """
-    for name in columns.values():
+    beside, places = heads_file(path), dict.fromkeys(columns, "drawing, columns")
+    if stated := heads_beside(path):
+        columns, places = {**stated, **columns}, {**dict.fromkeys(stated, f"{beside}, columns"), **places}
+    for head, name in columns.items():
         if name not in ToleranceRow.model_fields:
-            raise UnknownNameError.among("drawing, columns", "column", name, ToleranceRow.model_fields)
-    return Heads(needed=("id",), known=tuple(ToleranceRow.model_fields), called=columns)
+            raise UnknownNameError.among(places[head], f"{head!r} stands for column", name, ToleranceRow.model_fields)
+    return Heads(needed=("id",), known=tuple(ToleranceRow.model_fields), called=dict(columns))
+
+
+def heads_file(table: Path) -> Path:
+    """Return the file beside a tolerance table that says what its heads mean, whether it is there or not.
+
+    >>> heads_file(Path("shop/zones.xlsx")).name, heads_file(Path("mine.tolerances.csv")).name
+    ('zones.toml', 'mine.tolerances.toml')
+    """
+    return table.with_suffix(".toml")
+
+
+def heads_beside(table: Path) -> Mapping[str, str]:
+    """Return what the file beside a tolerance table says, nothing where there is none or it is of another kind.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The field and value that are not allowed.
+    """
+    path = heads_file(table)
+    content = read_toml(path) if is_file(path) else {}
+    if not get_close_matches("columns", content):
+        return {}
+    return validated(HeadsFile, content, path).columns
+
+
+def heads_text(called: Mapping[str, str]) -> str:
+    """Return the text of such a file."""
+    lines = (f"{as_toml(head)} = {as_toml(name)}\n" for head, name in called.items())
+    return "".join(["# What the heads of the table beside this file mean.\n[columns]\n", *lines])
 
 
 def own_heads(path: Path, names: Sequence[str]) -> tuple[str, ...]:
@@ -282,9 +344,14 @@ def own_heads(path: Path, names: Sequence[str]) -> tuple[str, ...]:
     spelt = {name.lower(): name for name in ToleranceRow.model_fields}
     own = [name for name in names if name and name not in ToleranceRow.model_fields]
     near = {name: get_close_matches(name.lower(), spelt, n=1, cutoff=_NEAR) for name in own}
+    for name in own:
+        first = _FIRST_WORD.match(name)
+        if first and spelt.get(first[1].lower()) in _NUMBERS:
+            near[name] = [first[1].lower()]
     if slips := [f"{name!r} ({spelt[found[0]]}?)" for name, found in near.items() if found]:
         raise InputError(
-            f"{path}: no such column: {', '.join(slips)}; rename each, or say what it is by ta.drawing(columns=)."
+            f"{path}: no such column: {', '.join(slips)}; rename each, or say what it is in "
+            f"{heads_file(path).name} beside it or by ta.drawing(columns=)."
         )
     return tuple(own)
 
@@ -306,23 +373,26 @@ def load_tolerance_table(
         The file, row, field and value that are not allowed.
     """
     path = shipped_or_path(name, DATA, ".tolerances.csv", "tolerance table")
-    (_, first), *others = read_table_file(path, heads_of(columns), sheet=sheet)
+    (_, first), *others = read_table_file(path, heads_of(path, columns), sheet=sheet)
     stated = [split_header(header) for header in first]
     own = own_heads(path, [name for name, _ in stated])
     headers = tuple(name for name, _ in stated)
+    unit = "" if "unit" in headers else _unit_of_heads(stated)
     plus = headers.index("plus") if "plus" in headers else 0
     both = others and "minus" not in headers and all(_says_both(cells[plus]) for _, cells in others)
     kept = tuple(name for name in headers if name not in own)
-    require_columns(path, (*kept, "minus") if both else kept, ToleranceRow)
+    require_columns(path, (*kept, *["minus"] * bool(both), *["unit"] * bool(unit)), ToleranceRow)
     if len(set(own)) < len(own):
         twice = next(name for name in own if own.count(name) > 1)
         raise InputError(f"{path}: the column {twice!r} is there twice; each has one.")
     if not others:
         raise InputError(f"{path}: the table has no rows; one row per source is needed.")
-    rows = [(number, dict(zip(headers, cells, strict=True))) for number, cells in others]
+    if unit:
+        others, kept = [(number, (*cells, unit)) for number, cells in others], (*kept, "unit")
+    rows = [(number, dict(zip((*headers, *["unit"] * bool(unit)), cells, strict=True))) for number, cells in others]
     _require_units(path, [(name, unit) for name, unit in stated if name not in own], rows)
     known = [
-        (number, _both_ways({name: row[name] for name in kept}, f"{path}, row {number} ({row['id'] or 'no id'})"))
+        (number, _as_numbers({name: row[name] for name in kept}, f"{path}, row {number} ({row['id'] or 'no id'})"))
         for number, row in rows
     ]
     sources = sources_of_rows(known, capabilities, str(path), path.parent)
@@ -331,6 +401,11 @@ def load_tolerance_table(
         replace(source, own_cells=tuple((full[name], row[name]) for name in own))
         for source, (_, row) in zip(sources, rows, strict=True)
     )
+
+
+def _as_numbers(row: dict[str, str], place: str) -> dict[str, str]:
+    """Return a row with its two deviations, all numbers without units."""
+    return _both_ways(_without_units(row, place), place)
 
 
 _BOTH = re.compile(r"(?:±|\+/-|\+-)\s*")
@@ -360,28 +435,62 @@ def _both_ways(row: dict[str, str], place: str) -> dict[str, str]:
     if feature != Feature.SIZE or row["id"].rsplit(".", 1)[-1] in RADII or not nominal:
         allowed = "plus and minus, since a fit is that of a diameter or width with its nominal size"
         raise InputError.at(place, "plus", plus, allowed)
-    unit = UNITS.get(usual_signs(row.get("unit", "")), 1.0) * MICROMETRE
+    unit, inch = usual_unit(row.get("unit", "")), usual_unit(row.get("unit", "")) == INCHES
     try:
-        deviations = fit_deviations(plus, plain_number(nominal) * MILLIMETRE)
+        width = plain_number(nominal) * LENGTHS[INCHES if inch else "mm"]
+        deviations = fit_deviations(plus, width)
     except ValueError:
         raise InputError.at(place, "nominal", nominal, "a number with a decimal point") from None
     except InputError as error:
         raise InputError(f"{place}: {error}") from None
-    upper, lower = (f"{round(one / unit, 9):.9g}" for one in deviations)
+    length = abs(width) / 100.0 if unit == PERCENT else UNITS.get(unit, 1.0) * MICROMETRE
+    upper, lower = (f"{round(one / length, 12):.12g}" for one in deviations)
     return {**row, "plus": upper, "minus": lower}
 
 
+def _unit_of_heads(stated: Sequence[tuple[str, str]]) -> str:
+    """Return the one unit of all zones where every head of them states it, for a table without a column of units."""
+    units = {usual_unit(unit) for name, unit in stated if name in COLUMNS and COLUMNS[name].unit == "unit"}
+    return units.pop() if len(units) == 1 and units <= {*UNITS, PERCENT} else ""
+
+
+def _without_units(row: dict[str, str], place: str) -> dict[str, str]:
+    """Return a row whose numbers stand without the units behind them, which must be those of their columns.
+
+    Raises
+    ------
+    InputError
+        A number in another unit.
+    """
+    found, unit = dict(row), usual_unit(row["unit"])
+    for name, cell in row.items():
+        own = {"unit": unit, "mm": INCHES if unit == INCHES else "mm"}.get(COLUMNS[name].unit, "")
+        if own and cell:
+            try:
+                found[name] = number_in(cell, own)
+            except ValueError as error:
+                raise InputError.at(place, name, cell, str(error)) from None
+    return found
+
+
 def _require_units(path: Path, stated: Sequence[tuple[str, str]], rows: Sequence[tuple[int, dict[str, str]]]) -> None:
-    """Raise unless headers state the units of `COLUMNS`; that of zones may also be the one unit of all rows."""
+    """Raise unless headers state the units of `COLUMNS`; that of zones may also be the one unit of all rows.
+
+    A nominal size may be stated in inches where all rows are in inches, and in mm where none is.
+    """
     units = {name: column.unit for name, column in COLUMNS.items()}
     for column, unit in stated:
-        if units[column] != "unit" or unit in ("", "unit"):
+        own = usual_unit(unit)
+        is_length = units[column] == "mm" and own in ("mm", INCHES)
+        if not is_length and (units[column] != "unit" or unit in ("", "unit")):
             continue
-        if unit not in UNITS:
+        if own not in UNITS and own != PERCENT:
             allowed = f"unit, where the column unit says it row by row; or {ALLOWED_UNITS}, the same as in all rows"
             raise InputError.at(path, f"the unit of column {column}", unit, allowed)
         for number, row in rows:
-            if UNITS.get(usual_signs(row["unit"]), UNITS[unit]) != UNITS[unit]:
+            said = usual_unit(row["unit"])
+            other = (said == INCHES) != (own == INCHES) if is_length else said != own
+            if other and (said in UNITS or said == PERCENT):
                 allowed = f"{unit} as in the header {column} [{unit}]; numbers are not converted"
                 raise InputError.at(f"{path}, row {number} ({row['id'] or 'no id'})", "unit", row["unit"], allowed)
         units[column] = unit
@@ -407,6 +516,7 @@ def sources_of_rows(
         identity = str(row.get("id", "")).strip()
         where = f"{place}, row {number} ({identity or 'no id'})"
         with faults.kept():
+            _require_filled(row, where)
             cells = with_process(typed_cells(ToleranceRow, row, where), processes, where)
             source = validated(ToleranceRow, cells, where).as_source(folder)
             if source.name in sources:
@@ -420,6 +530,16 @@ def sources_of_rows(
             sources[source.name] = source
     faults.require_none()
     return tuple(sources.values())
+
+
+def _require_filled(row: Mapping[str, object], where: str) -> None:
+    """Raise if several cells are empty that a source needs, as in the row of a sum."""
+    needed = [name for name, field in ToleranceRow.model_fields.items() if field.is_required()]
+    missing = [name for name in needed if row.get(name) in ("", None)]
+    if len(missing) > 1:
+        raise InputError(
+            f"{where}: {', '.join(missing)} are missing; a row that is no source, such as a sum, begins with # or goes."
+        )
 
 
 def table_rows(sources: Sequence[Source], folder: Path | None = None) -> list[list[str | int | float]]:
@@ -454,11 +574,16 @@ def _written(cell: Cell, folder: Path | None) -> str | int | float:
     return str(cell) if isinstance(cell, str) else cell
 
 
-def table_frame(sources: Sequence[Source], folder: Path | None = None, cost_unit: str = COST_UNITS) -> pd.DataFrame:
-    """Return the sources as a tolerance table in the layout that `load_tolerance_table` reads."""
+def table_frame(
+    sources: Sequence[Source],
+    folder: Path | None = None,
+    cost_unit: str = COST_UNITS,
+    called: Mapping[str, str] = MappingProxyType({}),
+) -> pd.DataFrame:
+    """Return the sources as a tolerance table in the layout that `load_tolerance_table` reads, heads as an office's."""
     import pandas as pd
 
-    heads = [*headers_in(cost_unit).values(), *own_heads_of(sources)]
+    heads = [*headers_in(cost_unit, sources, called).values(), *own_heads_of(sources)]
     return pd.DataFrame(table_rows(sources, folder), columns=heads)
 
 
@@ -484,25 +609,40 @@ def with_own_words(frame: pd.DataFrame, named: str, members: Mapping[str, Sequen
     return frame
 
 
-def table_text(sources: Sequence[Source], folder: Path | None = None, currency: str = "") -> str:
+def table_text(
+    sources: Sequence[Source],
+    folder: Path | None = None,
+    currency: str = "",
+    called: Mapping[str, str] = MappingProxyType({}),
+) -> str:
     """Return the sources as the CSV file that `load_tolerance_table` reads, costs in a currency if they are in one."""
     text = StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(map(no_formula, [*headers_in(currency or COST_UNITS).values(), *own_heads_of(sources)]))
+    heads = headers_in(currency or COST_UNITS, sources, called).values()
+    writer.writerow(map(no_formula, [*heads, *own_heads_of(sources)]))
     writer.writerows(map(no_formula, row) for row in table_rows(sources, folder))
     return text.getvalue()
 
 
+_MEASURED = 10.0
+"""Largest deviation of a measured part over the largest zone that a model believes [-]."""
+
+
 def require_small_zones(sources: Sequence[Source], largest: float, place: str | Path) -> None:
-    """Raise unless all zones, and those that may be asked for, are as small as a model believes [m].
+    """Raise unless all zones, those that may be asked for and measured parts are as small as a model believes [m].
 
     Raises
     ------
     InputError
         The source with a larger one.
     """
-    limit = largest / MICROMETRE
+    limit, farthest = largest / MICROMETRE, _MEASURED * largest / MICROMETRE
     for source in sources:
+        if source.measured and (own := max(map(abs, source.measured.values)) / MICROMETRE) > farthest:
+            file = source.measured.path.name
+            raise InputError(
+                f"{place} ({source.name}): {file} has a deviation of {own:g} µm; allowed is {farthest:g} µm."
+            )
         zone, smallest, most = (length / MICROMETRE for length in (source.zone, source.minimum, source.maximum))
         if zone > limit:
             raise InputError(

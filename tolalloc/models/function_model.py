@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.sources import is_angular
+from tolalloc.drawings.sources import LENGTHS, is_angular
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.model import ARRAY_RATE, Evaluation, Model, Observer, SettingDerivatives, unobserved
 from tolalloc.models.settings import Setting, require_settings
@@ -103,8 +103,9 @@ class FunctionModel:
     ----------
     function
         Takes the inputs in their order, then the settings; returns the output, or a sequence of outputs. An input is
-        the nominal plus the deviation [mm], of an angle the deviation [rad]; a function may take arrays of samples,
-        each output then being a number or one number per sample, or single numbers.
+        the nominal plus the deviation [mm, or in where its row is in inches], of an angle the deviation [rad]; a
+        function may take arrays of samples, each output then being a number or one number per sample, or single
+        numbers.
     inputs
         Names of the inputs: ids of the drawing, for positions ``id.x`` and ``id.y``.
     outputs
@@ -113,7 +114,7 @@ class FunctionModel:
         What the designer chooses beside the zones.
     jacobian
         Takes what the function takes and returns, for every output, the derivative by every input [unit of the output
-        per mm]; central differences unless given.
+        per mm or in]; central differences unless given.
     step
         Step of these differences to either side, over the zone [-].
     name
@@ -158,6 +159,7 @@ class FunctionModel:
             A source that is no input, or an input without a row.
         """
         nominal = {source.name: source.nominal for source in errors.sources}
+        lengths = {column: LENGTHS[own.length_name] for own in errors.sources for column in own.columns}
         for column in (*errors.columns, *errors.fixed):
             if column not in self.inputs:
                 raise UnknownNameError.among(f"{place}, model {self.name}", "source", column, self.inputs)
@@ -174,6 +176,7 @@ class FunctionModel:
             steps=self.step * np.repeat(errors.zones, [len(source.columns) for source in errors.active]),
             offsets=np.array([nominal.get(name, 0.0) + errors.fixed.get(name, 0.0) for name in self.inputs]),
             values=tuple(setting.value for setting in self.settings),
+            lengths=tuple(lengths[name] for name in self.inputs),
         )
 
 
@@ -191,6 +194,8 @@ class BoundFunction(Model):
         Step of every varied input to either side of a difference [m, angles rad].
     offsets
         Nominal of every input, with what a zone of 0 leaves it [m, angles rad].
+    lengths
+        Unit in which every input reaches the function: millimetre or inch; no matter for an angle [m].
     values
         Values of the settings in force [units of their names].
     asked
@@ -203,6 +208,7 @@ class BoundFunction(Model):
     varied: tuple[str, ...]
     steps: Float[np.ndarray, " column"]
     offsets: Float[np.ndarray, " input"]
+    lengths: tuple[float, ...]
     values: tuple[float, ...] = ()
     asked: tuple[str, ...] = ()
     observe: Observer = unobserved
@@ -249,6 +255,7 @@ class BoundFunction(Model):
     def content(self) -> Any:
         """Names, settings, and the function's code."""
         own = (identity(self.source.function), identity(self.source.jacobian))
+        own += (self.lengths,) if {*self.lengths} != {MILLIMETRE} else ()
         return (self.name, self.source.inputs, self.source.outputs, self.settings, *own)
 
     def observed(self, observe: Observer) -> BoundFunction:
@@ -306,8 +313,13 @@ class BoundFunction(Model):
 
     @cached_property
     def _per_input(self) -> Float[np.ndarray, " input"]:
-        """Input per metre, or per radian for an angle: lengths reach the function in millimetres."""
-        return np.array([1.0 if is_angular(name) else 1.0 / MILLIMETRE for name in self.source.inputs])
+        """Input per metre, or per radian for an angle: lengths reach the function in the unit of their row."""
+        return np.array(
+            [
+                1.0 if is_angular(name) else 1.0 / length
+                for name, length in zip(self.source.inputs, self.lengths, strict=True)
+            ]
+        )
 
     def _called(
         self, function: Callable[..., Any], x: Float[np.ndarray, "sample column"], count: int
@@ -321,7 +333,7 @@ class BoundFunction(Model):
         return UserFunction(function=function, values=count, place=f"model {self.name}")
 
     def _arguments(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample argument"]:
-        """Return what the function takes: inputs [mm, angles rad], then settings [units of their names]."""
+        """Return what the function takes: inputs [mm or in, angles rad], then settings [units of their names]."""
         inputs = np.tile(self.offsets, (x.shape[0], 1))
         inputs[:, [self.source.inputs.index(name) for name in self.varied]] += x
         settings = np.tile(self.values, (x.shape[0], 1))
@@ -369,7 +381,8 @@ def from_fmu(path: str, inputs: Mapping[str, str], outputs: Mapping[str, str], s
     path
         The unit, an ``.fmu`` file (FMI 2 or 3).
     inputs
-        Id of the drawing → name of the unit's parameter, which takes millimetres (angles: radians).
+        Id of the drawing → name of the unit's parameter, which takes millimetres, or inches where its row is in
+        inches (angles: radians).
     outputs
         Name of the output with its unit → name of the unit's variable.
     stop_time

@@ -54,6 +54,52 @@ def read_bytes(path: Path, what: str) -> bytes:
         raise InputError(f"{path}: cannot be read as {what} ({getattr(error, 'strerror', error)}).") from None
 
 
+_KINDS = (
+    (b"\xd0\xcf\x11\xe0", "an Excel 97–2003 workbook (XLS)"),
+    (b"PK\x03\x04", "a workbook or an archive under another ending"),
+    (b"%PDF", "a PDF"),
+)
+"""How files begin that are taken for tables, and what they are."""
+_OPEN_DOCUMENT, _BINARY, _APPLE = b"opendocument.spreadsheet", b"xl/workbook.bin", b"Index/Document.iwa"
+_ARCHIVES = {
+    _OPEN_DOCUMENT: "an OpenDocument spreadsheet (ODS)",
+    _BINARY: "a binary workbook (XLSB)",
+    _APPLE: "a Numbers spreadsheet",
+}
+"""What stands in an archive of which kind."""
+
+
+def require_table(path: Path, content: bytes, is_workbook: bool) -> None:
+    """Raise if a file that should be a table is one of another kind.
+
+    Parameters
+    ----------
+    path
+        The file, for messages.
+    content
+        What it holds.
+    is_workbook
+        Whether its name says a workbook (XLSX).
+
+    Raises
+    ------
+    InputError
+        The kind of file, and how it is saved as one that is read.
+    """
+    start = content[:512].lstrip().lower()
+    found = next((kind for mark, kind in _KINDS if content.startswith(mark)), "")
+    found = next((kind for mark, kind in _ARCHIVES.items() if found and mark in content), found)
+    if start.startswith((b"<html", b"<!doctype html", b"<table")):
+        found = "a web page"
+    if start.startswith(b"<?xml"):
+        found = "a file in XML"
+    if found and not (is_workbook and found == _KINDS[1][1]):
+        raise InputError(
+            f"{path}: this is {found}, which is not read; open it in Excel or LibreOffice, save it as Excel workbook "
+            "(*.xlsx) or as CSV UTF-8, and name that file."
+        )
+
+
 def read_text(path: Path, what: str) -> str:
     """Return the text of a file in UTF-8, its lines ended as Python ends them; a table also as offices save it.
 
@@ -63,6 +109,8 @@ def read_text(path: Path, what: str) -> str:
         As of `read_bytes`; also text that is not UTF-8, or a control character.
     """
     content = read_bytes(path, f"{what} (UTF-8)")
+    if what.endswith("CSV"):
+        require_table(path, content, is_workbook=False)
     encoding = _OFFICES.get(_encoding(content), "utf-8-sig") if what.endswith("CSV") else "utf-8-sig"
     try:
         text = content.decode(encoding).replace("\r\n", "\n").replace("\r", "\n")

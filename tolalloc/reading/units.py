@@ -10,6 +10,7 @@ from math import pi
 
 MILLIMETRE = 1e-3
 MICROMETRE = 1e-6
+INCH = 25.4e-3
 MICRORADIAN = 1e-6
 DEGREE = pi / 180.0
 ARCMINUTE = DEGREE / 60.0
@@ -49,3 +50,76 @@ def in_cost_units(unit: str) -> str:
     ('cost units µm^n', 'µm')
     """
     return _CURRENCY.sub(COST_UNITS, unit, count=1)
+
+
+WRITTEN_UNITS = ("mm", "µm", "um", "in", "inch", "%", "cm", "m", "nm")
+"""Units that a cell may state behind its number."""
+_NUMBER = r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?"
+WITH_UNIT = re.compile(rf"((?:±\s*|\+/-\s*|\+-\s*)?{_NUMBER})\s*({'|'.join(WRITTEN_UNITS)}|″|\")", re.ASCII)
+"""Number, or one behind ±, with a unit behind it."""
+
+
+def usual_signs(unit: str) -> str:
+    """Return a unit with the one µ and the one dot that are meant; others are typed too, and look alike."""
+    return unit.replace("\u03bc", "µ").replace("\u22c5", "·")
+
+
+def is_unit(text: str) -> bool:
+    """Return whether a text is the unit of a column of a tolerance table."""
+    text = text.strip()
+    return (
+        usual_signs(text) in (*WRITTEN_UNITS, "-", "unit", "half zone", COST_UNITS) or currency_in(text) == text != ""
+    )
+
+
+def number_in(cell: str, unit: str) -> str:
+    """Return what a cell states without the unit behind its number.
+
+    Parameters
+    ----------
+    cell
+        A number, or one behind ±, with or without a unit.
+    unit
+        The unit that it may state.
+
+    Raises
+    ------
+    ValueError
+        It states another unit.
+
+    Examples
+    --------
+    >>> number_in("0.05 mm", "mm"), number_in("5%", "%"), number_in("0.05", "mm")
+    ('0.05', '5', '0.05')
+    """
+    found = WITH_UNIT.fullmatch(usual_signs(cell))
+    if found is None:
+        return cell
+    stated = {"um": "µm", "inch": "in", "″": "in", '"': "in"}.get(found[2], found[2])
+    if stated != unit:
+        raise ValueError(f"a number in {unit}, as the row says; numbers are not converted")
+    return found[1]
+
+
+_LITERAL = re.compile(r'"\s*([^"]*?)\s*"|\\ ?([^\W\d_]+)')
+"""Words in the format of a number."""
+_THOUSANDTH = re.compile(r"[0#?],+(?![0#?])")
+"""Format of a number that shows it in thousands."""
+
+
+def shown_number(value: float, form: str) -> str:
+    """Return a number with what its format adds to it: leading zeros, per cent, the name of a unit.
+
+    >>> shown_number(7, "000"), shown_number(0.05, "0.00%"), shown_number(0.02, '0.00" mm"')
+    ('007', '5%', '0.02 mm')
+    """
+    if re.fullmatch(r"0{2,}", form) and float(value).is_integer():
+        return f"{int(value):0{len(form)}d}"
+    if "%" in re.sub(r'"[^"]*"', "", form):
+        return f"{100 * value:.12g}%"
+    named = (usual_signs(quoted or bare) for quoted, bare in _LITERAL.findall(form.split(";")[0]))
+    unit = next((name for name in named if name in WRITTEN_UNITS), "")
+    if _THOUSANDTH.search(form):
+        return f"{value:g} shown in thousands"
+    number = str(int(value) if float(value).is_integer() else value)
+    return f"{number} {unit}" if unit else number

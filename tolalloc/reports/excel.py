@@ -24,7 +24,15 @@ from tolalloc.reading.units import in_cost_units, unit_of
 from tolalloc.reports.figure import Figure, shares
 
 _MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
-_FORMATS = {"µm": "0.0##", "mm": "0.0000", "%": "0.0#", "cost units": "0.00", "arcsec": "0.00", "arcmin": "0.000"}
+_FORMATS = {
+    "µm": "0.0##",
+    "mm": "0.0000",
+    "in": "0.000000",
+    "%": "0.0#",
+    "cost units": "0.00",
+    "arcsec": "0.00",
+    "arcmin": "0.000",
+}
 """Unit in a header → format of its numbers."""
 
 

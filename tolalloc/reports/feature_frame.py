@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from html import escape
 from math import ceil, floor
 
-from tolalloc.drawings.sources import Source
+from tolalloc.drawings.sources import INCHES, LENGTHS, Source
 from tolalloc.drawings.zones import PHASE, ROTATION, TILT, Feature
-from tolalloc.reading.units import MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import INCH, MICROMETRE
 from tolalloc.reducers.family import RV
 
 SYMBOLS = {
@@ -33,6 +34,8 @@ HEIGHT, _LETTER = 20.0, 9.0
 
 STEP = 0.01 * MICROMETRE
 """Finest step in which a drawing writes a zone [m]; an allocated zone has the step of its row already."""
+FINEST = {"mm": (STEP, 5), INCHES: (1e-6 * INCH, 6)}
+"""Unit of a drawing → its finest step [m], and the decimals of that [-]."""
 _ROUNDING = 1e-6
 """Part of a step that a zone may lack and still count as whole [-]."""
 
@@ -139,14 +142,21 @@ def _found(source: Source) -> tuple[str, str]:
     return (own.name, own.assumed) if own else (_OF_FEATURE[source.feature], "")
 
 
-def written(length: float) -> str:
-    """Return a width as a drawing writes it [mm], rounded down to 0.01 µm so that nothing wider is allowed.
+def written(length: float, unit: str = "mm") -> str:
+    """Return a width as a drawing writes it, rounded down to 0.01 µm or 1e-6 in so that nothing wider is allowed.
 
-    >>> written(4.7503e-6), written(10e-6), written(0.5e-6)
-    ('0.00475', '0.01', '0.0005')
+    >>> written(4.7503e-6), written(10e-6), written(0.5e-6), written(50.8e-6, "in")
+    ('0.00475', '0.01', '0.0005', '0.002')
     """
-    steps = floor(length / STEP + _ROUNDING)
-    return f"{steps * STEP / MILLIMETRE:.5f}".rstrip("0").rstrip(".") or "0"
+    step, decimals = FINEST[unit]
+    steps = floor(length / step + _ROUNDING)
+    return f"{steps * step / LENGTHS[unit]:.{decimals}f}".rstrip("0").rstrip(".") or "0"
+
+
+def writing_unit(sources: Iterable[Source]) -> str:
+    """Return what a head says of the widths that a drawing writes; one in inches states its unit itself."""
+    stated = {own.length_name for own in sources} or {"mm"}
+    return stated.pop() if len(stated) == 1 else "mm unless stated"
 
 
 def callout(source: Source) -> FeatureFrame:
@@ -157,29 +167,34 @@ def callout(source: Source) -> FeatureFrame:
     ISO 1101 (symbols), ISO 1328-1 and -2 (total cumulative pitch deviation, run-out), ISO 129-1 (limit deviations).
     """
     characteristic, _ = _found(source)
-    exact = f"{source.zone / MICROMETRE:.6g} µm"
+    exact, unit = source.said(source.zone, ".6g"), source.length_name
+    stated = f" {unit}" if unit == INCHES else ""
     if characteristic in _DEVIATIONS:
         return FeatureFrame(characteristic, _deviations(source), exact=exact)
     round_zone = source.feature is Feature.POSITION
     over, place = "", ""
     if source.over and characteristic == "position":
-        place = f"at R {source.over / MILLIMETRE:g}"  # A turn about the axis; only a tilt is by length
+        place = f"at R {source.over / LENGTHS[unit]:g}{stated}"  # A turn about the axis; only a tilt is by length
     elif source.over:
-        over = f"/{source.over / MILLIMETRE:g}"
+        over = f"/{source.over / LENGTHS[unit]:g}"
     datums = () if characteristic in INSPECTED else ("A",)
-    zone = f"{'⌀' if round_zone else ''}{written(source.zone)}{over}"
+    zone = f"{'⌀' if round_zone else ''}{written(source.zone, unit)}{over}{stated}"
     return FeatureFrame(characteristic, zone, datums, exact, place)
 
 
 def _deviations(source: Source) -> str:
-    """Return the limit deviations of a size [mm]; half a zone is rounded, so that both sides are alike."""
+    """Return the limit deviations of a size [mm or in]; half a zone is rounded, so that both sides are alike."""
+    unit = source.length_name
+    stated = f" {unit}" if unit == INCHES else ""
     if source.middle == 0.0:
-        return f"±{written(source.zone / 2)}"
-    upper = floor((source.middle + source.zone / 2) / STEP + _ROUNDING)
-    lower = ceil((source.middle - source.zone / 2) / STEP - _ROUNDING)
-    return " / ".join(
-        f"{'−' if steps < 0 else '+' if steps else ''}{written(abs(steps) * STEP)}" for steps in (upper, lower)
+        return f"±{written(source.zone / 2, unit)}{stated}"
+    step, _ = FINEST[unit]
+    upper = floor((source.middle + source.zone / 2) / step + _ROUNDING)
+    lower = ceil((source.middle - source.zone / 2) / step - _ROUNDING)
+    ends = (
+        f"{'−' if steps < 0 else '+' if steps else ''}{written(abs(steps) * step, unit)}" for steps in (upper, lower)
     )
+    return " / ".join(ends) + stated
 
 
 def callout_assumptions(sources: tuple[Source, ...]) -> tuple[str, ...]:

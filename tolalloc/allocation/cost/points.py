@@ -82,7 +82,7 @@ class ShopPrice(Record):
     process: Annotated[str, Field(min_length=1)]
     feature: Feature | None = None
     tolerance: Annotated[float, Field(ge=SMALLEST_ZONE)]
-    unit: Literal["µm", "um", "mm"]
+    unit: Literal["µm", "um", "mm", "in", "inch"]
     cost: Annotated[float, Field(ge=SMALLEST_COST, le=1e9)]
     note: str = ""
 
@@ -113,7 +113,7 @@ def load_shop_points(path: Path) -> ShopPoints:
     for place, row in read_rows(path, ShopPrice, "process", _UNITS):
         zone = row.tolerance * UNITS[row.unit]
         if zone > LARGEST_ZONE:
-            raise InputError.at(place, "tolerance", f"{row.tolerance:g} {row.unit}", f"{LARGEST_ZONE:g} µm or less")
+            raise InputError.at(place, "tolerance", f"{row.tolerance:g} {row.unit}", f"{LARGEST_ZONE:.0f} µm or less")
         prices.setdefault((row.process, row.feature), []).append((zone, row.cost))
     found = {}
     for (process, feature), pairs in prices.items():

@@ -156,7 +156,7 @@ def _limits(
             _linked("D", at, predicted[name]),
             _linked("E", at, _kept(side.sign, side.limit, predicted[name])),
             off if isfinite(off) else None,
-            number="0.0000" if unit_of(name) == "mm" else "0.00##",
+            number={"mm": "0.0000", "in": "0.000000"}.get(unit_of(name), "0.00##"),
         )
     cost = f"cost [{cost_unit}]"
     rows.line(cost, None, result.cost, _linked("D", len(result.chosen.alone) + 2, predicted[cost]), number="0.00")

@@ -12,14 +12,14 @@ from jaxtyping import Float
 
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.allocation.space.requirement import AtYield
-from tolalloc.drawings.sources import Source
+from tolalloc.drawings.sources import Source, length_unit, zone_in, zone_unit
 from tolalloc.drawings.table_file import setting_line
-from tolalloc.drawings.tolerance_table import table_frame
+from tolalloc.drawings.tolerance_table import heads_file, heads_text, table_frame
 from tolalloc.reading.units import COST_UNITS, MICROMETRE, unit_of
 from tolalloc.reports.columns import Column, Table, own_words, span
 from tolalloc.reports.drawing_sheet import write_sheet
 from tolalloc.reports.excel import write_sheets
-from tolalloc.reports.feature_frame import Frames, callout
+from tolalloc.reports.feature_frame import Frames, callout, writing_unit
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
@@ -55,22 +55,23 @@ def sources_table(result: AllocationResult) -> Table[_Source]:
     """Return the drawing in short: zone, grade, process, share of the variance and cost of every source."""
     shares, changes, unit = _shares(result), result.process_changes, unit_of(result.leading)
     by_deviation, by_zone = (_by_source(result, own) for own in (result.chosen.by_deviation, result.chosen.by_zone))
-    none = float("nan")
+    none, zone = float("nan"), zone_unit(result.space.errors.sources)
+    length, _ = length_unit(result.space.errors.sources)
     columns: list[Column[_Source]] = [
         Column(header="source", value=lambda row: row[0].name),
         *own_words(lambda row: row[:1]),
         Column(header="callout", value=lambda row: row[0].feature.value),
-        Column(header="zone before [µm]", value=lambda row: row[0].zone / MICROMETRE),
-        Column(header="zone [µm]", value=lambda row: row[1].zone / MICROMETRE),
+        Column(header=f"zone before [{zone}]", value=lambda row: zone_in(row[0], zone)),
+        Column(header=f"zone [{zone}]", value=lambda row: zone_in(row[1], zone)),
         Column(header="change [%]", value=_change),
         Column(header="grade", value=lambda row: row[1].grade),
         *_processes(result),
         Column(header="share of variance [%]", value=lambda row: shares.get(row[0].name, none)),
     ]
     if by_deviation:
-        columns.append(Column(header=f"Sens [{unit}/µm]", value=lambda row: by_deviation.get(row[0].name, none)))
+        columns.append(Column(header=f"Sens [{unit}/{length}]", value=lambda row: by_deviation.get(row[0].name, none)))
     if by_zone:
-        header = f"kept value per zone [{unit}/µm]"
+        header = f"kept value per zone [{unit}/{length}]"
         columns.append(Column(header=header, value=lambda row: by_zone.get(row[0].name, none)))
     columns.append(Column(header="cost before [{cost}]", value=lambda row: row[0].cost))
     columns.append(Column(header="cost [{cost}]", value=lambda row: row[1].cost))
@@ -84,15 +85,17 @@ def sources_table(result: AllocationResult) -> Table[_Source]:
 
 def dimensions_table(result: AllocationResult) -> Table[_Dimension]:
     """Return the drawing line by line: a dimension, or members of one that share a value where it has several."""
-    parts = _parts(result)
+    parts, zone = _parts(result), zone_unit(result.space.errors.sources)
     before, after = _processes(result)
     columns: list[Column[_Dimension]] = [
         Column(header="dimension", value=lambda row: row[0], terminal=1),
         *own_words(_after),
         Column(header="places [-]", value=lambda row: len(row[1])),
-        Column(header="write [mm]", value=lambda row: frames(_after(row)), terminal=2),
-        Column(header="zone before [µm]", value=lambda row: _zones(old for old, _ in row[1])),
-        Column(header="zone [µm]", value=lambda row: _zones(new for _, new in row[1])),
+        Column(
+            header=f"write [{writing_unit(result.drawn_sources)}]", value=lambda row: frames(_after(row)), terminal=2
+        ),
+        Column(header=f"zone before [{zone}]", value=lambda row: _zones((old for old, _ in row[1]), zone)),
+        Column(header=f"zone [{zone}]", value=lambda row: _zones((new for _, new in row[1]), zone)),
         Column(header="change [%]", value=lambda row: _change(row[1][0])),
         Column(header="grade", value=lambda row: row[1][0][1].grade, nothing="", terminal=5),
         Column(header="process before", value=lambda row: before.value(row[1][0]), nothing="as today"),
@@ -141,9 +144,9 @@ def _processes(result: AllocationResult) -> tuple[Column[_Source], Column[_Sourc
     )
 
 
-def _zones(members: Iterable[Source]) -> float | str:
-    """Return the zone of all members, or the smallest and the largest of them [µm]."""
-    zones = [own.zone / MICROMETRE for own in members]
+def _zones(members: Iterable[Source], unit: str) -> float | str:
+    """Return the zone of all members, or the smallest and the largest of them [unit]."""
+    zones = [zone_in(own, unit) for own in members]
     return span(min(zones), max(zones))
 
 
@@ -158,11 +161,15 @@ def _parts(result: AllocationResult) -> dict[str, float]:
 
 
 def _by_source(result: AllocationResult, derivatives: Float[np.ndarray, " source"] | None) -> dict[str, float]:
-    """Return derivatives of the chosen design by the name of the source, none where there are none [output per µm]."""
+    """Return derivatives of the chosen design by the name of the source, none where there are none.
+
+    Per unit of length that a report shows zones in [output per µm, or in].
+    """
     if derivatives is None:
         return {}
     names = [source.name for source in result.drawn.errors.active]
-    return dict(zip(names, (derivatives * MICROMETRE).tolist(), strict=True))
+    _, length = length_unit(result.space.errors.sources)
+    return dict(zip(names, (derivatives * length).tolist(), strict=True))
 
 
 def _shares(result: AllocationResult) -> dict[str, float]:
@@ -173,7 +180,7 @@ def _shares(result: AllocationResult) -> dict[str, float]:
 
 def tolerances_frame(result: AllocationResult, cost_unit: str = COST_UNITS) -> pd.DataFrame:
     """Return the tolerance table in the layout of the input, with share of the variance and change added."""
-    frame = table_frame(result.drawn_sources, cost_unit=cost_unit)
+    frame = table_frame(result.drawn_sources, cost_unit=cost_unit, called=result.space.errors.called)
     known = sources_table(result).frame(cost_unit).set_index("source")
     known = known.reindex([source.name for source in result.drawn_sources])
     for header in ("share of variance [%]", "change [%]", f"cost before [{cost_unit}]"):
@@ -225,7 +232,8 @@ def risks(result: AllocationResult) -> tuple[str, ...]:
     name, members = min(dimensions_table(result).rows, key=lambda row: _change(row[1][0]))
     before, after = members[0]
     if (change := _change(members[0])) < -_NOTICED:
-        zones = {"before": before.zone / MICROMETRE, "after": after.zone / MICROMETRE}
+        unit = zone_unit(result.space.errors.sources)
+        zones = {"before": zone_in(before, unit), "after": zone_in(after, unit), "unit": unit}
         found.append(_say("risk_tightest", name=name, change=-change / 100, **zones))
     if result.met and driver[1] > 0:
         left = max(-result.chosen.checks[0].tightest.excess, 0.0)
@@ -239,11 +247,12 @@ def risks(result: AllocationResult) -> tuple[str, ...]:
 def zones_figure(rows: Sequence[_Source]) -> Figure:
     """Return the zones before and after."""
     names = [before.name for before, _ in rows]
-    before, after = ([own.zone / MICROMETRE for own in side] for side in zip(*rows, strict=True))
+    unit = zone_unit(before for before, _ in rows)
+    before, after = ([zone_in(own, unit) for own in side] for side in zip(*rows, strict=True))
     return Figure(
         name="zones",
         title=_say("figure_zones"),
-        x_label="zone [µm]",
+        x_label=f"zone [{unit}]",
         series=(
             Series(label="before", kind="bars", x=names, y=before),
             Series(label="after", kind="bars", x=names, y=after),
@@ -253,9 +262,11 @@ def zones_figure(rows: Sequence[_Source]) -> Figure:
 
 def write_drawing(result: AllocationResult, header: Header, folder: Path) -> None:
     """Write ``allocation.csv``, which is read back, ``drawing.xlsx``, which goes on calculating, and ``frames.dxf``."""
-    cost_unit = header.cost_unit
+    cost_unit, called = header.cost_unit, result.space.errors.called
     notes = (*drawn_amounts(result), *amounts_convention(result), *assembly_notes(result))
-    write_csv(table_frame(result.drawn_sources, folder, cost_unit), folder / "allocation.csv")
+    write_csv(table_frame(result.drawn_sources, folder, cost_unit, called), folder / "allocation.csv")
+    if called:
+        heads_file(folder / "allocation.csv").write_text(heads_text(called), encoding="utf-8")
     with (folder / "allocation.csv").open("a", encoding="utf-8") as file:
         file.write("".join(f"{line}\n" for line in _table_comments(result, header, notes)))
     calculator = calculator_sheets(result, cost_unit)

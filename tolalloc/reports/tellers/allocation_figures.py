@@ -127,12 +127,13 @@ def _where_known(label: str, x: Float[np.ndarray, " step"], y: Float[np.ndarray,
 
 def robustness_figure(frame: pd.DataFrame) -> Figure:
     """Return how far every free zone moves when an assumption is wrong, from the table that says so."""
+    _, best, low, high, *_ = frame.columns
     bars = Series(
         label="free zone; between its smallest and largest under all changed assumptions",
         kind="bars",
         x=list(frame["group"]),
-        y=list(frame["free zone [µm]"]),
-        low=list(np.minimum(frame["smallest under all changes [µm]"], frame["free zone [µm]"])),
-        high=list(np.maximum(frame["largest under all changes [µm]"], frame["free zone [µm]"])),
+        y=list(frame[best]),
+        low=list(np.minimum(frame[low], frame[best])),
+        high=list(np.maximum(frame[high], frame[best])),
     )
-    return Figure(name="robustness", title=_say("figure_robustness"), x_label="zone [µm]", series=(bars,))
+    return Figure(name="robustness", title=_say("figure_robustness"), x_label=f"zone [{unit_of(best)}]", series=(bars,))

@@ -16,7 +16,8 @@ from tolalloc.allocation.space.joint_yield import JointRequirement
 from tolalloc.allocation.space.problem import OneSidedConstraint
 from tolalloc.allocation.space.requirement import AtYield, Check
 from tolalloc.allocation.verify.verification import VerifiedDesign
-from tolalloc.reading.units import MICROMETRE, unit_of
+from tolalloc.drawings.sources import length_unit
+from tolalloc.reading.units import unit_of
 from tolalloc.reports.columns import Column, Table
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
@@ -229,7 +230,8 @@ def certificate_frame(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
 def bounds_frame(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     """Return what the smallest and the largest zones, of process and tolerance table together, cost free zones."""
     space, found = result.space, result.free
-    zones, scales = space.first_zones / MICROMETRE, found.optimum.zones
+    unit, length = length_unit(space.errors.sources)
+    zones, scales = space.first_zones / length, found.optimum.zones
     made = [feature.processes[at] for feature, at in zip(space.features, found.optimum.processes, strict=True)]
     saved = found.optimum.bound_prices * scales[:, np.newaxis]  # had the bound moved by its own size
     noise = solver_noise(found.optimum)
@@ -238,11 +240,11 @@ def bounds_frame(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
         {
             "group": space.groups,
             "process": [process.name for process in made],
-            "smallest of process and table [µm]": [process.minimum for process in made] * zones,
-            "cheapest zone of the models [µm]": scales * zones,
-            "largest of process and table [µm]": [process.maximum for process in made] * zones,
-            f"marginal price of the smallest [{cost_unit}/µm]": prices[:, 0],
-            f"marginal price of the largest [{cost_unit}/µm]": prices[:, 1],
+            f"smallest of process and table [{unit}]": [process.minimum for process in made] * zones,
+            f"cheapest zone of the models [{unit}]": scales * zones,
+            f"largest of process and table [{unit}]": [process.maximum for process in made] * zones,
+            f"marginal price of the smallest [{cost_unit}/{unit}]": prices[:, 0],
+            f"marginal price of the largest [{cost_unit}/{unit}]": prices[:, 1],
         }
     )
 
@@ -290,13 +292,14 @@ def trade_frame(trade: SettingTrade, cost_unit: str) -> pd.DataFrame:
 
 def robustness_frame(result: AllocationResult, found: Robustness) -> pd.DataFrame:
     """Return how far every free zone moves when an assumption is wrong."""
-    ratios, best = found.ratios, found.optimum * (result.space.first_zones / MICROMETRE)
+    unit, length = length_unit(result.space.errors.sources)
+    ratios, best = found.ratios, found.optimum * (result.space.first_zones / length)
     return pd.DataFrame(
         {
             "group": found.groups,
-            "free zone [µm]": best,
-            "smallest under all changes [µm]": best * ratios.min(axis=0),
-            "largest under all changes [µm]": best * ratios.max(axis=0),
+            f"free zone [{unit}]": best,
+            f"smallest under all changes [{unit}]": best * ratios.min(axis=0),
+            f"largest under all changes [{unit}]": best * ratios.max(axis=0),
             "same in all": ["yes" if same else "no" for same in found.same],
         }
     )

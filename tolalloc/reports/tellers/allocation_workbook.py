@@ -22,10 +22,10 @@ from openpyxl.worksheet.worksheet import Worksheet
 from tolalloc.allocation.cost.model import Combined, Exponential, Reciprocal, ReciprocalPower, SumOfCosts, Weighted
 from tolalloc.allocation.cost.points import Spline, Tabulated
 from tolalloc.allocation.result import AllocationResult
-from tolalloc.drawings.sources import STEPS, Source, rounded_down
-from tolalloc.reading.units import MICROMETRE, MILLIMETRE, unit_of
+from tolalloc.drawings.sources import LENGTHS, STEPS, Source, length_unit, rounded_down
+from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.excel import Formula, keep_values
-from tolalloc.reports.feature_frame import STEP, FeatureFrame, callout
+from tolalloc.reports.feature_frame import FINEST, FeatureFrame, callout, writing_unit
 from tolalloc.reports.header import Header
 from tolalloc.reports.tellers.allocation_answer_sheet import NAME, add_answer
 from tolalloc.reports.templates import Sentences
@@ -44,7 +44,7 @@ _WIDTHS = (_NAMES, 10, 10, 8, 9, 9, 7, 14, 9, 29, 10, 6, 9, 9, 9, 8)
 _HELD = "drawing!$P${}:$P${}"
 """Cells that say of every zone whether the weights hold for it."""
 _AS_VERIFIED = 1e-4
-"""Distance up to which a zone is the verified one [µm]."""
+"""Distance up to which a zone is the verified one, or at a bound [µm]."""
 _INPUT = PatternFill("solid", fgColor="FFF2CC")
 _RESULT = PatternFill("solid", fgColor="E2EFDA")
 _EDGE = Side(style="thin", color="7F7F7F")
@@ -59,7 +59,9 @@ def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     """Return one row per group, with what to write, what it costs and what it adds to every limited side."""
     space, chosen = result.drawn, result.chosen
     groups, callouts = len(space.groups), [callout(_first_member(result, name)) for name in space.groups]
-    scales, zones = chosen.design[:groups], space.first_zones * chosen.design[:groups] / MICROMETRE
+    unit, length = length_unit(space.errors.sources)
+    near = f"{_AS_VERIFIED * MICROMETRE / length:.12f}".rstrip("0")
+    scales, zones = chosen.design[:groups], space.first_zones * chosen.design[:groups] / length
     rows, reach = range(_FIRST, _FIRST + groups), result.model_range.factor
     made = [
         feature.processes[at]
@@ -68,13 +70,13 @@ def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     table = pd.DataFrame(
         {
             "group": [_first_line(result, name) for name in space.groups],
-            "zone to change [µm]": zones,
-            "zone in the tolerance table [µm]": space.first_zones / MICROMETRE,
+            f"zone to change [{unit}]": zones,
+            f"zone in the tolerance table [{unit}]": space.first_zones / length,
             "scale [-]": [Formula(f"=B{row}/C{row}", scale) for row, scale in zip(rows, scales.tolist(), strict=True)],
-            "smallest [µm]": space.first_zones * [process.minimum for process in made] / MICROMETRE,
-            "largest [µm]": space.first_zones * [process.maximum for process in made] / MICROMETRE,
+            f"smallest [{unit}]": space.first_zones * [process.minimum for process in made] / length,
+            f"largest [{unit}]": space.first_zones * [process.maximum for process in made] / length,
             "inside": [
-                Formula(f'=IF(AND(B{row}>=E{row}-0.0001,B{row}<=F{row}+0.0001),"yes","no")', "yes") for row in rows
+                Formula(f'=IF(AND(B{row}>=E{row}-{near},B{row}<=F{row}+{near}),"yes","no")', "yes") for row in rows
             ],
             "process": chosen.processes,
             f"cost [{cost_unit}]": [
@@ -85,16 +87,16 @@ def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
                 for process, row, scale in zip(made, rows, scales, strict=True)
             ],
             "characteristic": [_characteristic(_first_member(result, name)) for name in space.groups],
-            "write [mm]": [
-                _written(_first_member(result, name), row, zone)
+            _write_head(result): [
+                _written(_first_member(result, name), row, zone, length)
                 for row, name, zone in zip(rows, space.groups, zones.tolist(), strict=True)
             ],
             "datum": [" ".join(own.datums) for own in callouts],
-            "verified zone [µm]": zones,
-            "weights hold from [µm]": zones / reach,
-            "weights hold to [µm]": zones * reach,
+            f"verified zone [{unit}]": zones,
+            f"weights hold from [{unit}]": zones / reach,
+            f"weights hold to [{unit}]": zones * reach,
             "weights hold": [
-                Formula(f'=IF(AND(B{row}>=N{row}-0.0001,B{row}<=O{row}+0.0001),"yes","no")', "yes") for row in rows
+                Formula(f'=IF(AND(B{row}>=N{row}-{near},B{row}<=O{row}+{near}),"yes","no")', "yes") for row in rows
             ],
         }
     )
@@ -104,13 +106,21 @@ def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     return pd.concat([table, *_further_lines(result), *_other_lines(result)], ignore_index=True)
 
 
+def _write_head(result: AllocationResult) -> str:
+    """Return the head of what the drawing states."""
+    return f"write [{writing_unit(result.drawn_sources)}]"
+
+
 def _characteristic(source: Source) -> str:
     """Return symbol and name of a characteristic, and the length, radius or middle that its zone belongs to."""
     frame = callout(source)
-    _, _, length = frame.zone.partition("/") if frame.is_framed else ("", "", "")
-    where = f"over {length} mm" if length else f"{frame.place} mm" if frame.place else ""
+    unit = source.length_name
+    _, _, length = frame.zone.removesuffix(f" {unit}").partition("/") if frame.is_framed else ("", "", "")
+    where = (
+        f"over {length} {unit}" if length else f"{frame.place.removesuffix(f' {unit}')} {unit}" if frame.place else ""
+    )
     if frame.is_deviation and source.middle:
-        where = f"about nominal {signed(source.middle / MILLIMETRE, '+.5f')} mm"
+        where = f"about nominal {signed(source.middle / LENGTHS[unit], '+.5f')} {unit}"
     return " ".join(filter(None, (frame.symbol, frame.characteristic, where)))
 
 
@@ -144,17 +154,17 @@ def _others(result: AllocationResult) -> list[tuple[str, tuple[Source, ...]]]:
 
 def _other_lines(result: AllocationResult) -> list[pd.DataFrame]:
     """Return one row for every line whose zones are locked, for the drawing to be whole; nothing without any."""
-    rows = []
+    rows, head, (unit, length) = [], _write_head(result), length_unit(result.space.errors.sources)
     for line in _others(result):
         own = line[1][0]
         half = own.zone / 2 if callout(own).is_deviation else own.zone
         rows.append(
             {
                 "group": result.line_name(line),
-                "zone to change [µm]": own.zone / MICROMETRE,
+                f"zone to change [{unit}]": own.zone / length,
                 "inside": _say("workbook_locked"),
                 "characteristic": _characteristic(own),
-                "write [mm]": rounded_down(half, STEP) / MILLIMETRE,
+                head: rounded_down(half, FINEST[own.length_name][0]) / LENGTHS[own.length_name],
                 "datum": " ".join(callout(own).datums),
             }
         )
@@ -167,37 +177,42 @@ def _further_lines(result: AllocationResult) -> list[pd.DataFrame]:
     Nothing without any.
     """
     first = {name: _FIRST + at for at, name in enumerate(result.drawn.groups)}
-    rows = []
+    rows, head, (unit, length) = [], _write_head(result), length_unit(result.space.errors.sources)
     for row, line in enumerate(_further(result), start=_FIRST + len(first)):
         name, members = line
-        own, zone = callout(members[0]), members[0].zone / MICROMETRE
+        own, zone = callout(members[0]), members[0].zone / length
         ratio = number(members[0].zone / _first_member(result, name).zone)
         rows.append(
             {
                 "group": result.line_name(line),
-                "zone to change [µm]": Formula(f"=B{first[name]}*{ratio}", zone),
+                f"zone to change [{unit}]": Formula(f"=B{first[name]}*{ratio}", zone),
                 "characteristic": _characteristic(members[0]),
-                "write [mm]": _written(members[0], row, zone),
+                head: _written(members[0], row, zone, length),
                 "datum": " ".join(own.datums),
             }
         )
     return [pd.DataFrame(rows)] if rows else []
 
 
-def _written(source: Source, row: int, zone: float) -> Formula:
-    """Return what the drawing states of a zone [µm] in a row: rounded down to its step, half of it for a size [mm]."""
+def _written(source: Source, row: int, zone: float, shown: float) -> Formula:
+    """Return what the drawing states of a zone in a row: rounded down to its step, half of it for a size.
+
+    The zone is in the unit of the sheet, of that length [m]; what is stated in that of the drawing, mm or in.
+    """
     halved = callout(source).is_deviation
     size = f"B{row}/2" if halved else f"B{row}"
-    step = number(source.step / MICROMETRE)
-    if not source.step:
+    length, (finest, _) = LENGTHS[source.length_name], FINEST[source.length_name]
+    step = number((source.step or finest) / shown)
+    if not source.step and shown == MICROMETRE:
         step = number(STEPS[-1][1])
         for end, own in reversed(STEPS[:-1]):
             step = f"IF({size}<{number(end)},{number(own)},{step})"
     half = zone / 2 if halved else zone
     # What was verified is stated as it is, a grade or a smallest zone too.
-    value = rounded_down(half * MICROMETRE, STEP) / MILLIMETRE
-    verified = f"AND({size}>{number(half - _AS_VERIFIED)},{size}<{number(half + _AS_VERIFIED)})"
-    return Formula(f"=IF({verified},{number(round(value, 8))},INT({size}/{step}+0.000001)*{step}/1000)", value)
+    value, near = rounded_down(half * shown, finest) / length, _AS_VERIFIED * MICROMETRE / shown
+    verified = f"AND({size}>{number(half - near)},{size}<{number(half + near)})"
+    found = f"INT({size}/{step}+0.000001)*{step}" + (f"/{length / shown:.0f}" if length != shown else "")
+    return Formula(f"=IF({verified},{number(round(value, 8))},{found})", value)
 
 
 def _without_weight(result: AllocationResult) -> tuple[str, ...]:
@@ -261,7 +276,9 @@ def style_calculator(
     drawing, requirements = workbook["drawing"], workbook["requirements"]
     _mark(result, drawing)
     for row in range(_FIRST, requirements.max_row + 1):
-        requirements.cell(row, 4).number_format, requirements.cell(row, 4).fill = "0.000", _RESULT
+        is_fine = str(requirements.cell(row, 1).value).split(",")[0].endswith("[in]")
+        requirements.cell(row, 4).number_format = "0.000000" if is_fine else "0.000"
+        requirements.cell(row, 4).fill = _RESULT
     values = {
         name: {
             f"{get_column_letter(column)}{row}": cell.value
@@ -322,7 +339,8 @@ def _mark(result: AllocationResult, drawing: Worksheet) -> None:
 def _written_as(frame: FeatureFrame) -> str:
     """Return the format of a number that looks as on the drawing, whatever the language of its reader."""
     sign = "±" if frame.is_deviation else "⌀" if frame.zone.startswith("⌀") else ""
-    return f'"{sign}"0.0000#' if sign else "0.0000#"
+    number = '0.00000#" in"' if frame.zone.endswith(" in") else "0.0000#"
+    return f'"{sign}"{number}' if sign else number
 
 
 def _below(drawing: Worksheet, watched: pd.DataFrame, rows: int, notes: tuple[str, ...]) -> dict[str, float | str]:
@@ -342,7 +360,8 @@ def _below(drawing: Worksheet, watched: pd.DataFrame, rows: int, notes: tuple[st
             value = held.value if isinstance(held, Formula) else held
             if isinstance(value, str) or (value is not None and value == value):
                 cell = drawing.cell(row, column, f"=requirements!{place}{there}")
-                cell.number_format, cell.fill = "0.00", _RESULT
+                cell.number_format = "0.000000" if str(own["what"]).split(",")[0].endswith("[in]") else "0.00"
+                cell.fill = _RESULT
                 values[cell.coordinate] = value
     for row, text in enumerate(notes, start=drawing.max_row + 2):
         drawing.cell(row, 1, text).font = Font(italic=True)

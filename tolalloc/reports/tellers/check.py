@@ -15,7 +15,6 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import doubts
 from tolalloc.models.model import Model
-from tolalloc.reading.units import MICROMETRE
 from tolalloc.reports.document import Section
 from tolalloc.reports.finished_run import told_yields
 from tolalloc.reports.portrait import Examination, Portrait, portrait_of
@@ -189,7 +188,7 @@ def _zones(sources: tuple[Source, ...]) -> list[str]:
     said: dict[str, dict[str, str]] = {}
     for source in sources:
         name = f"{source.own_id} ({source.name})" if source.own_id else source.name
-        span = f"may become {source.minimum / MICROMETRE:.3g}…{source.maximum / MICROMETRE:.3g} µm"
+        span = f"may become {source.said(source.minimum).split()[0]}…{source.said(source.maximum)}"
         mapping = f"{source.mapping}; {'locked' if source.locked else span}"
         said.setdefault(_without_numbers(name), {})[name] = mapping
     lines = []

@@ -8,8 +8,8 @@ from typing import Any
 from tolalloc.allocation.difference import DifferenceResult
 from tolalloc.allocation.space.design_space import outside_range
 from tolalloc.capability.monte_carlo import Change
-from tolalloc.drawings.sources import Source
-from tolalloc.reading.units import COST_UNITS, MICROMETRE, unit_of
+from tolalloc.drawings.sources import Source, zone_in, zone_unit
+from tolalloc.reading.units import COST_UNITS, unit_of
 from tolalloc.reports.columns import Column, Table, own_words
 from tolalloc.reports.document import Section
 from tolalloc.reports.teller import Teller
@@ -32,14 +32,18 @@ _CHANGES: tuple[Column[_Changed], ...] = (
     Column(header="low 95 % [unit]", value=lambda row: row[3].low),
     Column(header="high 95 % [unit]", value=lambda row: row[3].high),
 )
-_ZONES: tuple[Column[tuple[Source, Source]], ...] = (
-    Column(header="source", value=lambda row: row[0].name),
-    *own_words(lambda row: row[:1]),
-    Column(header="zone before [µm]", value=lambda row: row[0].zone / MICROMETRE),
-    Column(header="zone after [µm]", value=lambda row: row[1].zone / MICROMETRE),
-    Column(header="cost before [{cost}]", value=lambda row: row[0].cost),
-    Column(header="cost after [{cost}]", value=lambda row: row[1].cost),
-)
+
+
+def _zone_columns(unit: str) -> tuple[Column[tuple[Source, Source]], ...]:
+    """Return the columns of the sources whose zones change, in a unit."""
+    return (
+        Column(header="source", value=lambda row: row[0].name),
+        *own_words(lambda row: row[:1]),
+        Column(header=f"zone before [{unit}]", value=lambda row: zone_in(row[0], unit)),
+        Column(header=f"zone after [{unit}]", value=lambda row: zone_in(row[1], unit)),
+        Column(header="cost before [{cost}]", value=lambda row: row[0].cost),
+        Column(header="cost after [{cost}]", value=lambda row: row[1].cost),
+    )
 
 
 class DifferenceTeller(Teller[DifferenceResult]):
@@ -123,7 +127,7 @@ class DifferenceTeller(Teller[DifferenceResult]):
     def _zones(self) -> Table[tuple[Source, Source]]:
         """The zones that change, with their costs."""
         rows = list(zip(self.result.before, self.result.after, strict=True))
-        return Table(name="changed zones", columns=_ZONES, rows=rows)
+        return Table(name="changed zones", columns=_zone_columns(zone_unit(before for before, _ in rows)), rows=rows)
 
 
 def _with_interval(change: Change, output: str) -> dict[str, str]:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from tolalloc.drawings.seeds import SamplingDesign
+from tolalloc.drawings.sources import zone_in, zone_unit
 from tolalloc.drawings.tolerance_table import table_frame
-from tolalloc.reading.units import MICROMETRE, unit_of
+from tolalloc.reading.units import unit_of
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, HeatMap, Series
 from tolalloc.reports.finished_run import told_yields
@@ -154,7 +155,7 @@ class RankingTeller(Teller[RankingResult]):
         if not ranked:
             return
         first = sorted(tables.per_micrometre(self.result).items(), key=lambda own: -own[1])
-        zones = {name: members[0].zone / MICROMETRE for name, members in lines.items()}
+        zones = {name: members[0].said(members[0].zone) for name, members in lines.items()}
         names = ", ".join(
             _say("per_micrometre_name", source=name, change=change, sign=self._sign) for name, change in first[:_NAMED]
         )
@@ -592,19 +593,21 @@ class RankingTeller(Teller[RankingResult]):
         rows = [at for at in tables.tightest_first(found) if np.isfinite(found.zone[at])][:_SHOWN]
         if not rows:
             return
-        now = np.array([source.zone / MICROMETRE for source in self.result.errors.active])[rows]
+        active = self.result.errors.active
+        unit = zone_unit(active)
+        now = np.array([zone_in(source, unit) for source in active])[rows]
         names = [found.sources[at] for at in rows]
         yield Figure(
             name="alone",
             title=_say("alone_may_open" if found.meets else "alone_may_stay"),
-            x_label="zone [µm]",
+            x_label=f"zone [{unit}]",
             series=(
                 Series(label="now", kind="bars", x=names, y=list(now)),
                 Series(
                     label="alone, with its 90 % interval",
                     kind="bars",
                     x=names,
-                    y=list(found.zone[rows] / MICROMETRE),
+                    y=[zone_in(active[at], unit, found.zone[at]) for at in rows],
                     low=list(now * found.low[rows]),
                     high=list(now * found.high[rows]),
                 ),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tolalloc.drawings.sources import Source
+from tolalloc.drawings.sources import Source, zone_in, zone_unit
 from tolalloc.drawings.tolerance_table import with_own_words
 from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.columns import Column, Table, span
@@ -105,11 +105,11 @@ def _blocks(pair: Neighbours | None) -> str:
 def ranking_table(result: RankingResult) -> pd.DataFrame:
     """Return the ranking of the leading output, with the zone and the order per micrometre beside it."""
     frame = sobol_table(result.indices)
-    zones = dict(zip((source.name for source in result.errors.active), result.errors.zones / MICROMETRE, strict=False))
+    zone = zone_unit(result.errors.active)
     local, unit = result.local, unit_of(result.leading)
     place = {local.sources[at]: rank for rank, at in enumerate(largest_first(local.per_micrometre), start=1)}
     columns = {
-        "zone [µm]": zones,
+        f"zone [{zone}]": {source.name: zone_in(source, zone) for source in result.errors.active},
         f"Sens [{unit}/µm]": dict(zip(local.sources, local.at_nominal, strict=True)),
         f"rms change per µm [{unit}/µm]": dict(zip(local.sources, local.per_micrometre, strict=True)),
         "rank per µm [-]": place,
@@ -394,16 +394,19 @@ def tightest_first(found: InverseSensitivity) -> list[int]:
 
 def inverse_table(result: RankingResult) -> pd.DataFrame:
     """Return how far each zone may open alone, or must close."""
-    found = result.inverse
+    found, active = result.inverse, result.errors.active
+    unit = zone_unit(active)
     return of_positions(
         "alone",
         {
             "source": found.sources,
-            "zone now [µm]": [source.zone / MICROMETRE for source in result.errors.active],
+            f"zone now [{unit}]": [zone_in(source, unit) for source in active],
             "factor alone [-]": found.factor,
             "factor low 5 % [-]": found.low,
             "factor high 95 % [-]": found.high,
-            "zone alone [µm]": found.zone / MICROMETRE,
+            f"zone alone [{unit}]": [
+                zone_in(source, unit, zone) for source, zone in zip(active, found.zone, strict=True)
+            ],
             "reading": [_reading(value) if found.decided else _say("undecided") for value in found.factor],
         },
         tightest_first(found),
