@@ -259,10 +259,10 @@ def table_workbook(sources: Sequence[Source]) -> bytes:
     """Return the workbook of a tolerance table."""
     from tolalloc.reports.excel import Book, letter
 
-    book, rows = Book(), [list(HEADERS.values()), *table_rows(sources)]
+    book, rows = Book(), table_rows(sources)
     sheet = book.sheet("tolerances")
     for at, (name, column) in enumerate(COLUMNS.items(), start=1):
-        cells = [row[at - 1] for row in rows]
+        cells = [HEADERS[name], *(row[at - 1] for row in rows)]
         for row, value in enumerate(cells, start=1):
             sheet.cell(row, at, value)
         sheet.cell(1, at, bold=True, bg_color="#DDE6F0")
@@ -276,7 +276,7 @@ def table_workbook(sources: Sequence[Source]) -> bytes:
                 "error_title": name,
                 "error_message": f"Allowed are {', '.join(_CHOICES[name])}.",
             }
-            sheet.inner.data_validation(f"{letter(at)}2:{letter(at)}{len(rows) + _SPARE}", allowed)
+            sheet.inner.data_validation(f"{letter(at)}2:{letter(at)}{len(cells) + _SPARE}", allowed)
     sheet.inner.freeze_panes(1, 1)
     return book.content()
 

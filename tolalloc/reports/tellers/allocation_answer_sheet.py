@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import isfinite
 
 from tolalloc.allocation.result import AllocationResult
@@ -62,7 +63,7 @@ class AnswerSheet:
         if bold or len(str(cells[0])) > _WIDTHS[0]:
             self.sheet.height(self.row, 2 * _LINE)
 
-    def rule(self, place: str, condition: str, style: dict[str, object], *, last: bool = False) -> None:
+    def rule(self, place: str, condition: str, style: Mapping[str, object], *, last: bool = False) -> None:
         """Give cells a style where a condition holds; the last one that is looked at, if it says so."""
         rule = {"type": "formula", "criteria": f"={condition}", "format": self.book.style(**style)}
         self.sheet.inner.conditional_format(place, {**rule, "stop_if_true": last})
