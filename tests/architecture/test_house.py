@@ -6,6 +6,8 @@ import ast
 import re
 import subprocess
 import sys
+import tomllib
+from datetime import date
 from pathlib import Path
 
 import pytest
@@ -24,7 +26,8 @@ DOORS = {
     "sklearn": ("sensitivity/surrogate/", "reducers/surrogates.py"),
     "matplotlib": ("reports/",),
     "jinja2": ("reports/",),
-    "openpyxl": ("cli/start.py", "reports/", "drawings/table_file.py"),
+    "openpyxl": ("drawings/table_file.py",),
+    "xlsxwriter": ("reports/excel.py",),
     "distributed": ("running/workers.py",),
     "numba": ("running/compiled.py", "running/compiled_parts.py", "reducers/equivalent/solvers/simd.py"),
     "llvmlite": ("running/compiled_parts.py", "reducers/equivalent/solvers/simd.py"),
@@ -165,6 +168,21 @@ def test_top_level_holds_only_what_it_should():
         pytest.skip("not a git checkout")
     names = {name for name in tracked.stdout.split() if not name.startswith(".")}
     assert names <= {"pyproject.toml", "tolalloc", "studies", "tests", "docs", "README.md", "LICENSE"}
+
+
+def test_the_version_stands_in_changes_and_citation_too():
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    (first, *_) = re.findall(r"^## (\S+), (.+)$", (ROOT / "docs" / "changelog.md").read_text(encoding="utf-8"), re.M)
+    cited = dict(re.findall(r"^([\w-]+): (.+)$", (ROOT / "docs" / "CITATION.cff").read_text(encoding="utf-8"), re.M))
+    assert version == first[0] == cited["version"]
+    assert f"{date.fromisoformat(cited['date-released']):%-d %B %Y}" == first[1]
+
+
+def test_answers_to_the_review_of_the_repository_stand_on_the_page():
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    page = (ROOT / "docs" / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    stated = dict(re.findall(r"^\| ([A-Z]+\d+) \| .+? \| (.+) \|$", page, re.M))
+    assert stated == settings["tool"]["repo-review"]["ignore"]
 
 
 def test_the_page_for_a_first_study_explains_every_column_as_the_list_of_fields_does():

@@ -1,10 +1,12 @@
-"""The wheel alone, without the checkout: presets, templates and pages are inside, and an own folder runs from it."""
+"""What is released: the wheel alone runs a folder of one's own; wheel and source hold what is tracked and no more."""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
+import tarfile
+from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
@@ -82,3 +84,27 @@ def test_a_folder_and_a_study_of_one_s_own_run_from_the_wheel(installed, tmp_pat
     (tmp_path / "gap.py").write_text(STUDY, encoding="utf-8")
     assert "Met: " in of_the_wheel(installed, tmp_path, "run", "gap.py", "--quick", "--out", "run")
     assert (tmp_path / "run" / "report.html").stat().st_size > 10_000
+
+
+OF_A_HOST = (".github", ".gitignore", ".pre-commit-config.yaml")
+"""What is tracked for a host or an editor, and is no part of a release; hatchling keeps `.gitignore` all the same."""
+
+
+@pytest.mark.slow
+def test_a_clean_clone_is_released_whole_and_without_anything_else(tmp_path):
+    clone, place = tmp_path / "clone", tmp_path / "dist"
+    cloned = subprocess.run(["git", "clone", "--quiet", ROOT, clone], capture_output=True, check=False)
+    if cloned.returncode:
+        pytest.skip("This is not a git checkout, so nothing says what is tracked.")
+    listed = subprocess.run(["git", "ls-files"], cwd=clone, capture_output=True, text=True, check=True)
+    tracked = set(listed.stdout.splitlines())
+    build = [sys.executable, "-m", "hatchling", "build", "--directory", place]
+    subprocess.run(build, cwd=clone, capture_output=True, check=True)
+    (source,), (wheel,) = place.glob("*.tar.gz"), place.glob("*.whl")
+    with tarfile.open(source) as content:
+        released = {Path(*Path(own.name).parts[1:]).as_posix() for own in content if own.isfile()}
+    of_a_host = {name for name in tracked if name.startswith(OF_A_HOST)}
+    assert released == tracked - of_a_host | {".gitignore", "PKG-INFO"}
+    with ZipFile(wheel) as content:
+        inside = {name for name in content.namelist() if ".dist-info/" not in name}
+    assert inside == {name for name in tracked if name.startswith("tolalloc/")}

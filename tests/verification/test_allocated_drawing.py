@@ -239,7 +239,7 @@ def test_formulas_hold_plain_numbers_and_the_zones_to_change_are_marked(drawn):
     assert not any("np." in formula or "e-" in formula or "nan" in formula for formula in formulas)
     zones = sheets["drawing"]
     marked = {zones.cell(2 + at, 2).fill.fgColor.rgb for at in range(len(results.drawn.groups))}
-    assert marked == {"00FFF2CC"}
+    assert marked == {"FFFFF2CC"}
     assert zones["C2"].fill.fgColor.rgb not in marked
     assert any("yellow" in str(row[0].value) for row in zones.iter_rows())
     (guard,) = zones.data_validations.dataValidation

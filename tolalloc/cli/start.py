@@ -7,7 +7,6 @@ import os
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from io import BytesIO
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
@@ -258,34 +257,28 @@ _SPARE = 200
 
 def table_workbook(sources: Sequence[Source]) -> bytes:
     """Return the workbook of a tolerance table."""
-    from openpyxl import Workbook
-    from openpyxl.comments import Comment
-    from openpyxl.styles import Font, PatternFill
-    from openpyxl.utils import get_column_letter
-    from openpyxl.worksheet.datavalidation import DataValidation
+    from tolalloc.reports.excel import Book, letter
 
-    book = Workbook()
-    sheet = book.active
-    sheet.title = "tolerances"
-    sheet.append(list(HEADERS.values()))
-    for row in table_rows(sources):
-        sheet.append(row)
+    book, rows = Book(), table_rows(sources)
+    sheet = book.sheet("tolerances")
     for at, (name, column) in enumerate(COLUMNS.items(), start=1):
-        letter, head = get_column_letter(at), sheet.cell(row=1, column=at)
-        head.font, head.fill = Font(bold=True), PatternFill("solid", fgColor="DDE6F0")
-        head.comment = Comment(column.meaning, "tolalloc")
-        longest = max(len(str(cell.value or "")) for cell in sheet[letter])
-        sheet.column_dimensions[letter].width = min(longest, 40) + 3
+        cells = [HEADERS[name], *(row[at - 1] for row in rows)]
+        for row, value in enumerate(cells, start=1):
+            sheet.cell(row, at, value)
+        sheet.cell(1, at, bold=True, bg_color="#DDE6F0")
+        sheet.inner.write_comment(0, at - 1, column.meaning, {"author": "tolalloc"})
+        sheet.width(at, min(max(len(str(value or "")) for value in cells), 40) + 3)
         if name in _CHOICES:
-            allowed = DataValidation(type="list", formula1=f'"{",".join(_CHOICES[name])}"', allow_blank=True)
-            allowed.showErrorMessage = name != "grade"
-            allowed.error, allowed.errorTitle = f"Allowed are {', '.join(_CHOICES[name])}.", name
-            allowed.add(f"{letter}2:{letter}{sheet.max_row + _SPARE}")
-            sheet.add_data_validation(allowed)
-    sheet.freeze_panes = "B2"
-    content = BytesIO()
-    book.save(content)
-    return content.getvalue()
+            allowed = {
+                "validate": "list",
+                "source": _CHOICES[name],
+                "show_error": name != "grade",
+                "error_title": name,
+                "error_message": f"Allowed are {', '.join(_CHOICES[name])}.",
+            }
+            sheet.inner.data_validation(f"{letter(at)}2:{letter(at)}{len(cells) + _SPARE}", allowed)
+    sheet.inner.freeze_panes(1, 1)
+    return book.content()
 
 
 SAMPLES = ("costs", "processes", "cmm", "bench", "curve", "parts", "assembly")

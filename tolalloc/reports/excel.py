@@ -1,29 +1,29 @@
-"""The results as one workbook."""
+"""Results as workbooks: the one place that writes them.
+
+XlsxWriter writes; what is read, anywhere, is read by openpyxl. A cell has its value and its style when the workbook is
+closed, and a formula what it gives now, for viewers and programs that calculate nothing.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from io import BytesIO
+from itertools import count
 from math import isfinite
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
-from zipfile import ZIP_DEFLATED, ZipFile
 
 import pandas as pd
-from openpyxl import Workbook, load_workbook
-from openpyxl.cell.cell import ILLEGAL_CHARACTERS_RE, Cell
-from openpyxl.styles import Alignment, Font
-from openpyxl.utils import get_column_letter
-from openpyxl.worksheet.pagebreak import Break
-from openpyxl.worksheet.properties import PageSetupProperties
-from openpyxl.worksheet.worksheet import Worksheet
+import xlsxwriter
+from xlsxwriter.utility import xl_col_to_name
 
 from tolalloc.reading.files import is_formula
 from tolalloc.reading.units import in_cost_units, unit_of
 from tolalloc.reports.figure import Figure, shares
 
-_MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
 _FORMATS = {
     "µm": "0.0##",
     "mm": "0.0000",
@@ -44,10 +44,22 @@ _CHARTS, _SERIES, _POINTS = 8, 4, 2000
 """Charts of a workbook, series of one and points of one, at most [-]."""
 _WIDE, _ROW, _PAPER = 13.0, 0.53, 17.0
 """Width of a chart, height of a row of its sheet, and height of what a sheet of paper holds [cm]."""
+_PIXELS = 96 / 2.54
+"""Pixels of a centimetre, in which XlsxWriter sizes a chart [1/cm]."""
 _COLUMN = 8.5
 """Width of a column of the sheet of charts [characters]."""
 _LINE = 110
 """Characters of a line of the answer, with room for wide ones [-]."""
+_LONGEST = 32767
+"""Characters that a cell holds [-]."""
+_NAME = 31
+"""Letters of the name of a sheet [-]."""
+_NO_NAME = re.compile(r"[\[\]:*?/\\']")
+"""What no name of a sheet may hold, or what a link to it would have to quote."""
+_CONTROL = re.compile(r"[\000-\010\013\014\016-\037]")
+"""What no workbook may hold."""
+HEAD = {"bold": True, "text_wrap": True, "valign": "top"}
+"""Style of a header."""
 
 
 @dataclass(frozen=True)
@@ -61,27 +73,160 @@ class Formula:
         return self.text
 
 
-def write_sheets(sheets: dict[str, pd.DataFrame], path: Path, figures: Iterable[object] = ()) -> None:
+def letter(column: int) -> str:
+    """Return the letter of a column that counts from 1.
+
+    >>> letter(1), letter(27)
+    ('A', 'AA')
+    """
+    return str(xl_col_to_name(column - 1))
+
+
+@dataclass(frozen=True)
+class _Link:
+    """The name of a table, which leads to its sheet."""
+
+    name: str
+    sheet: str
+
+
+class Sheet:
+    """One sheet, whose cells are written when its workbook is closed; rows and columns count from 1, as in a formula.
+
+    Parameters
+    ----------
+    inner
+        The sheet of XlsxWriter, which takes what is no cell, such as widths and rules, and counts from 0.
+    """
+
+    def __init__(self, inner: Any) -> None:
+        self.inner = inner
+        self.rows = 0  # The last one that has a cell
+        self._cells: dict[tuple[int, int], tuple[object, dict[str, object]]] = {}
+
+    def cell(self, row: int, column: int, value: object = None, **style: object) -> None:
+        """Give a cell a value, and properties of a format of XlsxWriter beside those that it has.
+
+        Without a value it keeps the one that it has.
+        """
+        held, before = self._cells.get((row, column), (None, {}))
+        self._cells[row, column] = (held if value is None else value, before | style)
+        self.rows = max(self.rows, row)
+
+    def width(self, column: int, characters: float) -> None:
+        """Set the width of a column."""
+        self.inner.set_column(column - 1, column - 1, characters)
+
+    def height(self, row: int, points: float) -> None:
+        """Set the height of a row."""
+        self.inner.set_row(row - 1, points)
+
+    def set_up_print(self, *, headed: bool = True) -> None:
+        """Let the sheet print across on A4, as wide as the paper, with its header, if it has one, on every page."""
+        self.inner.set_paper(9)  # A4
+        self.inner.set_landscape()
+        self.inner.fit_to_pages(1, 0)
+        if headed:
+            self.inner.repeat_rows(0)
+        self.inner.set_footer("&L&A&R&P / &N")
+
+    def write(self, book: Book) -> None:
+        """Hand all cells over to XlsxWriter."""
+        for (row, column), (value, style) in self._cells.items():
+            _write(self.inner, (row - 1, column - 1), value, style, book)
+
+
+class Book:
+    """A workbook that is being made."""
+
+    def __init__(self) -> None:
+        self._stream = BytesIO()
+        self._file = xlsxwriter.Workbook(self._stream, {"in_memory": True})
+        self._formats: dict[tuple[tuple[str, object], ...], Any] = {}
+        self.sheets: dict[str, Sheet] = {}
+
+    def sheet(self, name: str) -> Sheet:
+        """Return a new sheet behind the others; a workbook opens on its first."""
+        self.sheets[name] = Sheet(self._file.add_worksheet(self._name(name)))
+        return self.sheets[name]
+
+    def _name(self, name: str) -> str:
+        """Return a name that no other sheet has, as long and of such letters as Excel allows."""
+        short = _NO_NAME.sub("-", name)[:_NAME]
+        taken = {own.inner.get_name().casefold() for own in self.sheets.values()}
+        spare = (f"{short[: _NAME - len(ending)]}{ending}" for ending in map("~{}".format, count(2)))
+        return short if short.casefold() not in taken else next(own for own in spare if own.casefold() not in taken)
+
+    def table(self, name: str, frame: pd.DataFrame) -> Sheet:
+        """Return a new sheet with a table: headers frozen, numbers as their unit asks for, set up for print."""
+        sheet = self.sheet(name)
+        sheet.inner.freeze_panes(1, 0)
+        sheet.set_up_print()
+        for number, header in enumerate(frame.columns, start=1):
+            values = frame.iloc[:, number - 1].tolist()
+            longest = max([len(str(header)) * 0.7, *(len(str(value)) for value in values[:40])])
+            sheet.width(number, min(max(longest + 2, 10), 60))
+            sheet.cell(1, number, str(header), **HEAD)
+            shown = {"num_format": _FORMATS.get(in_cost_units(unit_of(str(header))), "0.0###")}
+            for row, value in enumerate(values, start=2):
+                sheet.cell(row, number, value, **(shown if isinstance(value, float | Formula) else {}))
+        return sheet
+
+    def style(self, **properties: object) -> Any:
+        """Return a format of XlsxWriter, the same one for the same properties."""
+        key = tuple(sorted(properties.items()))
+        if key not in self._formats:
+            self._formats[key] = self._file.add_format(properties)
+        return self._formats[key]
+
+    def chart(self, **options: object) -> Any:
+        """Return a new chart of XlsxWriter, which no sheet shows yet."""
+        return self._file.add_chart(options)
+
+    def content(self) -> bytes:
+        """Write all cells, and return the file; nothing can be added then."""
+        for sheet in self.sheets.values():
+            sheet.write(self)
+        self._file.close()
+        return self._stream.getvalue()
+
+
+def _write(sheet: Any, place: tuple[int, int], value: Any, style: dict[str, object], book: Book) -> None:
+    """Write a cell: a formula of ours, a number, or text that stays text, also when somebody edits it."""
+    if isinstance(value, Formula):
+        known = value.value if isinstance(value.value, str) or _is_finite(value.value) else ""
+        sheet.write_formula(*place, value.text, book.style(**style), known)
+    elif isinstance(value, _Link):
+        sheet.write_url(*place, f"internal:'{value.sheet}'!A1", string=value.name)
+    elif isinstance(value, bool) or type(value).__name__ == "bool":  # NumPy's own too
+        sheet.write_boolean(*place, bool(value), book.style(**style))
+    elif _is_finite(value):
+        sheet.write_number(*place, value, book.style(**style))
+    elif value is None or pd.isna(value) is True:
+        if style:
+            sheet.write_blank(*place, None, book.style(**style))
+    else:
+        text = _CONTROL.sub("\ufffd", str(value))[:_LONGEST]
+        quoted = {"quote_prefix": True} if is_formula(text) else {}
+        sheet.write_string(*place, text, book.style(**style, **quoted))
+
+
+def _is_finite(value: object) -> bool:
+    return isinstance(value, Integral | Real) and isfinite(value)
+
+
+def write_sheets(sheets: Mapping[str, pd.DataFrame], path: Path, figures: Iterable[object] = ()) -> None:
     """Write one sheet per table, headers frozen, units in every header; and figures as charts of the workbook's own."""
-    with pd.ExcelWriter(path, engine="openpyxl") as writer:
-        for name, frame in sheets.items():
-            frame.rename(columns=_shown).map(_shown).to_excel(writer, sheet_name=name, index=False)
-            sheet = writer.sheets[name]
-            sheet.freeze_panes = "A2"
-            set_up_print(sheet)
-            for number, header in enumerate(frame.columns, start=1):
-                longest = max([len(str(header)) * 0.7, *(len(str(value)) for value in frame[header].head(40))])
-                sheet.column_dimensions[get_column_letter(number)].width = min(max(longest + 2, 10), 60)
-                cell = sheet.cell(1, number)
-                cell.font, cell.alignment = Font(bold=True), Alignment(wrap_text=True, vertical="top")
-                _keep_text(cell, header)
-                for row in range(2, len(frame) + 2):
-                    value, cell = frame.iloc[row - 2, number - 1], sheet.cell(row, number)
-                    if isinstance(value, float | Formula):
-                        cell.number_format = _FORMATS.get(in_cost_units(unit_of(str(header))), "0.0###")
-                    _keep_text(cell, value)
-        _lay_out(writer.sheets)
-        _draw(writer.book, [own for own in figures if isinstance(own, Figure) and _is_chart(own)][:_CHARTS])
+    drawn = [own for own in figures if isinstance(own, Figure) and _is_chart(own)][:_CHARTS]
+    book = Book()
+    for name, frame in sheets.items():
+        book.table(name, frame)
+        if name == CONTENTS and drawn:
+            book.sheet(CHARTS)
+    _lay_out(book, sheets)
+    if drawn:
+        _draw(book, drawn)
+    path.write_bytes(book.content())
 
 
 def _is_chart(figure: Figure) -> bool:
@@ -93,79 +238,74 @@ def _is_chart(figure: Figure) -> bool:
     )
 
 
-def _draw(book: Workbook, figures: Sequence[Figure]) -> None:
+def _draw(book: Book, figures: Sequence[Figure]) -> None:
     """Draw figures below each other on a sheet of their own, from numbers on the last sheet."""
-    if not figures:
-        return
-    sheet, data = book.create_sheet(CHARTS, book.sheetnames.index(CONTENTS) + 1), book.create_sheet(_DATA)
-    set_up_print(sheet)
-    sheet.print_title_rows = None  # a chart stands in the first row
+    sheet, data = book.sheets[CHARTS], book.sheet(_DATA)
+    sheet.set_up_print(headed=False)  # a chart stands in the first row
     top, column, left = 0.0, 1, 0.0  # Where the next pair stands, and how much of a sheet of paper is left [cm]
+    breaks = []
     for first in range(0, len(figures), 2):
-        pair, row = [], int(top / _ROW) + 1
-        for own in figures[first : first + 2]:
-            chart, used = _chart(own, data, column)
-            _style(chart, own)
-            pair.append(chart)
-            column += used
-        tall = max(chart.height for chart in pair) + _ROW
+        pair, row = figures[first : first + 2], int(top / _ROW)
+        tall = max(map(_height, pair)) + _ROW
         if first and tall > left:
-            sheet.row_breaks.append(Break(id=row - 1))
+            breaks.append(row)
         left = (left if first and tall <= left else _PAPER) - tall
-        for place, chart in zip("AH", pair, strict=False):
-            sheet.add_chart(chart, f"{place}{row}")
+        for place, own in zip((0, 7), pair, strict=False):
+            chart, used = _chart(book, own, data, column)
+            _style(chart, own)
+            sheet.inner.insert_chart(row, place, chart)
+            column += used
         top += tall + _ROW
-    for letter in "ABCDEFGHIJKLMN":
-        sheet.column_dimensions[letter].width = _COLUMN
+    sheet.inner.set_h_pagebreaks(breaks)
+    sheet.inner.set_column(0, 13, _COLUMN)
+
+
+def _height(figure: Figure) -> float:
+    """Return the height of a chart [cm]."""
+    return min(max(7.0, 0.5 * figure.rows * len(figure.series) + 3.0), _PAPER)
 
 
 def _style(chart: Any, figure: Figure) -> None:
-    """Give a chart its title, its size and axes that are seen."""
-    from openpyxl.drawing.text import CharacterProperties
-
-    chart.title, chart.width = figure.title, _WIDE
-    for paragraph in chart.title.tx.rich.p:
-        for run in paragraph.r:
-            run.rPr = CharacterProperties(sz=1000, b=True)
-    chart.height = min(max(7.0, 0.5 * figure.rows * len(figure.series) + 3.0), _PAPER)
-    chart.x_axis.delete = chart.y_axis.delete = False
-    if len(figure.series) > 1:
-        chart.legend.position = "b"
-    else:
-        chart.legend = None
+    """Give a chart its title, its size and its legend."""
+    chart.set_title({"name": figure.title, "name_font": {"size": 10, "bold": True}})
+    chart.set_size({"width": round(_WIDE * _PIXELS), "height": round(_height(figure) * _PIXELS)})
+    chart.set_legend({"position": "bottom"} if len(figure.series) > 1 else {"none": True})
 
 
-def _chart(figure: Figure, data: Worksheet, column: int) -> tuple[Any, int]:
+def _chart(book: Book, figure: Figure, data: Sheet, column: int) -> tuple[Any, int]:
     """Return a chart whose numbers are written from a column on, and how many columns they take."""
-    from openpyxl.chart import BarChart, Reference, ScatterChart
-    from openpyxl.chart import Series as Drawn
-
     if figure.series[0].kind in ("line", "points"):
-        chart, used = ScatterChart(style=13), 0
+        chart, used = book.chart(type="scatter", subtype="straight"), 0
         for own in figure.series:
-            _write(data, column + used, [figure.x_label, own.label], list(own.x), list(own.y))
-            x, y = (Reference(data, column + used + at, 2, column + used + at, len(own.x) + 1) for at in (0, 1))
-            drawn = Drawn(y, x, title=own.label)
-            if own.kind == "points":
-                drawn.marker.symbol, drawn.graphicalProperties.line.noFill = "circle", True
-            chart.series.append(drawn)
+            _put(data, column + used, [figure.x_label, own.label], list(own.x), list(own.y))
+            x, y = (_range(column + used + at, len(own.x)) for at in (0, 1))
+            points = {"marker": {"type": "circle"}, "line": {"none": True}}
+            kind = points if own.kind == "points" else {"line": {"width": 1.5}}
+            chart.add_series({"name": own.label, "categories": x, "values": y, **kind})
             used += 2
-        chart.x_axis.title, chart.y_axis.title = figure.x_label, figure.y_label
+        chart.set_x_axis({"name": figure.x_label})
+        chart.set_y_axis({"name": figure.y_label})
         return chart, used
     shown, bars = _bars(figure), figure.series[0].kind == "bars"
     heads = [figure.x_label, *(own.label for own in figure.series)]
-    _write(data, column, heads, *([row[at] for row in shown] for at in range(len(heads))))
-    chart = BarChart()
-    chart.type, chart.gapWidth = ("bar", 40) if bars else ("col", 0)
-    chart.overlap = None if bars else 100
-    chart.add_data(Reference(data, column + 1, 1, column + len(figure.series), len(shown) + 1), titles_from_data=True)
-    chart.set_categories(Reference(data, column, 2, column, len(shown) + 1))
-    if bars:
-        chart.x_axis.scaling.orientation, chart.y_axis.crosses = "maxMin", "max"  # the first one on top
-        chart.y_axis.title, chart.x_axis.tickLblSkip = figure.x_label, 1
+    _put(data, column, heads, *([row[at] for row in shown] for at in range(len(heads))))
+    chart = book.chart(type="bar" if bars else "column")
+    layout = {"gap": 40} if bars else {"gap": 0, "overlap": 100}
+    for at, own in enumerate(figure.series, start=1):
+        names, lengths = _range(column, len(shown)), _range(column + at, len(shown))
+        chart.add_series({"name": own.label, "categories": names, "values": lengths, **layout})
+    if bars:  # the first one on top
+        chart.set_x_axis({"name": figure.x_label})
+        chart.set_y_axis({"reverse": True, "interval_unit": 1, "crossing": "max"})
     else:
-        chart.x_axis.title, chart.y_axis.title, chart.x_axis.number_format = figure.x_label, figure.y_label, "0"
+        chart.set_x_axis({"name": figure.x_label, "num_format": "0"})
+        chart.set_y_axis({"name": figure.y_label})
     return chart, len(heads)
+
+
+def _range(column: int, count: int) -> str:
+    """Return the cells below a head on the sheet of the charts' numbers, as a formula."""
+    return f"='{_DATA}'!${letter(column)}$2:${letter(column)}${count + 1}"
 
 
 def _bars(figure: Figure) -> list[list[object]]:
@@ -180,81 +320,21 @@ def _bars(figure: Figure) -> list[list[object]]:
     return [[f"{middle:.4g}", *(own["y"][at] for own in counted)] for at, middle in enumerate(middles)]
 
 
-def _write(data: Worksheet, column: int, heads: Sequence[str], *columns: Sequence[object]) -> None:
-    """Write columns with their heads."""
+def _put(data: Sheet, column: int, heads: Sequence[str], *columns: Sequence[object]) -> None:
+    """Write columns with their heads; what is no finite number leaves its cell empty."""
     for at, (head, values) in enumerate(zip(heads, columns, strict=True)):
         for row, value in enumerate((head, *values), start=1):
-            cell = data.cell(row, column + at, None if isinstance(value, float) and not isfinite(value) else value)
-            _keep_text(cell, value)
+            data.cell(row, column + at, value if isinstance(value, str) or _is_finite(value) else None)
 
 
-def _lay_out(sheets: Mapping[str, Worksheet]) -> None:
+def _lay_out(book: Book, sheets: Mapping[str, pd.DataFrame]) -> None:
     """Let the answer be read as text, and every entry of the contents lead to its sheet."""
     if ANSWER in sheets:
-        sheet = sheets[ANSWER]
-        sheet.column_dimensions["A"].width = 110
-        for (cell,) in sheet.iter_rows(min_row=2):
-            cell.alignment = Alignment(wrap_text=True, vertical="top")
-            sheet.row_dimensions[cell.row].height = 15.0 * (1 + len(str(cell.value)) // _LINE)
+        sheet = book.sheets[ANSWER]
+        sheet.width(1, 110)
+        for row, text in enumerate(sheets[ANSWER].iloc[:, 0], start=2):
+            sheet.cell(row, 1, text_wrap=True, valign="top")
+            sheet.height(row, 15.0 * (1 + len(str(text)) // _LINE))
     if CONTENTS in sheets:
-        for (cell,) in sheets[CONTENTS].iter_rows(min_row=2, max_col=1):
-            cell.hyperlink, cell.style = f"#'{cell.value}'!A1", "Hyperlink"
-
-
-def set_up_print(sheet: Worksheet) -> None:
-    """Let a sheet print across on A4, as wide as the paper, with its header on every page."""
-    sheet.page_setup.paperSize = Worksheet.PAPERSIZE_A4
-    sheet.page_setup.orientation, sheet.page_setup.fitToWidth, sheet.page_setup.fitToHeight = "landscape", 1, 0
-    sheet.sheet_properties.pageSetUpPr = PageSetupProperties(fitToPage=True)
-    sheet.print_title_rows = "1:1"
-    sheet.oddFooter.left.text, sheet.oddFooter.right.text = "&A", "&P / &N"
-
-
-def keep_values(path: Path, values: Mapping[str, Mapping[str, float | str]]) -> None:
-    """Write what formulas give into a workbook, for viewers and programs that calculate nothing.
-
-    openpyxl writes a formula or its value and never both.
-
-    Parameters
-    ----------
-    path
-        Workbook whose sheets stand in the order in which they were made.
-    values
-        Sheet → cell, such as ``D2``, → what its formula gives.
-    """
-    ElementTree.register_namespace("", _MAIN)
-    names = load_workbook(path, read_only=True).sheetnames
-    files = {f"xl/worksheets/sheet{at}.xml": name for at, name in enumerate(names, start=1)}
-    beside = path.with_suffix(".part")
-    with ZipFile(path) as old, ZipFile(beside, "w", ZIP_DEFLATED) as new:
-        for item in old.infolist():
-            content = old.read(item)
-            known = values.get(files.get(item.filename, ""), {})
-            new.writestr(item, _with_values(content, known) if known else content)
-    beside.replace(path)
-
-
-def _with_values(sheet: bytes, values: Mapping[str, float | str]) -> bytes:
-    """Return the XML of a sheet whose formulas have values."""
-    root = ElementTree.fromstring(sheet)
-    for cell in root.iter(f"{{{_MAIN}}}c"):
-        value, shown = values.get(cell.get("r", "")), cell.find(f"{{{_MAIN}}}v")
-        if value is None or cell.find(f"{{{_MAIN}}}f") is None:
-            continue
-        if shown is None:
-            shown = ElementTree.SubElement(cell, f"{{{_MAIN}}}v")
-        shown.text = value if isinstance(value, str) else repr(float(value))
-        if isinstance(value, str):
-            cell.set("t", "str")
-    return bytes(ElementTree.tostring(root, encoding="utf-8", xml_declaration=True))
-
-
-def _shown(value: object) -> object:
-    """Return a cell without the control characters that no workbook may hold."""
-    return ILLEGAL_CHARACTERS_RE.sub("\ufffd", value) if isinstance(value, str) else value
-
-
-def _keep_text(cell: Cell, value: object) -> None:
-    """Keep a text that begins like a formula from being one, also when somebody edits the cell."""
-    if isinstance(value, str) and is_formula(value):
-        cell.data_type, cell.quotePrefix = "s", True
+        for row, name in enumerate(sheets[CONTENTS].iloc[:, 0], start=2):
+            book.sheets[CONTENTS].cell(row, 1, _Link(name, book.sheets[name].inner.get_name()))

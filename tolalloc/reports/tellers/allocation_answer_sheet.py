@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import isfinite
-
-from openpyxl.formatting.rule import CellIsRule, FormulaRule
-from openpyxl.styles import Alignment, Border, Font, PatternFill, Side
-from openpyxl.workbook.workbook import Workbook
-from openpyxl.worksheet.worksheet import Worksheet
 
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.reading.units import MICROMETRE, unit_of
-from tolalloc.reports.excel import Formula, set_up_print
+from tolalloc.reports.excel import Book, Formula
 from tolalloc.reports.header import Header
 from tolalloc.reports.tellers import allocation_sentences as texts
 from tolalloc.reports.templates import Sentences
@@ -29,9 +25,9 @@ _LINE = 15.0
 """Height of a line of text [pt]."""
 _ACROSS = 98
 """Letters that fit beside the first column, and in all of them where that is a part of it [-]."""
-_GOOD, _CAUTION, _BAD = (PatternFill("solid", bgColor=own, fgColor=own) for own in ("C6EFCE", "FFEB9C", "FFC7CE"))
-_BOLD = Font(name="Calibri", bold=True)
-_EDGE = Border(bottom=Side(style="thin", color="7F7F7F"))
+_GOOD, _CAUTION, _BAD = ({"bg_color": own} for own in ("#C6EFCE", "#FFEB9C", "#FFC7CE"))
+_TOP = {"text_wrap": True, "valign": "top"}
+_HEAD = {"bold": True, "bottom": 1, "bottom_color": "#7F7F7F"}
 
 
 class AnswerSheet:
@@ -39,42 +35,38 @@ class AnswerSheet:
 
     Parameters
     ----------
-    sheet
-        An empty sheet.
+    book
+        The workbook that gets the sheet.
     """
 
-    def __init__(self, sheet: Worksheet) -> None:
-        self.sheet, self.row = sheet, 0
-        self.values: dict[str, float | str] = {}  # Cell → what its formula gives
-        for letter, width in zip("ABCDEF", _WIDTHS, strict=True):
-            sheet.column_dimensions[letter].width = width
+    def __init__(self, book: Book) -> None:
+        self.book, self.sheet, self.row = book, book.sheet(NAME), 0
+        for column, width in enumerate(_WIDTHS, start=1):
+            self.sheet.width(column, width)
 
-    def across(self, text: str, *, name: str = "", longest: int = 0) -> None:
+    def across(self, text: str | Formula, *, name: str = "", longest: int = 0) -> None:
         """Write a text over the whole width, or beside its name."""
         self.row += 1
         first, room = (2, _ACROSS) if name else (1, _ACROSS + 30)
+        self.sheet.inner.merge_range(self.row - 1, first - 1, self.row - 1, len(_WIDTHS) - 1, "")
         if name:
-            self.sheet.cell(self.row, 1, name).font = _BOLD
-        cell = self.sheet.cell(self.row, first, text)
-        self.sheet.merge_cells(start_row=self.row, start_column=first, end_row=self.row, end_column=len(_WIDTHS))
-        for own in (self.sheet.cell(self.row, 1), cell):
-            own.alignment = Alignment(wrap_text=True, vertical="top")
-        self.sheet.row_dimensions[self.row].height = _LINE * (1 + max(len(text), longest) // room)
+            self.sheet.cell(self.row, 1, name, bold=True, **_TOP)
+        self.sheet.cell(self.row, first, text, **_TOP)
+        self.sheet.height(self.row, _LINE * (1 + (longest or len(str(text))) // room))
 
     def line(self, *cells: str | float | Formula | None, number: str = "0.0##", bold: bool = False) -> None:
         """Write cells beside each other."""
         self.row += 1
         for column, own in enumerate(cells, start=1):
-            cell = self.sheet.cell(self.row, column, str(own) if isinstance(own, Formula) else own)
-            cell.number_format, cell.alignment = number, Alignment(wrap_text=True, vertical="top")
-            if isinstance(own, Formula) and own.value is not None:
-                self.values[cell.coordinate] = own.value
-            if isinstance(own, str | Formula) and column > 1:
-                cell.alignment = Alignment(wrap_text=True, vertical="top", horizontal="right")
-            if bold:
-                cell.font, cell.border = _BOLD, _EDGE
+            right = {"align": "right"} if isinstance(own, str | Formula) and column > 1 else {}
+            self.sheet.cell(self.row, column, own, num_format=number, **_TOP, **right, **(_HEAD if bold else {}))
         if bold or len(str(cells[0])) > _WIDTHS[0]:
-            self.sheet.row_dimensions[self.row].height = 2 * _LINE
+            self.sheet.height(self.row, 2 * _LINE)
+
+    def rule(self, place: str, condition: str, style: Mapping[str, object], *, last: bool = False) -> None:
+        """Give cells a style where a condition holds; the last one that is looked at, if it says so."""
+        rule = {"type": "formula", "criteria": f"={condition}", "format": self.book.style(**style)}
+        self.sheet.inner.conditional_format(place, {**rule, "stop_if_true": last})
 
     def space(self) -> None:
         """Leave a row free."""
@@ -82,26 +74,25 @@ class AnswerSheet:
 
 
 def add_answer(
-    workbook: Workbook, result: AllocationResult, header: Header, predicted: dict[str, Formula | float | None]
-) -> dict[str, float | str]:
-    """Put the sheet in front of the others and return what its formulas give.
+    book: Book, result: AllocationResult, header: Header, predicted: dict[str, Formula | float | None]
+) -> None:
+    """Write the sheet, on which the workbook opens.
 
     Parameters
     ----------
-    workbook
-        It has the sheets ``drawing`` and ``requirements``.
+    book
+        It has no sheet yet, and gets ``drawing`` and ``requirements`` after this one.
     result, header
         The allocation, and what is said of its run.
     predicted
         What is limited, or the cost → what the other sheets predict of it, in their order.
     """
-    sheet = workbook.create_sheet(NAME, 0)
-    rows, groups = AnswerSheet(sheet), len(result.drawn.groups)
+    rows, groups = AnswerSheet(book), len(result.drawn.groups)
     rows.across(texts.title(result, header))
-    sheet["A1"].font = Font(name="Calibri", bold=True, size=14)
+    rows.sheet.cell(1, 1, bold=True, font_size=14)
     rows.across(_say("sheet_study", study=header.name, digest=header.digest[:12], quick=_quick(header)))
     rows.across(" ".join(texts.verdict(result)), name=_say("sheet_verdict"))
-    sheet["B3"].fill = _GOOD if result.met and not texts.examined(result).fault else _BAD
+    rows.sheet.cell(3, 2, **(_GOOD if result.met and not texts.examined(result).fault else _BAD))
     _guard(rows, groups)
     _limits(rows, result, header.cost_unit, predicted)
     _amounts(rows, result)
@@ -109,8 +100,8 @@ def add_answer(
         if at == 0:
             rows.space()
         rows.across(text, name=_say("sheet_warnings") if at == 0 else " ")
-    _finish(workbook, rows)
-    return rows.values
+    rows.sheet.set_up_print()
+    rows.sheet.inner.print_area(f"A1:F{rows.row}")
 
 
 def _quick(header: Header) -> str:
@@ -127,14 +118,11 @@ def _guard(rows: AnswerSheet, groups: int) -> None:
         f'=IF({beyond},"{said["beyond"]}",IF({unheld},"{said["unheld"]}",IF({moved},"{said["moved"]}",'
         f'"{said["verified"]}")))'
     )
-    rows.across(formula, name=_say("sheet_zones"))
-    height = 1 + max(map(len, said.values())) // _ACROSS
-    rows.sheet.row_dimensions[rows.row].height = _LINE * height
-    cell, sheet = rows.sheet[GUARD], rows.sheet
-    cell.font = _BOLD
-    rows.values[GUARD] = said["verified"]
-    for condition, fill in ((f"OR({beyond},{unheld})", _BAD), (moved, _CAUTION), ("TRUE", _GOOD)):
-        sheet.conditional_formatting.add(GUARD, FormulaRule(formula=[condition], fill=fill, stopIfTrue=True))
+    longest = max(map(len, said.values()))
+    rows.across(Formula(formula, said["verified"]), name=_say("sheet_zones"), longest=longest)
+    rows.sheet.cell(rows.row, 2, bold=True)
+    for condition, style in ((f"OR({beyond},{unheld})", _BAD), (moved, _CAUTION), ("TRUE", _GOOD)):
+        rows.rule(GUARD, condition, style, last=True)
 
 
 def _limits(
@@ -161,8 +149,8 @@ def _limits(
     cost = f"cost [{cost_unit}]"
     rows.line(cost, None, result.cost, _linked("D", len(result.chosen.alone) + 2, predicted[cost]), number="0.00")
     place = f"E{first}:E{rows.row}"
-    rows.sheet.conditional_formatting.add(place, CellIsRule(operator="equal", formula=['"yes"'], fill=_GOOD))
-    rows.sheet.conditional_formatting.add(place, FormulaRule(formula=[f'AND(E{first}<>"",E{first}<>"yes")'], fill=_BAD))
+    rows.rule(place, f'E{first}="yes"', _GOOD)
+    rows.rule(place, f'AND(E{first}<>"",E{first}<>"yes")', _BAD)
 
 
 def _linked(column: str, row: int, held: Formula | float | str | None) -> Formula:
@@ -187,13 +175,3 @@ def _amounts(rows: AnswerSheet, result: AllocationResult) -> None:
         rows.line(quantity(own.name), own.value, own.before, unit_of(own.name), tolerance, number="0.00##")
     for text in texts.amounts_convention(result):
         rows.across(text)
-
-
-def _finish(workbook: Workbook, rows: AnswerSheet) -> None:
-    """Let the workbook open on the sheet, and the sheet print on one page's width."""
-    sheet = rows.sheet
-    set_up_print(sheet)
-    sheet.print_area = f"A1:F{rows.row}"
-    workbook.active = 0
-    for own in workbook.worksheets:  # two selected sheets would be changed together
-        own.sheet_view.tabSelected = own is sheet

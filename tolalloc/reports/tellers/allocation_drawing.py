@@ -18,7 +18,7 @@ from tolalloc.drawings.tolerance_table import heads_file, heads_text, table_fram
 from tolalloc.reading.units import COST_UNITS, MICROMETRE, unit_of
 from tolalloc.reports.columns import Column, Table, own_words, span
 from tolalloc.reports.drawing_sheet import write_sheet
-from tolalloc.reports.excel import write_sheets
+from tolalloc.reports.excel import Book
 from tolalloc.reports.feature_frame import Frames, callout, writing_unit
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.header import Header
@@ -26,7 +26,7 @@ from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.tellers.allocation_assembly import assembly_notes
 from tolalloc.reports.tellers.allocation_sentences import amounts_convention, drawn_amounts
 from tolalloc.reports.tellers.allocation_sheet import drawing_sheet
-from tolalloc.reports.tellers.allocation_workbook import calculator_sheets, style_calculator
+from tolalloc.reports.tellers.allocation_workbook import add_calculator
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import quantity, short, with_unit
 from tolalloc.reports.writer import write_csv
@@ -269,10 +269,11 @@ def write_drawing(result: AllocationResult, header: Header, folder: Path) -> Non
         heads_file(folder / "allocation.csv").write_text(heads_text(called), encoding="utf-8")
     with (folder / "allocation.csv").open("a", encoding="utf-8") as file:
         file.write("".join(f"{line}\n" for line in _table_comments(result, header, notes)))
-    calculator = calculator_sheets(result, cost_unit)
-    others = {**_settings_sheet(result), "tolerances": tolerances_frame(result, cost_unit)}
-    write_sheets({**calculator, **others}, folder / "drawing.xlsx")
-    style_calculator(result, header, calculator, notes, folder / "drawing.xlsx")
+    book = Book()
+    add_calculator(book, result, header, notes)
+    for name, frame in {**_settings_sheet(result), "tolerances": tolerances_frame(result, cost_unit)}.items():
+        book.table(name, frame)
+    (folder / "drawing.xlsx").write_bytes(book.content())
     write_sheet(drawing_sheet(result, header, date.today()), folder / "frames.dxf")
 
 

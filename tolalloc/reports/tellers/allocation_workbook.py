@@ -6,28 +6,22 @@ more: small changes of zones are judged well, large ones by ``tolalloc`` on unit
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import singledispatch
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from jaxtyping import Float
-from openpyxl import load_workbook
-from openpyxl.styles import Alignment, Border, Font, PatternFill, Side
-from openpyxl.utils import get_column_letter
-from openpyxl.worksheet.datavalidation import DataValidation
-from openpyxl.worksheet.worksheet import Worksheet
 
 from tolalloc.allocation.cost.model import Combined, Exponential, Reciprocal, ReciprocalPower, SumOfCosts, Weighted
 from tolalloc.allocation.cost.points import Spline, Tabulated
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.drawings.sources import LENGTHS, STEPS, Source, length_unit, rounded_down
 from tolalloc.reading.units import MICROMETRE, unit_of
-from tolalloc.reports.excel import Formula, keep_values
+from tolalloc.reports.excel import Book, Formula, Sheet, letter
 from tolalloc.reports.feature_frame import FINEST, FeatureFrame, callout, writing_unit
 from tolalloc.reports.header import Header
-from tolalloc.reports.tellers.allocation_answer_sheet import NAME, add_answer
+from tolalloc.reports.tellers.allocation_answer_sheet import add_answer
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import number as signed
 
@@ -45,14 +39,31 @@ _HELD = "drawing!$P${}:$P${}"
 """Cells that say of every zone whether the weights hold for it."""
 _AS_VERIFIED = 1e-4
 """Distance up to which a zone is the verified one, or at a bound [µm]."""
-_INPUT = PatternFill("solid", fgColor="FFF2CC")
-_RESULT = PatternFill("solid", fgColor="E2EFDA")
-_EDGE = Side(style="thin", color="7F7F7F")
+_INPUT = {"bg_color": "#FFF2CC", "border": 1, "border_color": "#7F7F7F"}
+_RESULT = {"bg_color": "#E2EFDA"}
+_WRAPPED = {"text_wrap": True, "valign": "top"}
 
 
-def calculator_sheets(result: AllocationResult, cost_unit: str) -> dict[str, pd.DataFrame]:
-    """Return the sheets ``drawing`` (to change and to print) and ``requirements`` (how the limits follow)."""
-    return {"drawing": _drawing(result, cost_unit), "requirements": _requirements(result, cost_unit)}
+def add_calculator(book: Book, result: AllocationResult, header: Header, notes: Sequence[str]) -> None:
+    """Add the sheets ``answer``, ``drawing`` (to change and to print) and ``requirements`` (how the limits follow).
+
+    Parameters
+    ----------
+    book
+        It has no sheet yet.
+    result, header
+        The allocation, and what is said of its run.
+    notes
+        What must be said with the zones.
+    """
+    watched = _requirements(result, header.cost_unit)
+    add_answer(
+        book, result, header, dict(zip(map(str, watched["what"]), watched["predicted for the zones"], strict=True))
+    )
+    jointly = (_say("workbook_jointly"),) if result.chosen.jointly else ()
+    below = (*notes, *_without_weight(result), *jointly, _say("workbook_change"), _say("workbook_models"))
+    _add_drawing(book, result, _drawing(result, header.cost_unit), watched, below)
+    _add_requirements(book, watched)
 
 
 def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
@@ -229,7 +240,7 @@ def _requirements(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     scales, watched = f"drawing!$D${first}:$D${last}", []
     left, ask = f'COUNTIF({_HELD.format(first, last)},"no")', _say("workbook_ask")
     for at, side in enumerate(chosen.alone):
-        adds, spreads = (get_column_letter(_WEIGHTS + 2 * at + step) for step in (0, 1))
+        adds, spreads = (letter(_WEIGHTS + 2 * at + step) for step in (0, 1))
         load = (
             f"SUMPRODUCT(drawing!${adds}${first}:${adds}${last},{scales})"
             f"+SQRT(SUMPRODUCT((drawing!${spreads}${first}:${spreads}${last}*{scales})^2))"
@@ -256,84 +267,56 @@ def _requirements(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     return pd.DataFrame([*watched, {"what": f"cost [{cost_unit}]", "predicted for the zones": total}])
 
 
-def style_calculator(
-    result: AllocationResult, header: Header, sheets: Mapping[str, pd.DataFrame], notes: Sequence[str], path: Path
+def _add_drawing(
+    book: Book, result: AllocationResult, frame: pd.DataFrame, watched: pd.DataFrame, below: tuple[str, ...]
 ) -> None:
-    """Make the written sheets a drawing: the answer first, cells to change marked and guarded, cost and limits below.
-
-    Parameters
-    ----------
-    result, header
-        What the sheets were made of, and what is said of its run.
-    sheets
-        What `calculator_sheets` made of it.
-    notes
-        What must be said with the zones.
-    path
-        Workbook with these sheets, and others behind them.
-    """
-    workbook = load_workbook(path)
-    drawing, requirements = workbook["drawing"], workbook["requirements"]
-    _mark(result, drawing)
-    for row in range(_FIRST, requirements.max_row + 1):
-        is_fine = str(requirements.cell(row, 1).value).split(",")[0].endswith("[in]")
-        requirements.cell(row, 4).number_format = "0.000000" if is_fine else "0.000"
-        requirements.cell(row, 4).fill = _RESULT
-    values = {
-        name: {
-            f"{get_column_letter(column)}{row}": cell.value
-            for column, header in enumerate(frame.columns, start=1)
-            for row, cell in enumerate(frame[header], start=_FIRST)
-            if isinstance(cell, Formula) and cell.value is not None
-        }
-        for name, frame in sheets.items()
-    }
-    jointly = (_say("workbook_jointly"),) if result.chosen.jointly else ()
-    below = (*notes, *_without_weight(result), *jointly, _say("workbook_change"), _say("workbook_models"))
-    rows = len(sheets["drawing"])
-    values["drawing"] |= _below(drawing, sheets["requirements"], rows, below)
-    watched = sheets["requirements"]
-    shown = dict(zip(map(str, watched["what"]), watched["predicted for the zones"], strict=True))
-    values[NAME] = add_answer(workbook, result, header, shown)
-    drawing.freeze_panes = "C2"
-    drawing.print_area = f"A1:{get_column_letter(_WEIGHTS - 1)}{drawing.max_row}"
-    requirements.print_area = f"A1:E{requirements.max_row}"
-    requirements.column_dimensions["A"].width = _NAMES
-    for column in range(2, requirements.max_column + 1):
-        requirements.column_dimensions[get_column_letter(column)].width = 16  # a formula is longer than its number
-    for column in range(1, drawing.max_column + 1):
-        width = _WIDTHS[column - 1] if column < _WEIGHTS else 16
-        drawing.column_dimensions[get_column_letter(column)].width = width
-    for row in range(_FIRST, _FIRST + rows):
-        drawing.cell(row, 1).alignment = Alignment(wrap_text=True, vertical="top")
-        drawing.row_dimensions[row].height = _LINE * (1 + len(str(drawing.cell(row, 1).value)) // _NAMES)
-    drawing.row_dimensions[1].height = requirements.row_dimensions[1].height = 4 * _LINE
-    workbook.calculation.fullCalcOnLoad = True
-    workbook.save(path)
-    keep_values(path, values)
+    """Make a table a drawing: cells to change marked and guarded, cost, limits and notes below."""
+    sheet = book.table("drawing", frame)
+    _mark(result, sheet)
+    for row, name in enumerate(frame["group"], start=_FIRST):
+        sheet.cell(row, 1, **_WRAPPED)
+        sheet.height(row, _LINE * (1 + len(str(name)) // _NAMES))
+    _below(sheet, watched, len(frame), below)
+    sheet.height(1, 4 * _LINE)
+    for column in range(1, frame.shape[1] + 1):
+        sheet.width(column, _WIDTHS[column - 1] if column < _WEIGHTS else 16)
+    sheet.inner.freeze_panes(1, 2)
+    sheet.inner.print_area(f"A1:{letter(_WEIGHTS - 1)}{sheet.rows}")
 
 
-def _mark(result: AllocationResult, drawing: Worksheet) -> None:
+def _add_requirements(book: Book, watched: pd.DataFrame) -> None:
+    """Add the table of what the zones would keep, its results marked."""
+    sheet = book.table("requirements", watched)
+    for row in range(_FIRST, sheet.rows + 1):
+        is_fine = _is_in_inches(watched["what"].iloc[row - _FIRST])
+        sheet.cell(row, 4, num_format="0.000000" if is_fine else "0.000", **_RESULT)
+    sheet.width(1, _NAMES)
+    for column in range(2, watched.shape[1] + 1):
+        sheet.width(column, 16)  # a formula is longer than its number
+    sheet.height(1, 4 * _LINE)
+    sheet.inner.print_area(f"A1:E{sheet.rows}")
+
+
+def _mark(result: AllocationResult, drawing: Sheet) -> None:
     """Mark and guard the zones to change, and show what to write as a drawing does."""
-    guard = DataValidation(
-        type="decimal",
-        operator="between",
-        formula1=f"$E{_FIRST}",
-        formula2=f"$F{_FIRST}",
-        allow_blank=False,
-        showErrorMessage=True,
-        errorStyle="stop",
-    )
-    guard.errorTitle, guard.error = "zone", _say("workbook_guard")
-    drawing.add_data_validation(guard)
-    for row, name in enumerate(result.drawn.groups, start=_FIRST):
-        drawing.cell(row, 2).fill, drawing.cell(row, 2).border = _INPUT, Border(*[_EDGE] * 4)
-        guard.add(drawing.cell(row, 2))
-        drawing.cell(row, 4).number_format = "0.000"
-        drawing.cell(row, 11).number_format = _written_as(callout(_first_member(result, name)))
+    groups = result.drawn.groups
+    guard = {
+        "validate": "decimal",
+        "criteria": "between",
+        "minimum": f"=$E{_FIRST}",
+        "maximum": f"=$F{_FIRST}",
+        "ignore_blank": False,
+        "error_title": "zone",
+        "error_message": _say("workbook_guard"),
+    }
+    drawing.inner.data_validation(f"B{_FIRST}:B{_FIRST + len(groups) - 1}", guard)
+    for row, name in enumerate(groups, start=_FIRST):
+        drawing.cell(row, 2, **_INPUT)
+        drawing.cell(row, 4, num_format="0.000")
+        drawing.cell(row, 11, num_format=_written_as(callout(_first_member(result, name))))
     below = [*_further(result), *_others(result)]
-    for row, (_, members) in enumerate(below, start=_FIRST + len(result.drawn.groups)):
-        drawing.cell(row, 11).number_format = _written_as(callout(members[0]))
+    for row, (_, members) in enumerate(below, start=_FIRST + len(groups)):
+        drawing.cell(row, 11, num_format=_written_as(callout(members[0])))
 
 
 def _written_as(frame: FeatureFrame) -> str:
@@ -343,15 +326,15 @@ def _written_as(frame: FeatureFrame) -> str:
     return f'"{sign}"{number}' if sign else number
 
 
-def _below(drawing: Worksheet, watched: pd.DataFrame, rows: int, notes: tuple[str, ...]) -> dict[str, float | str]:
-    """Write cost, limits and notes below the drawing, and return what the formulas there give."""
-    start, values = _FIRST + rows + 1, dict[str, float | str]()
+def _below(drawing: Sheet, watched: pd.DataFrame, rows: int, notes: tuple[str, ...]) -> None:
+    """Write cost, limits and notes below the drawing."""
+    start = _FIRST + rows + 1
     for column, header in enumerate(("what", "limit", "predicted", "kept"), start=1):
-        drawing.cell(start, column, header).font = Font(bold=True)
+        drawing.cell(start, column, header, bold=True)
     for at, own in enumerate(watched.to_dict("records")):
         row, there = start + 1 + at, _FIRST + at
-        drawing.cell(row, 1, str(own["what"])).alignment = Alignment(wrap_text=True, vertical="top")
-        drawing.row_dimensions[row].height = _LINE * (1 + len(str(own["what"])) // _NAMES)
+        drawing.cell(row, 1, str(own["what"]), **_WRAPPED)
+        drawing.height(row, _LINE * (1 + len(str(own["what"])) // _NAMES))
         for column, place, held in (
             (2, "B", own["limit"]),
             (3, "D", own["predicted for the zones"]),
@@ -359,13 +342,16 @@ def _below(drawing: Worksheet, watched: pd.DataFrame, rows: int, notes: tuple[st
         ):
             value = held.value if isinstance(held, Formula) else held
             if isinstance(value, str) or (value is not None and value == value):
-                cell = drawing.cell(row, column, f"=requirements!{place}{there}")
-                cell.number_format = "0.000000" if str(own["what"]).split(",")[0].endswith("[in]") else "0.00"
-                cell.fill = _RESULT
-                values[cell.coordinate] = value
-    for row, text in enumerate(notes, start=drawing.max_row + 2):
-        drawing.cell(row, 1, text).font = Font(italic=True)
-    return values
+                shown = Formula(f"=requirements!{place}{there}", value)
+                shown_as = "0.000000" if _is_in_inches(own["what"]) else "0.00"
+                drawing.cell(row, column, shown, num_format=shown_as, **_RESULT)
+    for row, text in enumerate(notes, start=drawing.rows + 2):
+        drawing.cell(row, 1, text, italic=True)
+
+
+def _is_in_inches(what: object) -> bool:
+    """Return whether what is watched is an output in inches, whose limits need more decimals."""
+    return str(what).split(",")[0].endswith("[in]")
 
 
 @singledispatch
