@@ -11,7 +11,7 @@ from tolalloc.allocation.result import AllocationResult, limit_price, limit_step
 from tolalloc.allocation.search.candidates import ALONE
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
 from tolalloc.allocation.space.joint_yield import JointRequirement
-from tolalloc.allocation.space.requirement import AtYield, Guarantee, OwnLimit, Requirement
+from tolalloc.allocation.space.requirement import AtYield, Guarantee, OwnLimit
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.capability.indices import capability
 from tolalloc.capability.monte_carlo import Yield
@@ -153,27 +153,22 @@ def zones_changed(result: AllocationResult) -> tuple[str, ...]:
     return (_say("zones_changed", changed="; ".join(said)),)
 
 
-def own_limit(asked: Requirement) -> str:
-    """Return that a limit is the model's own, where nobody wrote it."""
-    return _say("own_limit") if isinstance(asked, OwnLimit) else ""
-
-
 def today_values(result: AllocationResult) -> tuple[str, ...]:
     """Return what the numbers beside the limits are, and how many units keep the drawing as it is."""
     today = result.free.baseline
     several = len(result.requirements) > 1
     kept = today.joint if several else today.achieved
-    return (
-        _say(
-            "today_values",
-            simulated=portrait_of(result.model).simulated,
-            share=kept.estimate,
-            low=100 * kept.low,
-            high=kept.high,
-            units=kept.units,
-            limits=_say("today_all" if several else "today_one"),
-        ),
+    said = _say(
+        "today_values",
+        simulated=portrait_of(result.model).simulated,
+        share=kept.estimate,
+        low=100 * kept.low,
+        high=kept.high,
+        units=kept.units,
+        limits=_say("today_all" if several else "today_one"),
     )
+    names = [short(own.output) for own in result.requirements if isinstance(own, OwnLimit)]
+    return (said, *((_say("own_limit", names=" and ".join(names)),) if names else ()))
 
 
 def drawn_amounts(result: AllocationResult) -> tuple[str, ...]:

@@ -21,7 +21,7 @@ from tolalloc.reading.units import unit_of
 from tolalloc.reports.columns import Column, Table
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
-from tolalloc.reports.tellers.allocation_sentences import designs, own_limit, searches
+from tolalloc.reports.tellers.allocation_sentences import designs, searches
 from tolalloc.reports.wording import quantity, short
 
 _Limited = tuple[int, OneSidedConstraint, Check]
@@ -103,7 +103,7 @@ def today_table(result: AllocationResult, cost_unit: str) -> Table[_Compared]:
         uses = price * drawn.scale > _BINDS * after.cost and not (after.jointly and share == 1.0)
         rows.append(
             _Compared(
-                name=f"{portrait.display_name(asked.output)}{own_limit(asked)} [{unit_of(asked.output)}]",
+                name=f"{portrait.display_name(asked.output)} [{unit_of(asked.output)}]",
                 shown="" if after.jointly else asked.guarantee.words,
                 limit=f"{'≤' if drawn.sign > 0 else '≥'} {drawn.limit:.4g}",
                 before=side.value,
