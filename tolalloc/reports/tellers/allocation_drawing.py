@@ -42,7 +42,7 @@ _STEP = 0.1
 _NOTICED = 10.0
 """Tightening from which a shop is asked whether it holds a zone [%]."""
 
-_EFFECTS = 6
+_EFFECTS = 4
 """Dimensions whose effect is drawn, the largest first [-]."""
 
 _Source = tuple[Source, Source]
@@ -218,7 +218,7 @@ def effects_figure(result: AllocationResult) -> tuple[Figure, ...]:
         title=_say(key, output=short(result.leading), kept=kept, target=getattr(guarantee, "target", None)),
         x_label=f"change of {result.leading}",
         series=(
-            Series(label=f"by {_STEP:.0%} of it", kind="bars", x=names, y=list(largest.values())),
+            Series(label=f"by {_STEP * 100:.0f} %", kind="bars", x=names, y=list(largest.values())),
             Series(label="by 1 µm", kind="bars", x=names, y=[each[name] for name in names]),
         ),
         vertical=((0.0, ""),),
