@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Field, model_validator
 
 from tolalloc.drawings.distributions import Distribution, batches_text, parsed_batches, require_shape
-from tolalloc.drawings.measured_parts import MeasuredParts, load_measured_parts
+from tolalloc.drawings.measured_parts import MadeTo, MeasuredParts, load_measured_parts
 from tolalloc.drawings.sources import Source, is_angular
 from tolalloc.drawings.table_file import usual_signs
 from tolalloc.drawings.zones import Feature, parsed_spectrum, parsed_systematic, spectrum_text, systematic_text
@@ -160,9 +160,10 @@ class ToleranceRow(Record):
     measured: Annotated[
         str,
         Column(
-            "CSV of at least 20 measured parts beside the table (`deviation [µm]`; of a position `x [µm],y [µm]` or "
-            "`radius [µm]`); distribution `empirical`",
-            write=lambda source: source.measured.path if source.measured else None,
+            "file of at least 20 measured parts beside the table; distribution `empirical`. A CSV (`deviation [µm]` or "
+            "`mean [µm],sigma [µm],parts`; of a position `x [µm],y [µm]` or `radius [µm]`), or a Q-DAS file, with one "
+            "of its characteristics behind a colon: `parts.dfq:Diameter`",
+            write=lambda source: source.measured.named_file if source.measured else None,
         ),
     ] = ""
     measured_zone: Annotated[
@@ -432,7 +433,8 @@ class ToleranceRow(Record):
         if not self.measured:
             return None
         zone = (self.measured_zone or self.zone) * (UNITS[self.unit] * MICROMETRE)
-        return load_measured_parts((folder / self.measured).resolve(), self.feature, zone, middle)
+        made_to = MadeTo(feature=self.feature, zone=zone, middle=middle, nominal=self.nominal * MILLIMETRE)
+        return load_measured_parts((folder / self.measured).resolve(), made_to)
 
 
 COLUMNS = {
