@@ -7,17 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from pathlib import Path
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
 from tolalloc.capability.indices import Limits
-from tolalloc.drawings.distributions import Distribution
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.measured_parts import MeasuredParts, StatedProcess
+from tolalloc.drawings.measured_parts import MeasuredParts
 from tolalloc.drawings.seeds import CHUNK, SamplingDesign, uniform_chunks
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
@@ -43,12 +41,29 @@ class Yield:
     # Numbers of units [-]
     units: int
     rejected: int
-    # What measured parts leave open of their processes, which the interval holds too; none without measured parts
-    doubt: ProcessDoubt | None = None
+    widening: Widening | None = None  # Why the interval is wider than these units alone make it, if it is
 
     def doubted(self, doubt: ProcessDoubt | None, limits: Limits) -> Yield:
         """Return the yield with an interval that also holds what measured parts leave open, if any do."""
-        return doubt.widened(self, limits) if doubt else self
+        return Widening(doubt=doubt, limits=limits, counted=self).found if doubt else self
+
+
+@dataclass(frozen=True, kw_only=True)
+class Widening:
+    """What an interval of a yield holds beside the error of counted units."""
+
+    doubt: ProcessDoubt  # What measured parts leave open
+    limits: Limits  # Limits that the yield is of [output]
+    counted: Yield  # Yield of the units alone
+
+    @property
+    def found(self) -> Yield:
+        """The yield with both."""
+        return replace(self.doubt.widened(self.counted, self.limits), widening=self)
+
+    def with_parts(self, least: int) -> Yield:
+        """Return the yield that so many measured parts of every source would leave, were they like these."""
+        return replace(self, doubt=self.doubt.with_parts(least)).found
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,8 +163,8 @@ def proportion(units: int, rejected: int) -> Yield:
     )
 
 
-_PROCESSES = 4000
-"""Processes that are drawn of those that measured parts leave possible [-]."""
+_PROCESSES = 12
+"""Logarithm to base 2 of the processes that are drawn of those that measured parts leave possible [-]."""
 _LEAST_VARIANCE = 0.01
 """Least variance of an output over that of the units: its parts are estimates, which may fall below zero [-]."""
 _COUNTED = 30
@@ -184,6 +199,7 @@ class ProcessDoubt:
     An output that is the measured size itself, with 20 parts of σ = 1: 99.73 % keep 2.78 as far as the parts say, and
     with 95 % confidence 3.9; the tables of one-sided tolerance limits say so, too. With 200 parts they keep 3.1.
 
+    >>> from tolalloc.capability.experiment import measured_size
     >>> errors, x = measured_size(parts=20), np.random.default_rng(1).standard_normal((50_000, 1))
     >>> doubt, limits = ProcessDoubt.of(errors, x, x[:, 0]), Limits(upper=4.0)
     >>> [round(2.78 + own.margin(limits, 0.0027), 1) for own in (doubt, doubt.with_parts(200))]
@@ -253,14 +269,8 @@ class ProcessDoubt:
     @cached_property
     def _moments(self) -> tuple[Float[np.ndarray, " process"], Float[np.ndarray, " process"]]:
         """By how much the mean is off that of the units [output], and standard deviations over theirs [-]."""
-        from scipy.special import gammaincinv, ndtri
-
-        uniform = np.random.default_rng(1).random((2, _PROCESSES, len(self.parts)))
-        counts = np.array(self.parts, float)
-        freedom = np.where([own.are_radii for own in self.measured], 2.0 * counts, counts - 1.0)
-        wider = np.sqrt(freedom / (2.0 * gammaincinv(freedom / 2.0, uniform[0])))
-        shift = (wider * ndtri(uniform[1]) / np.sqrt(counts)) @ self.by_mean
-        mean = shift + (wider**2 - 1.0) @ self.mean_by_spread
+        wider, shift = _possible_processes(self.parts, tuple(own.are_radii for own in self.measured))
+        mean = shift @ self.by_mean + (wider**2 - 1.0) @ self.mean_by_spread
         variance = 1.0 + (wider**2 - 1.0) @ self.variance_by_spread / self.values.var()
         return mean, np.sqrt(np.maximum(variance, _LEAST_VARIANCE))
 
@@ -334,42 +344,29 @@ class ProcessDoubt:
         -----
         The error of counted units beside it is drawn from Jeffreys' posterior of a share (Brown, Cai & DasGupta 2001).
         """
-        from scipy.special import betaincinv
-
         rejected = 1.0 - found.estimate
         # Of none that are beyond the limits, half of one: so much the middle of what is possible.
         shares = self.shares(limits, max(rejected, 0.5 / found.units))
-        uniform = np.random.default_rng(2).random(shares.size)
-        drawn = betaincinv(found.units * shares + 0.5, found.units * (1.0 - shares) + 0.5, uniform)
+        drawn = np.random.default_rng(2).beta(found.units * shares + 0.5, found.units * (1.0 - shares) + 0.5)
         tail = (1.0 - CONFIDENCE) / 2.0
         least, most, bound = np.quantile(1.0 - drawn, [tail, 1.0 - tail, 1.0 - CONFIDENCE]).tolist()
-        return replace(
-            found, low=min(found.low, least), high=max(found.high, most), bound=min(found.bound, bound), doubt=self
-        )
+        return replace(found, low=min(found.low, least), high=max(found.high, most), bound=min(found.bound, bound))
 
 
-def measured_size(parts: int) -> ErrorModel:
-    """Return the error model of one size whose measured parts have mean 0 and σ = 1, for worked numbers [m]."""
-    made = MeasuredParts(
-        path=Path("parts.csv"),
-        values=(),
-        are_radii=False,
-        zone=6.0,
-        middle=0.0,
-        stated=StatedProcess(mean=0.0, deviation=1.0, parts=parts),
-    )
-    source = Source(
-        name="x1",
-        part="part",
-        feature=Feature.SIZE,
-        zone=6.0,
-        minimum=0.6,
-        maximum=60.0,
-        cost=1.0,
-        distribution=Distribution.EMPIRICAL,
-        measured=made,
-    )
-    return ErrorModel((source,))
+@lru_cache(maxsize=64)
+def _possible_processes(
+    parts: tuple[int, ...], are_radii: tuple[bool, ...]
+) -> tuple[Float[np.ndarray, "process source"], Float[np.ndarray, "process source"]]:
+    """Return σ/s and (μ − x̄)/s of processes that so many parts leave possible, the same for the same numbers [-]."""
+    from scipy.special import gammaincinv, ndtri
+    from scipy.stats import qmc
+
+    points = qmc.Sobol(2 * len(parts), rng=np.random.default_rng(1)).random_base2(_PROCESSES)
+    uniform = np.clip(points, np.finfo(float).eps, None).reshape(-1, 2, len(parts)).swapaxes(0, 1)
+    counts = np.array(parts, float)
+    freedom = np.where(are_radii, 2.0 * counts, counts - 1.0)
+    wider = np.sqrt(freedom / (2.0 * gammaincinv(freedom / 2.0, uniform[0])))
+    return wider, np.where(are_radii, 0.0, wider * ndtri(uniform[1]) / np.sqrt(counts))
 
 
 def allowed_rejections(units: int, target: float, confidence: float = CONFIDENCE) -> int:
