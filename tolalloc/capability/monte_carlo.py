@@ -17,7 +17,6 @@ from tolalloc.capability.indices import Limits
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.measured_parts import MeasuredParts
 from tolalloc.drawings.seeds import CHUNK, SamplingDesign, uniform_chunks
-from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import FailedUnitsError
 from tolalloc.models.model import Evaluation, Response
@@ -605,6 +604,8 @@ def largest_excess(
     values: Mapping[str, Float[np.ndarray, " unit"]], limits: Mapping[str, Limits]
 ) -> Float[np.ndarray, " unit"]:
     """Return how far every unit lies beyond any of its limits at most, over the standard deviation of the output [-].
+
+    max over outputs and sides of sign·(y − limit)/σ, own derivation; it is above 0 where a unit fails.
 
     Examples
     --------

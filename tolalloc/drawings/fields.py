@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Field, model_validator
 
 from tolalloc.drawings.distributions import Distribution, batches_text, parsed_batches, require_shape
-from tolalloc.drawings.measured_parts import MadeTo, MeasuredParts, load_measured_parts
+from tolalloc.drawings.measured_parts import MadeTo, MeasuredParts, load_measured_parts, named_file
 from tolalloc.drawings.sources import Source, is_angular
 from tolalloc.drawings.table_file import usual_signs
 from tolalloc.drawings.zones import Feature, parsed_spectrum, parsed_systematic, spectrum_text, systematic_text
@@ -44,8 +44,8 @@ UNITS = {"µm": 1.0, "um": 1.0, "mm": 1000.0}
 ALLOWED_UNITS = "µm, um or mm"
 """`UNITS` in a sentence."""
 
-Cell = str | int | float | Path | None
-"""What a source writes: a flag as yes or no, a path as seen from the table, nothing as an empty cell."""
+Cell = str | int | float | MeasuredParts | None
+"""What a source writes: a flag as yes or no, a file as seen from the table, nothing as an empty cell."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ class ToleranceRow(Record):
             "file of at least 20 measured parts beside the table; distribution `empirical`. A CSV (`deviation [µm]` or "
             "`mean [µm],sigma [µm],parts`; of a position `x [µm],y [µm]` or `radius [µm]`), or a Q-DAS file, with one "
             "of its characteristics behind a colon: `parts.dfq:Diameter`",
-            write=lambda source: source.measured.named_file if source.measured else None,
+            write=lambda source: source.measured,
         ),
     ] = ""
     measured_zone: Annotated[
@@ -434,7 +434,8 @@ class ToleranceRow(Record):
             return None
         zone = (self.measured_zone or self.zone) * (UNITS[self.unit] * MICROMETRE)
         made_to = MadeTo(feature=self.feature, zone=zone, middle=middle, nominal=self.nominal * MILLIMETRE)
-        return load_measured_parts((folder / self.measured).resolve(), made_to)
+        file, characteristic = named_file(self.measured)
+        return load_measured_parts((folder / file).resolve(), made_to, characteristic)
 
 
 COLUMNS = {

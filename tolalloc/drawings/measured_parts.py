@@ -168,11 +168,6 @@ class MeasuredParts:
             f"{self.zone / MICROMETRE:.3g} µm that they were made to"
         )
 
-    @property
-    def named_file(self) -> Path:
-        """The file as a table names it, with the characteristic behind a colon where one was named."""
-        return self.path.with_name(f"{self.path.name}:{self.characteristic}") if self.characteristic else self.path
-
     @cached_property
     def fit(self) -> MeasuredFit:
         """What the parts say about the process."""
@@ -259,21 +254,31 @@ class MadeTo:
     nominal: float = 0.0
 
 
-def load_measured_parts(path: Path, made_to: MadeTo) -> MeasuredParts:
+def named_file(text: str) -> tuple[str, str]:
+    """Return the file that a table names, and the characteristic of a Q-DAS file behind a colon.
+
+    >>> named_file("cmm/parts.dfq:Ø 5/8"), named_file("parts.csv")
+    (('cmm/parts.dfq', 'Ø 5/8'), ('parts.csv', ''))
+    """
+    found = _AQDEF.fullmatch(text)
+    return (found[1], (found[2] or "").strip()) if found else (text, "")
+
+
+def load_measured_parts(path: Path, made_to: MadeTo, characteristic: str = "") -> MeasuredParts:
     """Return the parts of a file.
 
     A CSV file has a column ``deviation [µm]`` for a size, or one row of ``mean [µm]``, ``sigma [µm]``, ``parts``; of a
     position ``x [µm]`` and ``y [µm]`` or ``radius [µm]``; all from the nominal place. A file of Q-DAS (AQDEF)
     ends in ``.dfq``, or in ``.dfd`` with its values in the ``.dfx`` beside it; one of several characteristics is named
-    behind a colon, ``parts.dfq:Diameter``, by its number (K2001) or its name (K2002).
+    by its number (K2001) or its name (K2002).
 
     Raises
     ------
     InputError, UnknownNameError
         The file, row, column or field and value that are not allowed, or there are too few parts.
     """
-    if named := _AQDEF.fullmatch(path.name):
-        return _of_characteristic(path.with_name(named[1]), named[2] or "", made_to)
+    if _AQDEF.fullmatch(path.name):
+        return _of_characteristic(path, characteristic, made_to)
     table = read_text_table(path)
     names = tuple(split_header(header)[0] for header in table.headers)
     layouts = _LAYOUTS[made_to.feature]
@@ -529,6 +534,8 @@ def _require_limits(where: str, own: _Characteristic, factor: float, nominal: fl
         if not written or expected is None:
             continue
         found = _aqdef_number(own.fields[written]) * factor - (nominal if written == limit else 0.0)
-        if not abs(found - expected) <= 1e3 * _SAME:
+        if not isfinite(found):
+            raise InputError.at(where, f"the {side} limit ({written})", own.fields[written], "a number")
+        if abs(found - expected) > 1e3 * _SAME:
             allowed = f"{expected:+g} µm, as the row has it (measured_zone states another zone that they were made to)"
             raise InputError.at(where, f"the {side} limit ({written})", f"{found:+g} µm from nominal", allowed)
