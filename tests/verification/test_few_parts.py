@@ -83,6 +83,35 @@ def test_radii_leave_their_spread_open_with_twice_as_many_degrees_and_no_mean():
     assert found == pytest.approx(np.quantile(NORMAL[:, 0], TARGET) * (wider - 1), rel=0.06)
 
 
+BENT = {
+    "range of twelve like sizes": lambda x: np.ptp(x[:, 2:], axis=1),
+    "length of a position": lambda x: np.hypot(x[:, 0], x[:, 1]),
+    "product": lambda x: (5.0 + x[:, 2]) * (5.0 + x[:, 3:].mean(axis=1)),
+}
+
+
+@pytest.mark.parametrize("name", BENT)
+def test_margin_of_bent_outputs_is_near_that_of_processes_that_are_drawn_again(name):
+    generator, parts = np.random.default_rng(12), 20
+    radii = np.hypot(*generator.normal(size=(2, parts)))
+    radii /= np.sqrt((radii**2).mean() / 2)
+    made = MeasuredParts(path=Path("p"), values=tuple(radii), are_radii=True, zone=6.0, middle=0.0)
+    size = measured_size(parts).sources[0]
+    place = replace(size, name="place", feature=Feature.POSITION, measured=made)
+    errors = ErrorModel((place, replace(size, name="size", each=12)))
+    x, output = generator.standard_normal((8000, 14)), BENT[name]
+    quantile = float(np.quantile(output(x), TARGET))
+    margin = ProcessDoubt.of(errors, x, output(x)).margin(Limits(upper=quantile), 1 - TARGET)
+    found = []
+    for _ in range(200):
+        wider = np.sqrt(2 * parts / generator.chisquare(2 * parts)), np.sqrt(19 / generator.chisquare(19))
+        shift = wider[1] * generator.normal() / np.sqrt(parts)
+        again = np.concatenate([x[:, :2] * wider[0], x[:, 2:] * wider[1] + shift], axis=1)
+        found.append(float(np.quantile(output(again), TARGET)))
+    held = np.mean(np.array(found) <= quantile + margin)
+    assert 0.95 - 2 * np.sqrt(0.95 * 0.05 / 200) <= held < 1.0
+
+
 def test_interval_of_a_yield_holds_units_and_processes():
     counted = proportion(30_000, 81)
     found = counted.doubted(doubt_of_size(20), Limits(upper=2.78))
