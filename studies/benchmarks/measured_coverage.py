@@ -31,6 +31,7 @@ from tolalloc.capability.indices import Limits
 from tolalloc.drawings.distributions import Distribution
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.measured_parts import MeasuredParts
+from tolalloc.drawings.seeds import SeedTree
 
 TARGET = 0.9973
 UNITS = 4096  # random units of every verification
@@ -71,8 +72,9 @@ CASES = (
 )
 
 
-def verifier(case: Case, generator: np.random.Generator, parts: int) -> Verifier:
-    """Return what verifies drawings of the case with so many parts."""
+def verifier(case: Case, number: int, parts: int) -> Verifier:
+    """Return what verifies drawings of the case with a set of so many parts, on units of its own."""
+    generator = np.random.default_rng([parts, number])
     found = verifier_of_sum(*case.zones, limit=1.0, guarantee=AtYield(TARGET))
     sources = list(found.space.errors.sources)
     for at, (mean, deviation) in enumerate(case.processes[: case.measured]):
@@ -82,17 +84,17 @@ def verifier(case: Case, generator: np.random.Generator, parts: int) -> Verifier
         sources[at] = replace(sources[at], distribution=Distribution.EMPIRICAL, measured=made)
     requirement = replace(found.requirements[0], limits=case.limits)
     space = replace(found.space, errors=ErrorModel(tuple(sources)))
-    return replace(found, space=space, requirements=(requirement,), units=UNITS)
+    return replace(found, space=space, requirements=(requirement,), units=UNITS, seeds=SeedTree(number))
 
 
 def just_met(own: Verifier) -> VerifiedDesign:
     """Return the drawing of one factor of all zones that is just met; what is compared with a limit goes with it."""
-    scale, design = 1.0, own.verify(own.space.uniform(1.0), "as drawn")
-    for step in range(3):
+    scale, design = 1.0, own.verify(own.space.uniform(1.0), "first")
+    for step in range(2):
         scale /= 1 + max(design.blocking.tightest.excess / own.limit, -0.9)
         design = own.verify(own.space.uniform(scale), f"step {step}")
     while not design.met:
-        scale *= 0.998
+        scale *= 0.995
         design = own.verify(own.space.uniform(scale), f"inwards to {scale}")
     return design
 
@@ -126,7 +128,7 @@ def main() -> None:
         for parts in chosen.parts:
             held, inside, plain, margins, costs = [], [], [], [], []
             for number in range(chosen.sets):
-                own, known = verifier(case, np.random.default_rng([parts, number]), parts), np.array(case.zones)
+                own, known = verifier(case, number, parts), np.array(case.zones)
                 design = make(own)
                 held.append(not design.met or case.share(own.space.zones(design.design) * 1e3) >= TARGET)
                 drawn = own.verify(own.space.uniform(1.0), "drawn").achieved
