@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Generic, TypeVar
 
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.drawings.distributions import Distribution
 from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.measured_parts import MeasuredParts, StatedProcess
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
@@ -109,3 +112,36 @@ def sum_of_sizes(*zones: float, seed: int = 1) -> Experiment[SumOfSizes]:
         )
     )
     return Experiment.of(SumOfSizes(errors.columns), errors, SeedTree(seed))
+
+
+def measured_size(parts: int) -> ErrorModel:
+    """Return the error model of one size whose measured parts have mean 0 and σ = 1, for worked numbers [m].
+
+    Half its zone is 3σ (own derivation).
+
+    Examples
+    --------
+    >>> (source,) = measured_size(parts=20).sources
+    >>> source.measured.parts, round(source.measured.cp, 12)
+    (20, 1.0)
+    """
+    made = MeasuredParts(
+        path=Path("parts.csv"),
+        values=(),
+        are_radii=False,
+        zone=6.0,
+        middle=0.0,
+        stated=StatedProcess(mean=0.0, deviation=1.0, parts=parts),
+    )
+    source = Source(
+        name="x1",
+        part="part",
+        feature=Feature.SIZE,
+        zone=6.0,
+        minimum=0.6,
+        maximum=60.0,
+        cost=1.0,
+        distribution=Distribution.EMPIRICAL,
+        measured=made,
+    )
+    return ErrorModel((source,))

@@ -1,16 +1,23 @@
-"""Monte Carlo: random units, their yield and its confidence, limits of any side, and changes on the same units."""
+"""Monte Carlo: random units, their yield and its confidence, limits of any side, and changes on the same units.
+
+What few measured parts leave open of their processes widens the interval of a yield (`ProcessDoubt`).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
 from tolalloc.capability.indices import Limits
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.measured_parts import MeasuredParts
 from tolalloc.drawings.seeds import CHUNK, SamplingDesign, uniform_chunks
+from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import FailedUnitsError
 from tolalloc.models.model import Evaluation, Response
 
@@ -33,6 +40,29 @@ class Yield:
     # Numbers of units [-]
     units: int
     rejected: int
+    widening: Widening | None = None  # Why the interval is wider than these units alone make it, if it is
+
+    def doubted(self, doubt: ProcessDoubt | None, limits: Limits) -> Yield:
+        """Return the yield with an interval that also holds what measured parts leave open, if any do."""
+        return Widening(doubt=doubt, limits=limits, counted=self).found if doubt else self
+
+
+@dataclass(frozen=True, kw_only=True)
+class Widening:
+    """What an interval of a yield holds beside the error of counted units."""
+
+    doubt: ProcessDoubt  # What measured parts leave open
+    limits: Limits  # Limits that the yield is of [output]
+    counted: Yield  # Yield of the units alone
+
+    @property
+    def found(self) -> Yield:
+        """The yield with both."""
+        return replace(self.doubt.widened(self.counted, self.limits), widening=self)
+
+    def with_parts(self, least: int) -> Yield:
+        """Return the yield that so many measured parts of every source would leave, were they like these."""
+        return replace(self, doubt=self.doubt.with_parts(least)).found
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,6 +160,212 @@ def proportion(units: int, rejected: int) -> Yield:
         units=units,
         rejected=rejected,
     )
+
+
+_PROCESSES = 12
+"""Logarithm to base 2 of the processes that are drawn of those that measured parts leave possible [-]."""
+_LEAST_VARIANCE = 0.01
+"""Least variance of an output over that of the units: its parts are estimates, which may fall below zero [-]."""
+_COUNTED = 30
+"""Units beyond the limits from which shares are counted; of fewer the output is taken for normal [-]."""
+_HALVINGS = 40
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProcessDoubt:
+    """What measured parts leave open of their processes, and what that does to one output.
+
+    Notes
+    -----
+    Mean and standard deviation of a process behind n parts are drawn from their posterior under the prior 1/σ²: σ = s·r
+    with r² = ν/χ²_ν, and μ = x̄ + σ·z/√n, where ν = n − 1; radii about a known centre have ν = 2n and no μ. Units are
+    drawn with x̄ and s. With the processes the output has
+
+    mean M + Σ aᵢ·rᵢ·zᵢ/√nᵢ + Σ dᵢ·(rᵢ² − 1) and variance V + Σ vᵢ·(rᵢ² − 1),
+
+    and the shape that the units show. The effects a, d and v of all columns of a source are regressed on these units:
+    the output and its squared deviation on Σx̃ and Σ(x̃² − 1), x̃ the standardised deviations. For an output that is
+    linear in the deviations this is exact; the second order of μ is left out (own derivation).
+
+    Valid for normal processes. Parts that refute that keep their shape.
+
+    References
+    ----------
+    Gelman et al., Bayesian Data Analysis, 3rd ed. (2014), section 3.2: the posterior.
+
+    Examples
+    --------
+    An output that is the measured size itself, with 20 parts of σ = 1: 99.73 % keep 2.78 as far as the parts say, and
+    with 95 % confidence 3.9; the tables of one-sided tolerance limits say so, too. With 200 parts they keep 3.1.
+
+    >>> from tolalloc.capability.experiment import measured_size
+    >>> errors, x = measured_size(parts=20), np.random.default_rng(1).standard_normal((50_000, 1))
+    >>> doubt, limits = ProcessDoubt.of(errors, x, x[:, 0]), Limits(upper=4.0)
+    >>> [round(2.78 + own.margin(limits, 0.0027), 1) for own in (doubt, doubt.with_parts(200))]
+    [3.9, 3.1]
+    """
+
+    values: Float[np.ndarray, " good"]  # The output of the units that have one, ascending [output]
+    measured: tuple[MeasuredParts, ...]  # Parts behind each source
+    parts: tuple[int, ...]  # Their numbers, or what others there might be [-]
+    by_mean: Float[np.ndarray, " source"]  # Effect of a mean off by a standard deviation, a [output]
+    # Effect of a squared ratio of standard deviations on mean and variance, d [output] and v [output²]
+    mean_by_spread: Float[np.ndarray, " source"]
+    variance_by_spread: Float[np.ndarray, " source"]
+
+    @classmethod
+    def of(
+        cls, errors: ErrorModel, x: Float[np.ndarray, "sample column"], values: Float[np.ndarray, " sample"]
+    ) -> ProcessDoubt | None:
+        """Return the doubt about an output, none where no part was measured or the output does not vary.
+
+        Parameters
+        ----------
+        errors
+            The sources.
+        x
+            Deviations of random units [m, angles rad].
+        values
+            The output of these units, not a number where one has none [output].
+        """
+        pairs = zip(errors.active, errors.columns_of_source, strict=False)
+        sources = [(source, own) for source, own in pairs if source.measured]
+        good = np.isfinite(values)
+        if not sources or np.count_nonzero(good) <= 4 * len(sources) or not np.ptp(values[good]) > 0.0:
+            return None
+        known, squares, means, counts = values[good], list[np.ndarray](), list[np.ndarray](), list[int]()
+        for source, own in sources:
+            standard = x[good][:, own]
+            standard = (standard - standard.mean(axis=0)) / standard.std(axis=0)
+            squares.append((standard**2 - 1.0).sum(axis=1))
+            means.append(standard.sum(axis=1) if source.feature is Feature.SIZE else np.zeros(known.size))
+            counts.append(standard.shape[1])
+        features = np.stack([*means, *squares], axis=1)
+        centred = features - features.mean(axis=0)
+        off = known - known.mean()
+        both = np.stack([off, off**2 - (off**2).mean()], axis=1)
+        effects = np.linalg.lstsq(centred.T @ centred, centred.T @ both, rcond=None)[0]
+        effects *= np.tile(counts, 2)[:, np.newaxis]
+        parts = tuple(source.measured for source, _ in sources if source.measured)
+        return cls(
+            values=np.sort(known),
+            measured=parts,
+            parts=tuple(own.parts for own in parts),
+            by_mean=effects[: len(sources), 0],
+            mean_by_spread=effects[len(sources) :, 0],
+            variance_by_spread=np.maximum(effects[len(sources) :, 1], 0.0),
+        )
+
+    @classmethod
+    def about(cls, errors: ErrorModel, x: Float[np.ndarray, "sample column"]) -> Doubting | None:
+        """Return what tells of an output of random units what is left open of it, none where no part was measured."""
+        return partial(cls.of, errors, x) if any(source.measured for source in errors.active) else None
+
+    def with_parts(self, least: int) -> ProcessDoubt:
+        """Return the doubt that so many parts of every source would leave, or more where more were measured."""
+        return replace(self, parts=tuple(max(own, least) for own in self.parts))
+
+    @cached_property
+    def _moments(self) -> tuple[Float[np.ndarray, " process"], Float[np.ndarray, " process"]]:
+        """By how much the mean is off that of the units [output], and standard deviations over theirs [-]."""
+        wider, shift = _possible_processes(self.parts, tuple(own.are_radii for own in self.measured))
+        mean = shift @ self.by_mean + (wider**2 - 1.0) @ self.mean_by_spread
+        variance = 1.0 + (wider**2 - 1.0) @ self.variance_by_spread / self.values.var()
+        return mean, np.sqrt(np.maximum(variance, _LEAST_VARIANCE))
+
+    def _beyond(
+        self, limits: Limits, excess: Float[np.ndarray, " process"], moments: tuple[np.ndarray, np.ndarray]
+    ) -> Float[np.ndarray, " process"]:
+        """Return the share of units that lie further beyond the limits than so far, process by process [-]."""
+        (moved, wider), centre, beyond = moments, self.values.mean(), np.zeros(moments[0].size)
+        for sign, limit in limits.turned:
+            at = centre + (limit + sign * excess - centre - moved) / wider
+            below = np.searchsorted(self.values, at, side="right" if sign > 0 else "left")
+            beyond += self.values.size - below if sign > 0 else below
+        return beyond / self.values.size
+
+    def _excess(
+        self, limits: Limits, share: float, moments: tuple[np.ndarray, np.ndarray]
+    ) -> Float[np.ndarray, " process"]:
+        """Return how far beyond the limits a share of the units lies, process by process; by halving [output]."""
+        (moved, wider), centre = moments, self.values.mean()
+        ends = [sign * (centre + moved - limit) for sign, limit in limits.turned]
+        reach = wider * np.abs(self.values[[0, -1]] - centre).max()
+        low, high = np.min(ends, axis=0) - reach, np.max(ends, axis=0) + reach
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2.0
+            kept = self._beyond(limits, middle, moments) <= share
+            low, high = np.where(kept, low, middle), np.where(kept, middle, high)
+        return np.asarray(high)
+
+    def margin(self, limits: Limits, share: float) -> float:
+        """Return how much further inside the limits units must lie so that the share beyond is kept [output].
+
+        With 95 % of the processes that the parts leave possible.
+        """
+        own = self._excess(limits, share, (np.zeros(1), np.ones(1)))[0]
+        return max(float(np.quantile(self._excess(limits, share, self._moments), CONFIDENCE) - own), 0.0)
+
+    def margin_of_spread(self, sign: int, spread: float) -> float:
+        """Return by how much mean + spread·σ may lie further out, with 95 % of the possible processes [output]."""
+        moved, wider = self._moments
+        further = sign * moved + spread * self.values.std() * (wider - 1.0)
+        return max(float(np.quantile(further, CONFIDENCE)), 0.0)
+
+    def shares(self, limits: Limits, share: float) -> Float[np.ndarray, " process"]:
+        """Return the share of units beyond the limits for every possible process, where it is so much of all [-].
+
+        Notes
+        -----
+        Normal scores of the shares that the units show are moved by the same, so that the units give the share asked
+        for; of few units beyond the limits the scores are those of a normal output.
+        """
+        from scipy.special import ndtr, ndtri
+
+        scores, units = list[Float[np.ndarray, " process"]](), self.values.size
+        still = (np.zeros(1), np.ones(1))
+        counted = self._beyond(limits, np.zeros(1), still)[0] * units
+        for moments in (still, self._moments):
+            if min(counted, units - counted) >= _COUNTED:
+                beyond = (self._beyond(limits, np.zeros(moments[0].size), moments) * units + 0.5) / (units + 1.0)
+            else:
+                (moved, wider), centre, deviation = moments, self.values.mean(), self.values.std()
+                turned = [sign * (limit - centre - moved) / (wider * deviation) for sign, limit in limits.turned]
+                beyond = np.sum([ndtr(-own) for own in turned], axis=0)
+            scores.append(ndtri(np.clip(beyond, np.finfo(float).tiny, 1.0 - np.finfo(float).eps)))
+        own = ndtri(np.clip(share, np.finfo(float).tiny, 1.0 - np.finfo(float).eps))
+        return np.asarray(ndtr(own + scores[1] - scores[0]))
+
+    def widened(self, found: Yield, limits: Limits) -> Yield:
+        """Return a yield whose interval and bound also hold what is not known of the processes.
+
+        Notes
+        -----
+        The error of counted units beside it is drawn from Jeffreys' posterior of a share (Brown, Cai & DasGupta 2001).
+        """
+        rejected = 1.0 - found.estimate
+        # Of none that are beyond the limits, half of one: so much the middle of what is possible.
+        shares = self.shares(limits, max(rejected, 0.5 / found.units))
+        drawn = np.random.default_rng(2).beta(found.units * shares + 0.5, found.units * (1.0 - shares) + 0.5)
+        tail = (1.0 - CONFIDENCE) / 2.0
+        least, most, bound = np.quantile(1.0 - drawn, [tail, 1.0 - tail, 1.0 - CONFIDENCE]).tolist()
+        return replace(found, low=min(found.low, least), high=max(found.high, most), bound=min(found.bound, bound))
+
+
+@lru_cache(maxsize=64)
+def _possible_processes(
+    parts: tuple[int, ...], are_radii: tuple[bool, ...]
+) -> tuple[Float[np.ndarray, "process source"], Float[np.ndarray, "process source"]]:
+    """Return σ/s and (μ − x̄)/s of processes that so many parts leave possible, the same for the same numbers [-]."""
+    from scipy.special import gammaincinv, ndtri
+    from scipy.stats import qmc
+
+    points = qmc.Sobol(2 * len(parts), rng=np.random.default_rng(1)).random_base2(_PROCESSES)
+    uniform = np.clip(points, np.finfo(float).eps, None).reshape(-1, 2, len(parts)).swapaxes(0, 1)
+    counts = np.array(parts, float)
+    freedom = np.where(are_radii, 2.0 * counts, counts - 1.0)
+    wider = np.sqrt(freedom / (2.0 * gammaincinv(freedom / 2.0, uniform[0])))
+    return wider, np.where(are_radii, 0.0, wider * ndtri(uniform[1]) / np.sqrt(counts))
 
 
 def allowed_rejections(units: int, target: float, confidence: float = CONFIDENCE) -> int:
@@ -357,7 +593,39 @@ def quantile_change(
     return Change(estimate=estimate, low=float(found.low), high=float(found.high))
 
 
-def kept_at_once(evaluation: Evaluation, outputs: Sequence[str], limits: Mapping[str, Limits]) -> Yield:
+Doubting = Callable[[Float[np.ndarray, " sample"]], ProcessDoubt | None]
+"""Returns what measured parts leave open of an output of random units, as `ProcessDoubt.of` does."""
+
+ANY_LIMIT = Limits(upper=0.0)
+"""Limits of `largest_excess` [-]."""
+
+
+def largest_excess(
+    values: Mapping[str, Float[np.ndarray, " unit"]], limits: Mapping[str, Limits]
+) -> Float[np.ndarray, " unit"]:
+    """Return how far every unit lies beyond any of its limits at most, over the standard deviation of the output [-].
+
+    max over outputs and sides of sign·(y − limit)/σ, own derivation; it is above 0 where a unit fails.
+
+    Examples
+    --------
+    >>> largest_excess({"y": np.array([-1.0, 1.0])}, {"y": Limits(upper=0.5)}).tolist()
+    [-1.5, 0.5]
+    """
+    found = [
+        sign * (values[name] - limit) / (float(values[name][np.isfinite(values[name])].std()) or 1.0)
+        for name, own in limits.items()
+        for sign, limit in own.turned
+    ]
+    return np.asarray(np.max(found, axis=0))
+
+
+def kept_at_once(
+    evaluation: Evaluation,
+    outputs: Sequence[str],
+    limits: Mapping[str, Limits],
+    doubting: Doubting | None = None,
+) -> Yield:
     """Return the share of units that keep all limits at once; one without an answer keeps none.
 
     Parameters
@@ -368,6 +636,8 @@ def kept_at_once(evaluation: Evaluation, outputs: Sequence[str], limits: Mapping
         Names of its outputs, in their order.
     limits
         Output → limits.
+    doubting
+        Tells what measured parts of these units leave open, which the interval then holds, too.
 
     References
     ----------
@@ -384,7 +654,9 @@ def kept_at_once(evaluation: Evaluation, outputs: Sequence[str], limits: Mapping
     """
     kept = [own.kept_by(evaluation.values[:, outputs.index(name)]) for name, own in limits.items()]
     good = evaluation.good & np.all(kept, axis=0)
-    return proportion(good.size, good.size - int(np.count_nonzero(good)))
+    found = proportion(good.size, good.size - int(np.count_nonzero(good)))
+    known = {name: np.where(evaluation.good, evaluation.values[:, outputs.index(name)], np.nan) for name in limits}
+    return found.doubted(doubting(largest_excess(known, limits)), ANY_LIMIT) if doubting else found
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -395,7 +667,13 @@ class KeptLimits:
     joint: Yield  # Share of the units that keep all limits at once
 
     @classmethod
-    def of(cls, evaluation: Evaluation, outputs: Sequence[str], limits: Mapping[str, Limits]) -> KeptLimits:
+    def of(
+        cls,
+        evaluation: Evaluation,
+        outputs: Sequence[str],
+        limits: Mapping[str, Limits],
+        doubting: Doubting | None = None,
+    ) -> KeptLimits:
         """Return what units say, as `kept_at_once` reads them."""
-        each = {name: kept_at_once(evaluation, outputs, {name: own}) for name, own in limits.items()}
-        return cls(each=each, joint=kept_at_once(evaluation, outputs, limits))
+        each = {name: kept_at_once(evaluation, outputs, {name: own}, doubting) for name, own in limits.items()}
+        return cls(each=each, joint=kept_at_once(evaluation, outputs, limits, doubting))

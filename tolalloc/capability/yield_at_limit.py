@@ -25,7 +25,7 @@ from tolalloc.capability.indices import (
     defects_per_million_opportunities,
 )
 from tolalloc.capability.limit_state import ChainedEstimate, LimitState, RareFailure, ResponseLimit
-from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo, Yield, require_few_failures
+from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo, ProcessDoubt, Yield, require_few_failures
 from tolalloc.capability.rare_failure import MOST_KNOWN, ScaledSigmaEstimate, scaled_sigma_sampling, subset_simulation
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
@@ -365,17 +365,33 @@ def yield_at_limit(
         scaled=scaled,
         largest_failed_share=allowed,
     )
+    counted = ShareInterval(estimate=within.estimate, low=within.low, high=within.high, confidence=CONFIDENCE)
+    interval = counted if found.estimate.method == _RANDOM_UNITS else log_normal_interval(found.estimate, runs)
     return YieldAtLimit(
         limit=limit,
-        interval=ShareInterval(estimate=within.estimate, low=within.low, high=within.high, confidence=CONFIDENCE)
-        if found.estimate.method == _RANDOM_UNITS
-        else log_normal_interval(found.estimate, runs),
+        interval=_doubted(interval, limit_state, sample),
         estimate=found.estimate,
         estimates=found.estimates,
         verdict=found.verdict,
         capability=capability(sample.values, Limits(upper=limit)),
         defects_per_million=defects_per_million_opportunities(within.rejected, within.units),
     )
+
+
+def _doubted(interval: ShareInterval, limit_state: ResponseLimit, sample: MonteCarlo) -> ShareInterval:
+    """Return the interval of a yield that also holds what measured parts leave open of their processes."""
+    evaluation = sample.evaluation
+    values = np.where(evaluation.good, evaluation.values[:, 0], np.nan)
+    doubt = ProcessDoubt.of(limit_state.experiment.errors, sample.x, values)
+    if doubt is None:
+        return interval
+    limits, tail = Limits(upper=limit_state.limit), (1 - interval.confidence) / 2
+    # The worst process at the worse end of the counted interval, and the best one at its better end.
+    least, most = (
+        1.0 - float(np.quantile(doubt.shares(limits, 1.0 - end), at))
+        for end, at in ((interval.low, 1.0 - tail), (interval.high, tail))
+    )
+    return replace(interval, low=min(interval.low, least), high=max(interval.high, most))
 
 
 def log_normal_interval(failure: RareFailure, runs: int, confidence: float = CONFIDENCE) -> ShareInterval:

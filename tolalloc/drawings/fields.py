@@ -11,7 +11,13 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from tolalloc.drawings.distributions import Distribution, batches_text, parsed_batches, parsed_shapes, require_shapes
-from tolalloc.drawings.measured_parts import LARGEST_DEVIATION, MeasuredParts, load_measured_parts
+from tolalloc.drawings.measured_parts import (
+    LARGEST_DEVIATION,
+    MadeTo,
+    MeasuredParts,
+    load_measured_parts,
+    named_file,
+)
 from tolalloc.drawings.sources import INCHES, LENGTHS, PERCENT, Source, is_angular
 from tolalloc.drawings.zones import Feature, parsed_spectrum, parsed_systematic, spectrum_text, systematic_text
 from tolalloc.reading.files import Record
@@ -51,8 +57,8 @@ ALLOWED_UNITS = "µm, um, mm, in, inch or %"
 _CALLED = {"um": "µm", "inch": INCHES}
 """Other spelling of a unit → the one that is written."""
 
-Cell = str | int | float | Path | None
-"""What a source writes: a flag as yes or no, a path as seen from the table, nothing as an empty cell."""
+Cell = str | int | float | MeasuredParts | None
+"""What a source writes: a flag as yes or no, a file as seen from the table, nothing as an empty cell."""
 
 
 @dataclass(frozen=True)
@@ -220,9 +226,10 @@ class ToleranceRow(Record):
     measured: Annotated[
         str,
         Column(
-            "CSV of at least 20 measured parts beside the table (`deviation [µm]`; of a position `x [µm],y [µm]` or "
-            "`radius [µm]`); distribution `empirical`",
-            write=lambda source: source.measured.path if source.measured else None,
+            "file of at least 20 measured parts beside the table; distribution `empirical`. A CSV (`deviation [µm]` or "
+            "`mean [µm],sigma [µm],parts`; of a position `x [µm],y [µm]` or `radius [µm]`), or a Q-DAS file, with one "
+            "of its characteristics behind a colon: `parts.dfq:Diameter`",
+            write=lambda source: source.measured,
         ),
     ] = ""
     measured_zone: Annotated[
@@ -519,7 +526,11 @@ class ToleranceRow(Record):
         if not self.measured:
             return None
         zone = (self.measured_zone or self.zone) * (self.micrometres * MICROMETRE)
-        return load_measured_parts((folder / self.measured).resolve(), self.feature, zone, middle)
+        made_to = MadeTo(
+            feature=self.feature, zone=zone, middle=middle, nominal=self.nominal * LENGTHS[self.length_unit]
+        )
+        file, characteristic = named_file(self.measured)
+        return load_measured_parts((folder / file).resolve(), made_to, characteristic)
 
 
 COLUMNS = {

@@ -1,29 +1,44 @@
-"""Measured parts behind an empirical distribution, and which distribution comes nearest to them."""
+"""Measured parts behind an empirical distribution: their files, what they say of the process, and what they leave open.
+
+Files are tables of deviations or of mean and standard deviation (CSV), and those of measuring rooms (Q-DAS, AQDEF).
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import isfinite
+from math import isfinite, sqrt
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawings.distributions import RAYLEIGH, Distribution
+from tolalloc.drawings.distributions import (
+    NORMAL,
+    RAYLEIGH,
+    Distribution,
+    Marginal,
+    smoothed,
+    smoothed_magnitude,
+    smoothing_width,
+)
 from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
 from tolalloc.drawings.zones import Feature
-from tolalloc.exceptions import Faults, InputError
-from tolalloc.reading.units import MICROMETRE
+from tolalloc.exceptions import Faults, InputError, UnknownNameError
+from tolalloc.reading.file_content import is_file, read_bytes
+from tolalloc.reading.units import MICROMETRE, usual_signs
 
-FEWEST_PARTS = 20
+FEWEST_PARTS, MOST_PARTS = 20, 1_000_000
 LARGEST_DEVIATION = 1e6
 """Largest deviation that is believed, as large as a zone may be [µm]."""
 
 _FACTORS = {"µm": 1.0, "um": 1.0, "mm": 1000.0}
-_LAYOUTS = {Feature.SIZE: (("deviation",),), Feature.POSITION: (("x", "y"), ("radius",))}
+_SUMMARY = ("mean", "sigma", "parts")
+"""Columns of a file that has a mean and a standard deviation instead of single parts."""
+_LAYOUTS = {Feature.SIZE: (("deviation",), _SUMMARY), Feature.POSITION: (("x", "y"), ("radius",))}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +74,16 @@ class MeasuredFit:
         return self.fits[0]
 
 
+@dataclass(frozen=True)
+class StatedProcess:
+    """Mean and standard deviation of measured parts whose single values nobody kept."""
+
+    # Mean of the deviations from the nominal size, and their sample standard deviation [m]
+    mean: float
+    deviation: float
+    parts: int  # Number of measured parts [-]
+
+
 @dataclass(frozen=True, kw_only=True)
 class MeasuredParts:
     """Measured parts and the zone that they were made to.
@@ -67,14 +92,25 @@ class MeasuredParts:
     -----
     At another zone the parts are assumed to deviate in proportion to it. The path stays out of the text of a record, so
     that a digest of the same parts in another folder is the same.
+
+    The process is assumed to be normal, of a position on each axis, with the mean and the standard deviation of the
+    parts, unless the parts refute that with an error of 1 % (Anderson & Darling 1954); then they are smoothed. What so
+    few parts leave open of mean and standard deviation is `tolalloc.capability.monte_carlo.ProcessDoubt`.
+
+    References
+    ----------
+    T. W. Anderson, D. A. Darling, A test of goodness of fit, J. Am. Stat. Assoc. 49 (1954) 765–769.
     """
 
     path: Path = field(repr=False)  # Where they were read
-    values: tuple[float, ...]  # Deviations from the nominal size, or radii of a position [m]
+    values: tuple[float, ...]  # Deviations from the nominal size, or radii of a position; none where stated [m]
     are_radii: bool  # Whether the values are radii
     # Width and middle of the zone that they were made to [m]
     zone: float
     middle: float
+    characteristic: str = ""  # Which one of several of the file they are, as the table names it
+    stated: StatedProcess | None = None  # What the file states in place of single parts
+    left_out: int = 0  # Values of the file that it marks as not valid [-]
 
     @property
     def relative(self) -> Float[np.ndarray, " part"]:
@@ -82,12 +118,53 @@ class MeasuredParts:
         return (np.array(self.values) - self.middle) / (self.zone / 2.0)
 
     @property
+    def parts(self) -> int:
+        """Number of measured parts [-]."""
+        return self.stated.parts if self.stated else len(self.values)
+
+    @cached_property
+    def is_normal(self) -> bool:
+        """Whether the process is taken for normal, on each axis for a position."""
+        return self.stated is not None or not _is_refuted(self.relative, self.are_radii)
+
+    @cached_property
+    def cp(self) -> float:
+        """How many times the spread fits into the zone; for radii that of a normal deviation on each axis [-].
+
+        Half the zone over 3s, with the sample standard deviation s; of radii over 3.44·√(Σr²/2n).
+        """
+        if self.stated:
+            return self.zone / 2.0 / (NORMAL.reach * self.stated.deviation)
+        own = self.relative
+        if self.are_radii:
+            return 1.0 / (RAYLEIGH.reach * sqrt(float((own**2).mean()) / 2.0))
+        return 1.0 / (NORMAL.reach * float(own.std(ddof=1)))
+
+    @cached_property
+    def shift(self) -> float:
+        """Mean off the middle of the zone; none for radii, which have any direction [half zone]."""
+        if self.are_radii:
+            return 0.0
+        return (self.stated.mean - self.middle) / (self.zone / 2.0) if self.stated else float(self.relative.mean())
+
+    @property
+    def smoothed(self) -> Marginal:
+        """Distribution of the parts themselves, smoothed [half zone]."""
+        own = self.relative
+        return smoothed_magnitude(own) if self.are_radii else smoothed(own, smoothing_width(own))
+
+    @property
     def sentence(self) -> str:
         """What the distribution follows, and what was assumed."""
-        fit = self.fit
+        fit, shape = self.fit, "smoothed, since normal parts would look otherwise"
+        if self.is_normal:
+            shape = "taken for normal on each axis" if self.are_radii else "taken for normal"
+        nearest = f", nearest to {fit.best.distribution.value}" if fit.fits else ""
+        which = f" ({self.characteristic})" if self.characteristic else ""
+        left_out = f", {self.left_out} values that the file marks as not valid left out" if self.left_out else ""
         return (
-            f"as {fit.parts} measured parts of {self.path.name} (Cp {fit.cp:.3g}, Cpk {fit.cpk:.3g}, nearest to "
-            f"{fit.best.distribution.value}), smoothed, assumed to scale with the zone from the "
+            f"as {fit.parts} measured parts of {self.path.name}{which} (Cp {fit.cp:.3g}, Cpk {fit.cpk:.3g}{nearest})"
+            f"{left_out}, {shape}, assumed to scale with the zone from the "
             f"{self.zone / MICROMETRE:.3g} µm that they were made to"
         )
 
@@ -96,13 +173,14 @@ class MeasuredParts:
         """What the parts say about the process."""
         from scipy import stats
 
-        values, half = np.array(self.values), self.zone / 2.0
+        half = self.zone / 2.0
+        if self.stated:
+            mean, deviation = self.stated.mean, self.stated.deviation
+            cpk = (half - abs(mean - self.middle)) / (3.0 * deviation)
+            return MeasuredFit(parts=self.parts, mean=mean, deviation=deviation, cp=self.cp, cpk=cpk, fits=())
+        values = np.array(self.values)
         mean, deviation = float(values.mean()), float(values.std(ddof=1))
-        if self.are_radii:
-            cp = half / (RAYLEIGH.reach * float(np.sqrt((values**2).mean() / 2.0)))
-            nearest = half - mean
-        else:
-            cp, nearest = half / (3.0 * deviation), half - abs(mean - self.middle)
+        nearest = half - (mean if self.are_radii else abs(mean - self.middle))
         fits = [_fitted(Distribution.NORMAL, stats.rayleigh if self.are_radii else stats.norm, values, self.are_radii)]
         above = values if self.are_radii else values - (self.middle - half)
         if above.min() > 0.0:
@@ -112,10 +190,37 @@ class MeasuredParts:
             parts=values.size,
             mean=mean,
             deviation=deviation,
-            cp=cp,
+            cp=self.cp,
             cpk=nearest / (3.0 * deviation),
             fits=tuple(sorted(fits, key=lambda fit: fit.aic)),
         )
+
+
+def _is_refuted(relative: Float[np.ndarray, " part"], are_radii: bool) -> bool:
+    """Return whether parts of a normal process look like these with a probability below 1 %.
+
+    Notes
+    -----
+    Anderson and Darling's A² of deviations with mean and σ unknown exceeds 1.035/(1 + 0.75/n + 2.25/n²) with 1 %, that
+    of squared radii, which are exponential, 1.959/(1 + 0.6/n).
+
+    References
+    ----------
+    M. A. Stephens in D'Agostino & Stephens, Goodness-of-fit techniques (1986), tables 4.7 and 4.14.
+    """
+    from scipy import stats
+
+    count = relative.size
+    if are_radii:
+        squares = np.sort(relative**2)
+        logs = stats.expon.logcdf(squares / squares.mean()), stats.expon.logsf(squares / squares.mean())
+        largest = 1.959 / (1.0 + 0.6 / count)
+    else:
+        scores = np.sort((relative - relative.mean()) / relative.std(ddof=1))
+        logs = stats.norm.logcdf(scores), stats.norm.logsf(scores)
+        largest = 1.035 / (1.0 + 0.75 / count + 2.25 / count**2)
+    weights = 2.0 * np.arange(1, count + 1) - 1.0
+    return bool(-count - weights @ (logs[0] + logs[1][::-1]) / count > largest)
 
 
 def _fitted(
@@ -138,38 +243,97 @@ def _fitted(
     )
 
 
-def load_measured_parts(path: Path, feature: Feature, zone: float, middle: float) -> MeasuredParts:
-    """Return the parts of a CSV file, which were made to a zone of this width and middle [m].
+@dataclass(frozen=True, kw_only=True)
+class MadeTo:
+    """What a row of the table says of the feature that was measured."""
 
-    It has a column ``deviation [µm]`` for a size, and ``x [µm]`` and ``y [µm]`` or ``radius [µm]`` for a position; all
-    from the nominal place.
+    feature: Feature
+    # Width and middle of the zone that the parts were made to, and the nominal size, 0 where the row states none [m]
+    zone: float
+    middle: float
+    nominal: float = 0.0
+
+
+def named_file(text: str) -> tuple[str, str]:
+    """Return the file that a table names, and the characteristic of a Q-DAS file behind a colon.
+
+    >>> named_file("cmm/parts.dfq:Ø 5/8"), named_file("parts.csv")
+    (('cmm/parts.dfq', 'Ø 5/8'), ('parts.csv', ''))
+    """
+    found = _AQDEF.fullmatch(text)
+    return (found[1], (found[2] or "").strip()) if found else (text, "")
+
+
+def load_measured_parts(path: Path, made_to: MadeTo, characteristic: str = "") -> MeasuredParts:
+    """Return the parts of a file.
+
+    A CSV file has a column ``deviation [µm]`` for a size, or one row of ``mean [µm]``, ``sigma [µm]``, ``parts``; of a
+    position ``x [µm]`` and ``y [µm]`` or ``radius [µm]``; all from the nominal place. A file of Q-DAS (AQDEF)
+    ends in ``.dfq``, or in ``.dfd`` with its values in the ``.dfx`` beside it; one of several characteristics is named
+    by its number (K2001) or its name (K2002).
 
     Raises
     ------
-    InputError
-        The file, row, column and value that are not allowed, or there are too few parts.
+    InputError, UnknownNameError
+        The file, row, column or field and value that are not allowed, or there are too few parts.
     """
+    if _AQDEF.fullmatch(path.name):
+        return _of_characteristic(path, characteristic, made_to)
     table = read_text_table(path)
     names = tuple(split_header(header)[0] for header in table.headers)
-    layouts = _LAYOUTS[feature]
+    layouts = _LAYOUTS[made_to.feature]
     if names not in layouts:
-        allowed = " or ".join(" and ".join(f"{name} [µm]" for name in layout) for layout in layouts)
-        raise InputError.at(path, f"columns for feature {feature.value}", ", ".join(table.headers), allowed)
-    if len(table.cells) < FEWEST_PARTS:
-        raise InputError.at(path, "number of measured parts", len(table.cells), f"{FEWEST_PARTS} or more")
+        allowed = " or ".join(" and ".join(_header(name) for name in layout) for layout in layouts)
+        raise InputError.at(path, f"columns for feature {made_to.feature.value}", ", ".join(table.headers), allowed)
+    if names == _SUMMARY:
+        return _stated(table, made_to)
     columns = [_column(table, at) for at in range(len(names))]
     values = np.hypot(columns[0], columns[1]) if len(columns) == 2 else np.array(columns[0])
-    if names == ("radius",) and values.min() < 0.0:
+    if names == ("radius",) and values.size and values.min() < 0.0:
         row = table.rows[int(values.argmin())]
         raise InputError.at(f"{path}, row {row}", table.headers[0], f"{values.min():g} µm", "0 or more")
+    return _measured(path, values, made_to)
+
+
+def _header(name: str) -> str:
+    return name if name == "parts" else f"{name} [µm]"
+
+
+def _measured(path: Path, values: Float[np.ndarray, " part"], made_to: MadeTo, **more: Any) -> MeasuredParts:
+    """Return parts with these deviations or radii [µm], which must be enough and differ."""
+    if values.size < FEWEST_PARTS:
+        raise InputError.at(path, "number of measured parts", values.size, f"{FEWEST_PARTS} or more")
     if np.ptp(values) == 0.0:
         raise InputError.at(path, "every measured part", f"{values[0]:g} µm", "parts that differ from each other")
     return MeasuredParts(
         path=path,
         values=tuple((values * MICROMETRE).tolist()),
-        are_radii=feature is Feature.POSITION,
-        zone=zone,
-        middle=middle,
+        are_radii=made_to.feature is Feature.POSITION,
+        zone=made_to.zone,
+        middle=made_to.middle,
+        **more,
+    )
+
+
+def _stated(table: TextTable, made_to: MadeTo) -> MeasuredParts:
+    """Return parts whose mean and standard deviation alone are known."""
+    if len(table.cells) != 1:
+        raise InputError.at(table.path, "rows with mean, sigma and parts", len(table.cells), "1 of them")
+    (mean,), (deviation,) = _column(table, 0), _column(table, 1)
+    where, written = f"{table.path}, row {table.rows[0]}", table.cells[0]
+    if not deviation > 0.0:
+        raise InputError.at(where, table.headers[1], written[1], "a standard deviation above 0")
+    count = int(written[2]) if written[2].isascii() and written[2].isdecimal() and len(written[2]) < 10 else 0
+    if not FEWEST_PARTS <= count <= MOST_PARTS:
+        allowed = f"the number of parts behind mean and sigma, {FEWEST_PARTS} to {MOST_PARTS}"
+        raise InputError.at(where, "parts", written[2], allowed)
+    return MeasuredParts(
+        path=table.path,
+        values=(),
+        are_radii=False,
+        zone=made_to.zone,
+        middle=made_to.middle,
+        stated=StatedProcess(mean * MICROMETRE, deviation * MICROMETRE, count),
     )
 
 
@@ -192,3 +356,186 @@ def _column(table: TextTable, at: int) -> list[float]:
         values.append(value)
     faults.require_none()
     return values
+
+
+_AQDEF = re.compile(r"(.+\.(?:dfq|dfd|dfx))(?::(.*))?", re.IGNORECASE)
+"""Name of a Q-DAS file, and of the characteristic behind it."""
+_KEY = re.compile(r"(K\d{4})(?:/(\d{1,6}))?(?:\s+(.*))?")
+"""Line of such a file that begins with a field: its key, the characteristic that it is about, and its content."""
+_BETWEEN_CHARACTERISTICS, _BETWEEN_FIELDS = "\x0f", "\x14"
+_VALID = "0"
+"""Content of K0002 of a value that counts; 129, 255, 256 and 290 mark one that does not."""
+_ATTRIBUTIVE = "1"
+"""Content of K2004 of a characteristic that is counted, not measured."""
+_SAME = 1e-4
+"""Difference of nominal sizes or limits up to which they are the same: a tenth of a micrometre [mm]."""
+
+
+@dataclass(frozen=True)
+class _Characteristic:
+    """What a Q-DAS file says of one characteristic."""
+
+    fields: dict[str, str] = field(default_factory=dict)  # K2… → content
+    values: list[tuple[str, str]] = field(default_factory=list)  # Value (K0001) and attribute (K0002), as written
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Number (K2001) and name (K2002), as far as the file has them."""
+        return tuple(self.fields[key] for key in ("K2001", "K2002") if self.fields.get(key))
+
+
+def read_characteristics(path: Path) -> dict[int, _Characteristic]:
+    """Return what a Q-DAS file (AQDEF) says of every characteristic.
+
+    Notes
+    -----
+    Read are the fields of characteristics (K2…) and values with their attribute (K0001, K0002); in lines of values
+    byte 15 separates characteristics and byte 20 the fields of one value. A field with index 0 is about all. This is
+    own code: the library aqdefreader 1.3.0 needs packages that it does not name, prints, leaves `K0001/1 5.001` a
+    text and fails on lines of values with decimal commas or operators, as measuring machines write them.
+
+    References
+    ----------
+    Q-DAS ASCII Transfer Format, version 12 (2015), and Hexagon's lists of the contents of K00xx and K2xxx.
+    """
+    lines = _aqdef_text(path).splitlines()
+    if path.suffix.lower() == ".dfd":
+        beside = [path.with_suffix(end) for end in (".dfx", ".DFX")]
+        found = next((own for own in beside if is_file(own)), beside[0])
+        lines += _aqdef_text(found).splitlines()
+    common, found_by = dict[str, str](), dict[int, _Characteristic]()
+    for line in lines:
+        if key := _KEY.fullmatch(line.rstrip()):
+            _read_field(key[1], int(key[2] or 1), (key[3] or "").strip(), found_by, common)
+        elif line.strip() and not line.startswith("K"):
+            for at, written in enumerate(line.split(_BETWEEN_CHARACTERISTICS), start=1):
+                _read_value(written.split(_BETWEEN_FIELDS), found_by.setdefault(at, _Characteristic()))
+    for characteristic in found_by.values():
+        characteristic.fields.update({key: own for key, own in common.items() if key not in characteristic.fields})
+    return {at: own for at, own in sorted(found_by.items()) if own.values}
+
+
+def _aqdef_text(path: Path) -> str:
+    """Return the text of a Q-DAS file, which measuring machines write in UTF-8, UTF-16 or Windows-1252."""
+    content = read_bytes(path, "a Q-DAS file")
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return content.decode("utf-16", "replace")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("cp1252", "replace")
+
+
+def _read_field(key: str, at: int, content: str, found: dict[int, _Characteristic], common: dict[str, str]) -> None:
+    """Take a field of a characteristic, or of all of them."""
+    if key.startswith("K2"):
+        if at:
+            found.setdefault(at, _Characteristic()).fields[key] = content
+        else:
+            common[key] = content
+    elif key == "K0001" and at:
+        found.setdefault(at, _Characteristic()).values.append((content, _VALID))
+    elif key == "K0002":
+        for own in [found[at]] if at in found else list(found.values()) if not at else []:
+            if own.values:
+                own.values[-1] = (own.values[-1][0], content)
+
+
+def _read_value(fields: list[str], own: _Characteristic) -> None:
+    """Take one value of a line of values; one that is empty was not measured."""
+    if own.fields.get("K2004") != _ATTRIBUTIVE and fields[0].strip():
+        attribute = fields[1].strip() if len(fields) > 1 else ""
+        own.values.append((fields[0].strip(), attribute or _VALID))
+
+
+def _of_characteristic(path: Path, name: str, made_to: MadeTo) -> MeasuredParts:
+    """Return the parts of one characteristic of a Q-DAS file, whose unit, nominal size and limits must be the row's."""
+    if path.suffix.lower() == ".dfx":
+        allowed = f"{path.with_suffix('.dfd').name}, which describes the values in it"
+        raise InputError.at(path, "measured", path.name, allowed)
+    own = _named(path, name, read_characteristics(path))
+    where = f"{path}, characteristic {' '.join(own.names) or '1'}"
+    unit = usual_signs(own.fields.get("K2142", ""))
+    if unit not in _FACTORS:
+        raise InputError.at(where, "the unit (K2142)", unit, "µm, um or mm")
+    nominal = _nominal(where, own, _FACTORS[unit], made_to)
+    _require_limits(where, own, _FACTORS[unit], nominal, made_to)
+    values, faults, valid = list[float](), Faults(), [text for text, attribute in own.values if attribute == _VALID]
+    for text in valid:
+        deviation = _aqdef_number(text) * _FACTORS[unit] - nominal
+        if not abs(deviation) <= LARGEST_DEVIATION:
+            with faults.kept():
+                allowed = f"a number within {LARGEST_DEVIATION:g} µm of the nominal size"
+                raise InputError.at(where, "a value (K0001)", text, allowed)
+        values.append(deviation)
+    faults.require_none()
+    found = np.array(values)
+    if made_to.feature is Feature.POSITION:
+        if found.size and found.min() < 0.0:
+            raise InputError.at(where, "a position (K0001)", f"{found.min():g} µm", "a diameter, 0 or more")
+        found = found / 2.0
+    return _measured(path, found, made_to, characteristic=name, left_out=len(own.values) - len(valid))
+
+
+def _named(path: Path, name: str, found: dict[int, _Characteristic]) -> _Characteristic:
+    """Return the characteristic of a number or name; the only one where none is named."""
+    if not found:
+        raise InputError(f"{path}: it has no measured values; a line of values or fields K0001 are needed.")
+    known = [" ".join(own.names) or str(at) for at, own in found.items()]
+    if not name:
+        if len(found) > 1:
+            allowed = f"{path.name}:NAME with the number or name of one of {', '.join(known[:10])}"
+            raise InputError.at(path, "measured", path.name, allowed)
+        return next(iter(found.values()))
+    for key in ("K2001", "K2002"):
+        meant = [own for own in found.values() if own.fields.get(key) == name]
+        if len(meant) > 1:
+            raise InputError(
+                f"{path}: {len(meant)} characteristics are called {name!r}; name one by its number (K2001)."
+            )
+        if meant:
+            return meant[0]
+    raise UnknownNameError.among(path, "characteristic", name, [own for each in found.values() for own in each.names])
+
+
+def _aqdef_number(text: str) -> float:
+    """Return a number with a decimal comma or point, not a number where it is none."""
+    try:
+        return plain_number(text.strip().replace(",", "."))
+    except ValueError:
+        return float("nan")
+
+
+def _nominal(where: str, own: _Characteristic, factor: float, made_to: MadeTo) -> float:
+    """Return the nominal size of a characteristic [µm]; a position has none."""
+    if made_to.feature is Feature.POSITION:
+        return 0.0
+    written = own.fields.get("K2101", "")
+    nominal = _aqdef_number(written) * factor
+    row = made_to.nominal / MICROMETRE
+    if not isfinite(nominal):
+        raise InputError.at(where, "the nominal size (K2101)", written, "a number, from which the parts deviate")
+    if row and abs(nominal - row) > 1e3 * _SAME:
+        allowed = f"the {row / 1e3:g} mm of the row"
+        raise InputError.at(where, "the nominal size (K2101)", f"{nominal / 1e3:g} mm", allowed)
+    return nominal
+
+
+def _require_limits(where: str, own: _Characteristic, factor: float, nominal: float, made_to: MadeTo) -> None:
+    """Raise if the file states other limits than those that the row says the parts were made to."""
+    is_size = made_to.feature is Feature.SIZE
+    half = made_to.zone / 2.0
+    ends = {
+        "lower": (("K2112", "K2110"), (made_to.middle - half) / MICROMETRE if is_size else None),
+        "upper": (("K2113", "K2111"), (made_to.middle + half if is_size else made_to.zone) / MICROMETRE),
+    }
+    for side, ((allowance, limit), expected) in ends.items():
+        written = next((key for key in (allowance, limit) if own.fields.get(key)), "")
+        if not written or expected is None:
+            continue
+        found = _aqdef_number(own.fields[written]) * factor - (nominal if written == limit else 0.0)
+        if not isfinite(found):
+            raise InputError.at(where, f"the {side} limit ({written})", own.fields[written], "a number")
+        if abs(found - expected) > 1e3 * _SAME:
+            allowed = f"{expected:+g} µm, as the row has it (measured_zone states another zone that they were made to)"
+            raise InputError.at(where, f"the {side} limit ({written})", f"{found:+g} µm from nominal", allowed)

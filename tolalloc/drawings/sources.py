@@ -19,9 +19,6 @@ from tolalloc.drawings.distributions import (
     Family,
     Marginal,
     Mixture,
-    smoothed,
-    smoothed_magnitude,
-    smoothing_width,
 )
 from tolalloc.drawings.measured_parts import MeasuredParts
 from tolalloc.drawings.zones import Feature, Spectrum, Systematic, ZoneMapping
@@ -277,9 +274,8 @@ class Source:
         """Deviation of a size, from the middle of its zone or its lower limit; radius or amplitude of all others."""
         is_size = self.feature is Feature.SIZE
         normal = NORMAL if is_size else RAYLEIGH
-        if self.distribution is Distribution.EMPIRICAL:
-            relative = self.measured.relative if self.measured else np.empty(0)
-            return smoothed(relative, smoothing_width(relative)) if is_size else smoothed_magnitude(relative)
+        if self.measured:
+            return normal if self.measured.is_normal else self.measured.smoothed
         if self.distribution is Distribution.MIXTURE:
             return Mixture(normal, self.batches)
         if self.distribution in (Distribution.NORMAL, Distribution.RAYLEIGH):
@@ -303,12 +299,13 @@ class Source:
     @cached_property
     def zone_mapping(self) -> ZoneMapping:
         """Distribution of the columns per unit of zone."""
+        normal = self.measured if self.measured and self.measured.is_normal else None
         return ZoneMapping(
             feature=self.feature,
             distribution=self.distribution,
             base=self._base,
-            cp=self.cp,
-            shift=self.shift,
+            cp=normal.cp if normal else self.cp,
+            shift=normal.shift if normal else self.shift,
             spectrum=self.spectrum,
             teeth=self.teeth,
             sorted=self.sorted,

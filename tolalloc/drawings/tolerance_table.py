@@ -28,6 +28,7 @@ from tolalloc.drawings.fields import (
     usual_unit,
 )
 from tolalloc.drawings.ladder import RADII, fit_deviations, is_fit
+from tolalloc.drawings.measured_parts import MeasuredParts
 from tolalloc.drawings.sources import INCHES, LENGTHS, PERCENT, Source, known_as
 from tolalloc.drawings.table_file import (
     DATA,
@@ -565,8 +566,9 @@ def own_heads_of(sources: Sequence[Source]) -> tuple[str, ...]:
 
 def _written(cell: Cell, folder: Path | None) -> str | int | float:
     """Return a cell as a table shows it."""
-    if isinstance(cell, Path):
-        return (Path(os.path.relpath(cell, folder.resolve())) if folder else cell).as_posix()
+    if isinstance(cell, MeasuredParts):
+        file = (Path(os.path.relpath(cell.path, folder.resolve())) if folder else cell.path).as_posix()
+        return f"{file}:{cell.characteristic}" if cell.characteristic else file
     if isinstance(cell, bool):
         return "yes" if cell else "no"
     if cell is None:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from tolalloc.capability.indices import Capability, Limits, QuantileInterval, capability, quantile_interval
-from tolalloc.capability.monte_carlo import MonteCarlo, OneSided, Yield, kept_at_once, proportion
+from tolalloc.capability.monte_carlo import Doubting, MonteCarlo, OneSided, ProcessDoubt, Yield, kept_at_once
 from tolalloc.capability.yield_at_limit import YieldAtLimit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SamplingDesign
@@ -107,11 +107,15 @@ class RankingResult:
     @cached_property
     def joint(self) -> Yield:
         """Share of the random units that keep all limits at once; one without an answer keeps none."""
-        return kept_at_once(self.sample.evaluation, self.outputs, self.limits)
+        return kept_at_once(self.sample.evaluation, self.outputs, self.limits, self._doubting)
+
+    @property
+    def _doubting(self) -> Doubting | None:
+        return ProcessDoubt.about(self.errors, self.sample.x)
 
     def _capability(self, at: int, output: str) -> OutputCapability:
         evaluation, limits = self.sample.evaluation, self.limits.get(output)
-        values, units = evaluation.values[evaluation.good, at], evaluation.status.size
+        values = evaluation.values[evaluation.good, at]
         return OutputCapability(
             output=output,
             mean=float(values.mean()),
@@ -120,6 +124,6 @@ class RankingResult:
             most=float(values.max()),
             quantile=quantile_interval(values, self.target),
             limits=limits,
-            inside=proportion(units, units - values.size + limits.outside(values)) if limits else None,
+            inside=kept_at_once(evaluation, self.outputs, {output: limits}, self._doubting) if limits else None,
             capability=capability(values, limits) if limits and np.ptp(values) > 0 else None,
         )

@@ -17,7 +17,7 @@ from tolalloc.allocation.space.effort import AllocationEffort
 from tolalloc.allocation.space.joint_yield import JointRequirement
 from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, Guarantee, OwnLimit, Requirement
 from tolalloc.capability.indices import Limits
-from tolalloc.capability.monte_carlo import KeptLimits
+from tolalloc.capability.monte_carlo import KeptLimits, ProcessDoubt
 from tolalloc.drawings.compensators import Compensator, all_choices, choice_label, in_force
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
@@ -250,7 +250,8 @@ class Prepared:
         """Return the shares of random units at the zones of the drawing that keep each limit and all at once."""
         limits = {own.output: own.limits for own in self.requirements}
         response = self.model.reading(tuple(limits))
-        return KeptLimits.of(response(self.random_units(units)), response.outputs, limits)
+        x = self.random_units(units)
+        return KeptLimits.of(response(x), response.outputs, limits, ProcessDoubt.about(self.errors, x))
 
     @property
     def header(self) -> Header:

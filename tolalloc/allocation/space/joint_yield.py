@@ -104,9 +104,8 @@ class JointRequirement(Requirement):
     def check(self, sample: OutputSample) -> Check:
         """Return whether all limits are kept at once; the search is steered by the limits."""
         values = self.read({own: sample.units.values(own) for own in self.outputs})
-        limited = LimitedSample.all_of(
-            values, self.limits, None, self.controls(sample.units.nearest, sample.units.planes)
-        )
+        controls = self.controls(sample.units.nearest, sample.units.planes)
+        limited = LimitedSample.all_of(values, self.limits, None, controls, sample.units.doubt(values))
         (bound,) = self.guarantee.bounds(limited, sample.confidence)
         nothing, settings = np.zeros(sample.groups), np.zeros(sample.design.size - sample.groups)
         verdict = OneSidedConstraint(
@@ -162,10 +161,17 @@ class Tail:
     slope: float  # s, per normal score [unit of the output]
     error: float  # Standard error [unit of the output]
     law: LinearLaw | None = None  # Of the output where it is linear, which is then exact at every share
+    margin: float = 0.0  # What measured parts leave open, by which a limit is kept further inside [unit of the output]
 
     @classmethod
     def of(cls, sample: LimitedSample, share: float) -> Tail:
         """Return the tail of units around a share of failures [-]."""
+        margin = sample.doubt.margin(sample.limits, share) if sample.doubt else 0.0
+        return replace(cls._counted(replace(sample, doubt=None), share), margin=margin)
+
+    @classmethod
+    def _counted(cls, sample: LimitedSample, share: float) -> Tail:
+        """Return the tail for processes that are as their measured parts say."""
         from scipy.stats import norm
 
         limits, law = sample.limits, sample.law
@@ -212,7 +218,7 @@ class Tail:
         rise = self.rise(share)
         by_share = self.rise(share * max(1 - doubt, _LEAST_PART), share) if doubt else 0.0
         error = float(np.hypot(self.error, by_share))
-        return tuple(replace(own, value=own.value + own.sign * rise, standard_error=error) for own in self.bounds)
+        return tuple(replace(own.further(rise + self.margin), standard_error=error) for own in self.bounds)
 
 
 def _slope(sample: LimitedSample, share: float) -> float:
@@ -433,6 +439,7 @@ def limited_by(sample: DesignSample) -> Callable[[Requirement], LimitedSample]:
     def read(requirement: Requirement) -> LimitedSample:
         values = requirement.read({own: sample.values(own) for own in requirement.outputs})
         controls = requirement.controls(sample.nearest, sample.planes)
-        return LimitedSample.all_of(values, requirement.limits, sample.laws.get(requirement.output), controls)
+        law, doubt = sample.laws.get(requirement.output), sample.doubt(values)
+        return LimitedSample.all_of(values, requirement.limits, law, controls, doubt)
 
     return read

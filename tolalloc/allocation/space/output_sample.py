@@ -13,7 +13,7 @@ from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.linear_function import LinearFunction, LinearLaw, NearPlane
-from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo
+from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo, ProcessDoubt
 from tolalloc.capability.near_limit import SolvedUnits, largest_first
 from tolalloc.capability.worst_unit import worst_unit
 from tolalloc.drawings.seeds import SeedTree
@@ -150,6 +150,7 @@ class LimitedSample:
     law: LinearLaw | None = None  # Law of the output, known before these units were drawn or the same units' own
     leaving: int = 0  # Units solved whatever was predicted whose value the law does not give [-]
     controls: tuple[Control, ...] = ()  # Planes near what is limited, none where not all units were solved
+    doubt: ProcessDoubt | None = None  # What measured parts leave open of what is limited
 
     @classmethod
     def all_of(
@@ -158,9 +159,11 @@ class LimitedSample:
         limits: Limits,
         law: LinearLaw | None = None,
         controls: tuple[Control, ...] = (),
+        doubt: ProcessDoubt | None = None,
     ) -> LimitedSample:
         """Return plain random units, all of which were solved."""
-        return cls(values=values, units=SolvedUnits.all_of(values.size), limits=limits, law=law, controls=controls)
+        units = SolvedUnits.all_of(values.size)
+        return cls(values=values, units=units, limits=limits, law=law, controls=controls, doubt=doubt)
 
     def controlled_excess(self, share: float, confidence: float) -> tuple[float, float]:
         """Return how far beyond the limits a share of units lies at most, and its standard error [unit of the excess].
@@ -339,6 +342,11 @@ class DesignSample:
         """What these planes say of every unit [unit of the output]."""
         return {output: near(self.x) for output, near in self.nearest.items()}
 
+    def doubt(self, values: Float[np.ndarray, " unit"]) -> ProcessDoubt | None:
+        """Return what measured parts leave open of what the units have, not a number where one has none."""
+        doubting = ProcessDoubt.about(self.space.errors, self.x)
+        return doubting(values) if doubting else None
+
     def sensitivity(self, output: str) -> Float[np.ndarray, " source"]:
         """Return the change of an output with a deviation of each source; one of `exact` [unit of the output per m].
 
@@ -504,8 +512,14 @@ class OutputSample:
         """Return what the units say of limits; a search solves all of them."""
         if near := self.near:
             control = Control(near=near, values=self.units.planes[self.output], limits=limits)
-            return LimitedSample.all_of(self.units.values(self.output), limits, None, (control,))
-        return LimitedSample.all_of(np.append(self.values, np.full(self.failed, np.nan)), limits, self.law)
+            return LimitedSample.all_of(self.units.values(self.output), limits, None, (control,), self.doubt)
+        values = np.append(self.values, np.full(self.failed, np.nan))
+        return LimitedSample.all_of(values, limits, self.law, doubt=self.doubt)
+
+    @cached_property
+    def doubt(self) -> ProcessDoubt | None:
+        """What measured parts leave open of the output."""
+        return self.units.doubt(self.units.values(self.output))
 
     @property
     def near(self) -> NearPlane | None:

@@ -40,6 +40,10 @@ class QuantileBound:
     value: float  # What is compared with the limit, infinite where too few units answered [unit of the output]
     standard_error: float  # Standard error of the value [unit of the output]
 
+    def further(self, by: float) -> QuantileBound:
+        """Return the bound with a value that lies further out [unit of the output]."""
+        return replace(self, value=self.value + self.sign * by)
+
     @property
     def excess(self) -> float:
         """How far the value lies beyond the limit, negative inside [unit of the output]."""
@@ -224,7 +228,9 @@ class AtYield(NamedFields):
     -----
     The values are order statistics: of the units furthest beyond a limit, either one, so many are left out as the
     sample may reject. So they are inside exactly where the bound of the yield reaches the target, Clopper–Pearson's
-    where all units were solved. Where the output is linear in the deviations, its exact law takes their place.
+    where all units were solved. Where the output is linear in the deviations, its exact law takes their place. Where
+    parts were measured, the values lie further out by what keeps the target with 95 % of the processes that these
+    leave possible (`tolalloc.capability.monte_carlo.ProcessDoubt`).
 
     Examples
     --------
@@ -276,6 +282,14 @@ class AtYield(NamedFields):
 
     def bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what units show of every limit, or what its law does where they keep to it."""
+        found = self._counted_bounds(sample, confidence)
+        if sample.doubt is None:
+            return found
+        margin = sample.doubt.margin(sample.limits, 1 - self.target)
+        return tuple(bound.further(margin) for bound in found)
+
+    def _counted_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
+        """Return what units show of processes that are as their measured parts say."""
         if sample.law:
             return bounds_of_law(sample, sample.law, 1 - self.target - sample.most_leaving(confidence))
         if sample.controls:
@@ -351,11 +365,18 @@ class AtCpk(NamedFields):
 
     def bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what units show of every limit."""
-        return tuple(self._bound(sample.plain, sign, limit, confidence) for sign, limit in sample.limits.turned)
+        found = self._counted_bounds(sample, confidence)
+        if sample.doubt is None:
+            return found
+        return tuple(own.further(sample.doubt.margin_of_spread(own.sign, 3 * self.target)) for own in found)
 
     def least_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what is compared with every limit at its least."""
-        return self.bounds(sample, 1 - confidence)
+        return self._counted_bounds(sample, 1 - confidence)
+
+    def _counted_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
+        """Return what units show of processes that are as their measured parts say."""
+        return tuple(self._bound(sample.plain, sign, limit, confidence) for sign, limit in sample.limits.turned)
 
     def _bound(
         self, values: Float[np.ndarray, " good"], sign: Literal[1, -1], limit: float, confidence: float

@@ -11,12 +11,13 @@ from jaxtyping import Float
 
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.joint_yield import JointRequirement, tightened
+from tolalloc.allocation.space.output_sample import LimitedSample
 from tolalloc.allocation.space.problem import OneSidedConstraint
 from tolalloc.allocation.space.requirement import AtYield, Check, QuantileBound, Requirement, Sampled
 from tolalloc.allocation.verify.independent_sample import IndependentSample, Screen, SolvedPart, UnitSolver
-from tolalloc.allocation.verify.verification import VerifiedDesign
+from tolalloc.allocation.verify.verification import ALL_LIMITS, VerifiedDesign
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
-from tolalloc.capability.monte_carlo import AnsweredUnits, RedrawnUnits, require_few_failures
+from tolalloc.capability.monte_carlo import ANY_LIMIT, AnsweredUnits, RedrawnUnits, require_few_failures
 from tolalloc.capability.near_limit import Drawn
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import FailedUnitsError
@@ -348,12 +349,14 @@ def _tested(
     independent = IndependentSample(units=units, outputs=values, leaving=solved.leaving, planes=solved.planes)
     checks = _checks(design, independent, confidence)
     kept = np.array([own.requirement.limits.kept_by(own.requirement.read(values)) for own in checks])
+    leading, doubts = checks[0].requirement, design.doubts
+    achieved, joint = (units.yield_of(np.logical_not(own)) for own in (kept[0], kept.all(axis=0)))
     return replace(
         design,
         sample=RedrawnUnits(evaluation=solved.plain, redraw=redraw),
-        achieved=units.yield_of(np.logical_not(kept[0])),
+        achieved=achieved.doubted(doubts.get(leading.output), leading.limits),
         checks=checks,
-        joint=units.yield_of(np.logical_not(kept.all(axis=0))),
+        joint=joint.doubted(doubts.get(ALL_LIMITS), ANY_LIMIT),
         outputs={name: own[units.whatever] for name, own in values.items()},
         independent=independent,
         confidence=confidence,
@@ -372,7 +375,7 @@ def _checks(design: VerifiedDesign, independent: IndependentSample, confidence: 
         )
     return tightened(
         tuple(found),
-        lambda requirement: independent.limited(requirement, design.laws.get(requirement.output), design.nearest),
+        lambda requirement: _limited(design, requirement, independent),
         confidence,
         lambda check, bounds, _: _read(design, check.requirement, check.steering[-len(bounds) :], bounds, independent),
     )
@@ -398,8 +401,13 @@ def _bounds(
     requirement = check.requirement
     if not isinstance(requirement.guarantee, Sampled):
         return ()
-    sample = independent.limited(requirement, design.laws.get(requirement.output), design.nearest)
-    return requirement.guarantee.bounds(sample, confidence)
+    return requirement.guarantee.bounds(_limited(design, requirement, independent), confidence)
+
+
+def _limited(design: VerifiedDesign, requirement: Requirement, independent: IndependentSample) -> LimitedSample:
+    """Return what units say of a requirement, with what measured parts leave open as the search found it."""
+    law, doubt = design.laws.get(requirement.output), design.doubts.get(requirement.output)
+    return independent.limited(requirement, law, design.nearest, doubt)
 
 
 def _moved(

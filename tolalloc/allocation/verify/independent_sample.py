@@ -13,6 +13,7 @@ from tolalloc.allocation.space.output_sample import LimitedSample
 from tolalloc.allocation.space.requirement import AtYield, Requirement
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.linear_function import LinearLaw, NearPlane
+from tolalloc.capability.monte_carlo import ProcessDoubt
 from tolalloc.capability.near_limit import Drawn, SolvedUnits
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models.model import Evaluation, Response
@@ -116,7 +117,11 @@ class IndependentSample:
     planes: dict[str, Float[np.ndarray, " solved"]]  # Output near a plane → what that says [unit of the output]
 
     def limited(
-        self, requirement: Requirement, law: LinearLaw | None, nearest: Mapping[str, NearPlane]
+        self,
+        requirement: Requirement,
+        law: LinearLaw | None,
+        nearest: Mapping[str, NearPlane],
+        doubt: ProcessDoubt | None = None,
     ) -> LimitedSample:
         """Return what the units say of a requirement.
 
@@ -128,6 +133,8 @@ class IndependentSample:
             Of its output, none where it has none.
         nearest
             Output → plane near it.
+        doubt
+            What measured parts leave open of what is limited.
         """
         plain = self.units.drawn.whatever == self.units.drawn.units
         return LimitedSample(
@@ -137,6 +144,7 @@ class IndependentSample:
             law=law,
             leaving=self.leaving.get(requirement.output, 0),
             controls=requirement.controls(nearest, self.planes) if plain else (),
+            doubt=doubt,
         )
 
 

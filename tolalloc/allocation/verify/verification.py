@@ -18,7 +18,16 @@ from tolalloc.allocation.verify.independent_sample import IndependentSample
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.linear_function import LinearLaw, NearPlane
-from tolalloc.capability.monte_carlo import CONFIDENCE, RedrawnUnits, Yield, proportion, require_few_failures
+from tolalloc.capability.monte_carlo import (
+    ANY_LIMIT,
+    CONFIDENCE,
+    ProcessDoubt,
+    RedrawnUnits,
+    Yield,
+    largest_excess,
+    proportion,
+    require_few_failures,
+)
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
@@ -56,6 +65,8 @@ class VerifiedDesign:
     by_deviation: Float[np.ndarray, " source"] | None
     confidence: float  # With which the units show what is compared with the limits, one-sided [-]
     near: Mapping[str, NearPlane] = field(default_factory=dict)  # Output → plane that was found near it
+    # What is limited → what measured parts leave open of it; all limits at once under `ALL_LIMITS`
+    doubts: Mapping[str, ProcessDoubt] = field(default_factory=dict)
     independent: IndependentSample | None = None  # What tested it last, none if it was not tested
     accepted: bool = False  # Whether units that no search has seen showed every requirement, with the stated error
     # Cost before its zones and amounts were rounded to what the drawing states, none if they were not [cost units]
@@ -81,8 +92,10 @@ class VerifiedDesign:
         outputs = self.independent.outputs if self.independent else self.outputs
         outside = np.logical_not(requirement.limits.kept_by(requirement.read(outputs)))
         if self.independent:
-            return self.independent.units.yield_of(outside)
-        return proportion(outside.size, int(np.count_nonzero(outside)))
+            found = self.independent.units.yield_of(outside)
+        else:
+            found = proportion(outside.size, int(np.count_nonzero(outside)))
+        return found.doubted(self.doubts.get(requirement.output), requirement.limits)
 
     @property
     def constraints(self) -> tuple[OneSidedConstraint, ...]:
@@ -235,6 +248,8 @@ class Verifier:
             lambda check, bounds, at: spread_constraints(read[at], bounds, check.requirement.limits),
         )
         values = {output: sample.values(output) for output in outputs}
+        doubts = _doubts(sample, requirements, values)
+        leading, every = requirements[0], doubts.get(ALL_LIMITS)
         kept = np.array([requirement.limits.kept_by(requirement.read(values)) for requirement in requirements])
         return VerifiedDesign(
             name=name,
@@ -245,15 +260,35 @@ class Verifier:
             sample=RedrawnUnits(
                 evaluation=sample.samples[0].evaluation, redraw=partial(self.space.units, design, seeds, self.units)
             ),
-            achieved=proportion(self.units, int(np.count_nonzero(~kept[0]))),
+            achieved=proportion(self.units, int(np.count_nonzero(~kept[0]))).doubted(
+                doubts.get(leading.output), leading.limits
+            ),
             checks=checks,
-            joint=proportion(self.units, int(np.count_nonzero(~kept.all(axis=0)))),
+            joint=proportion(self.units, int(np.count_nonzero(~kept.all(axis=0)))).doubted(every, ANY_LIMIT),
             outputs=values,
             by_zone=_by_zone(sample, checks[0].constraints[0].value),
             by_deviation=sample.sensitivity(sample.outputs[0]) if sample.outputs[0] in sample.exact else None,
             confidence=self.confidence,
             near=sample.nearest,
+            doubts=doubts,
         )
+
+
+ALL_LIMITS = ""
+"""Key of the doubt about all limits at once."""
+
+
+def _doubts(
+    sample: DesignSample, requirements: tuple[Requirement, ...], values: Mapping[str, Float[np.ndarray, " unit"]]
+) -> dict[str, ProcessDoubt]:
+    """Return what measured parts leave open of all that is limited, nothing where no part was measured."""
+    doubting = ProcessDoubt.about(sample.space.errors, sample.x)
+    if doubting is None:
+        return {}
+    read = {own.output: own.read(values) for own in requirements}
+    every = largest_excess(read, {own.output: own.limits for own in requirements})
+    found = {name: doubting(own) for name, own in {**read, ALL_LIMITS: every}.items()}
+    return {name: doubt for name, doubt in found.items() if doubt}
 
 
 def _by_zone(sample: DesignSample, quantile: float) -> Float[np.ndarray, " source"] | None:

@@ -21,6 +21,7 @@ from tolalloc.reports.feature_frame import callout_assumptions
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import Examination, portrait_of
 from tolalloc.reports.tellers.allocation_assembly import assembly_cost_sentences
+from tolalloc.reports.tellers.check import MORE_PARTS, few_parts
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import QUICK_RUN, number, quantity, short, with_unit
 from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
@@ -88,6 +89,7 @@ def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     found += assembly_cost_sentences(result, cost_unit)
     if len(result.requirements) > 1 and not chosen.jointly:
         found.append(_say("all_limits", share=chosen.joint.estimate))
+    found += _few_parts(result, cost_unit)
     if result.met and result.error < _EVEN_ODDS:
         found.append(_say("error", error=result.error))
     return (
@@ -169,6 +171,25 @@ def today_values(result: AllocationResult) -> tuple[str, ...]:
     )
     names = [short(own.output) for own in result.requirements if isinstance(own, OwnLimit)]
     return (said, *((_say("own_limit", names=" and ".join(names)),) if names else ()))
+
+
+def _few_parts(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
+    """Return what few measured parts do to the interval and to the zones, and what 100 parts would bring."""
+    chosen, check = result.chosen, result.chosen.checks[0]
+    interval = few_parts(chosen.joint if chosen.jointly else chosen.achieved)
+    asked, doubt = check.requirement, chosen.doubts.get(check.requirement.output)
+    if doubt is None or not isinstance(asked.guarantee, AtYield):
+        return interval
+    ways = {"margin": doubt, "less": doubt.with_parts(MORE_PARTS)}
+    margins = {name: own.margin(asked.limits, 1 - asked.guarantee.target) for name, own in ways.items()}
+    gaps = {name: with_unit(f"{margin:.3g}", asked.output) for name, margin in margins.items()}
+    said = [_say("margin", output=quantity(asked.output), **gaps)]
+    if min(doubt.parts) < MORE_PARTS:
+        price = sum(result.free.prices.get(side.stack.name, 0.0) for side in check.constraints)
+        saved = price * (margins["margin"] - margins["less"])
+        key = "margin_saves" if saved > _NOTHING * chosen.cost else "margin_less"
+        said.append(_say(key, more=MORE_PARTS, saved=saved, cost_unit=cost_unit, **gaps))
+    return (*interval, " ".join(said))
 
 
 def drawn_amounts(result: AllocationResult) -> tuple[str, ...]:

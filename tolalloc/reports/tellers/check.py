@@ -10,7 +10,7 @@ from typing import Any
 
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.requirement import Requirement
-from tolalloc.capability.monte_carlo import KeptLimits
+from tolalloc.capability.monte_carlo import KeptLimits, Yield
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import doubts
@@ -174,8 +174,30 @@ def today_sentence(kept: KeptLimits) -> str:
     each = ", ".join(_say("each", output=short(name), share=own.estimate) for name, own in kept.each.items())
     said = {"units": joint.units, "share": joint.estimate, "low": 100 * joint.low, "high": joint.high}
     if len(kept.each) == 1:
-        return _say("today_one", output=short(next(iter(kept.each))), **said)
-    return _say("today", each=each, **said)
+        today = _say("today_one", output=short(next(iter(kept.each))), **said)
+    else:
+        today = _say("today", each=each, **said)
+    return " ".join((today, *few_parts(joint)))
+
+
+MORE_PARTS = 100
+"""Measured parts of every source whose worth is said where there are fewer [-]."""
+
+
+def few_parts(found: Yield) -> tuple[str, ...]:
+    """Return that an interval holds what measured parts leave open, and what it would be with 100 of them.
+
+    Nothing without measured parts.
+    """
+    if found.widening is None:
+        return ()
+    parts = found.widening.doubt.parts
+    gaps = {"parts": min(parts), "sources": len(parts), "low": 100 * found.low, "high": found.high}
+    said = [_say("few_parts_one" if len(parts) == 1 else "few_parts", **gaps)]
+    if min(parts) < MORE_PARTS:
+        more = found.widening.with_parts(MORE_PARTS)
+        said.append(_say("more_parts", more=MORE_PARTS, low=100 * more.low, high=more.high))
+    return (" ".join(said),)
 
 
 def _cost(space: DesignSpace) -> float:

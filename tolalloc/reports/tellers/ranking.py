@@ -18,6 +18,7 @@ from tolalloc.reports.finished_run import told_yields
 from tolalloc.reports.portrait import Portrait, portrait_of
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.tellers import ranking_tables as tables
+from tolalloc.reports.tellers.check import few_parts
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import QUICK_RUN, alike, number, quantity, sign_of
 from tolalloc.sensitivity.ranking import Convergence, Neighbours
@@ -87,6 +88,7 @@ class RankingTeller(Teller[RankingResult]):
             self._rejects(),
             self._beyond(),
             *self._all_limits(),
+            *few_parts(self.result.joint),
             self._opening(),
             chosen_surrogate(found.choice),
             *self._portrait.remarks,

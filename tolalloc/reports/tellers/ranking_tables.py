@@ -511,7 +511,7 @@ def measured_tables(result: RankingResult) -> tuple[tuple[str, pd.DataFrame], ..
         (source.name, source.measured.fit, fitted)
         for source in result.errors.active
         if source.measured
-        for fitted in source.measured.fit.fits
+        for fitted in source.measured.fit.fits or (None,)
     ]
     columns = {
         "source": [name for name, _, _ in rows],
@@ -520,10 +520,11 @@ def measured_tables(result: RankingResult) -> tuple[tuple[str, pd.DataFrame], ..
         "sigma [µm]": [fit.deviation / MICROMETRE for _, fit, _ in rows],
         "Cp [-]": [fit.cp for _, fit, _ in rows],
         "Cpk [-]": [fit.cpk for _, fit, _ in rows],
-        "distribution": [fitted.distribution.value for _, _, fitted in rows],
-        "AIC [-]": [fitted.aic for _, _, fitted in rows],
-        "Kolmogorov–Smirnov distance [-]": [fitted.distance for _, _, fitted in rows],
-        "best": ["yes" if fitted is fit.best else "no" for _, fit, fitted in rows],
+        # Of parts whose mean and σ alone are stated nothing can be fitted.
+        "distribution": [fitted.distribution.value if fitted else "normal" for _, _, fitted in rows],
+        "AIC [-]": [fitted.aic if fitted else np.nan for _, _, fitted in rows],
+        "Kolmogorov–Smirnov distance [-]": [fitted.distance if fitted else np.nan for _, _, fitted in rows],
+        "best": ["no" if fitted and fitted is not fit.best else "yes" for _, fit, fitted in rows],
     }
     table = of_positions("measured parts", columns, range(len(rows)))
     return ((table.name, table.frame()),) if rows else ()
