@@ -116,7 +116,7 @@ BAD_AQDEF = {
     "upper limit": (head(K2113=None, K2111="5.01"), coded(), r"the upper limit \(K2111\) is '\+10 µm from nominal'"),
     "limit is no number": (head(K2113="x"), coded(), r"the upper limit \(K2113\) is 'x'; allowed is a number"),
     "value is no number": (head(), [*coded(), "K0001/1 five"], r"a value \(K0001\) is 'five'; allowed is a number"),
-    "value is far off": (head(), [*coded(), "K0001/1 50.0"], "'50.0'; allowed is a number within 2000 µm"),
+    "value is far off": (head(), [*coded(), "K0001/1 5000.0"], "'5000.0'; allowed is a number within 1,000,000 µm"),
     "few parts": (head(), coded(PARTS[:19]), "number of measured parts is 19; allowed is 20 or more"),
     "equal parts": (head(), coded([1.0] * 30), "parts that differ"),
     "no values": (head(), [], "it has no measured values"),

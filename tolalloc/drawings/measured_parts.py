@@ -465,7 +465,7 @@ def _of_characteristic(path: Path, name: str, made_to: MadeTo) -> MeasuredParts:
         deviation = _aqdef_number(text) * _FACTORS[unit] - nominal
         if not abs(deviation) <= LARGEST_DEVIATION:
             with faults.kept():
-                allowed = f"a number within {LARGEST_DEVIATION:g} µm of the nominal size"
+                allowed = f"a number within {LARGEST_DEVIATION:,.0f} µm of the nominal size"
                 raise InputError.at(where, "a value (K0001)", text, allowed)
         values.append(deviation)
     faults.require_none()
