@@ -198,7 +198,7 @@ export class Chart {
   }
 
   plane() {
-    const { figure } = this, height = figure.height ?? Math.max(180, Math.min(380, 0.55 * this.width));
+    const { figure } = this, height = figure.height ?? Math.max(150, Math.min(380, 0.46 * this.width));
     const svg = this.canvas(height);
     let [xl, xh] = this.zoom ?? padded(range(extent(figure, "x")), 0.02, figure.logarithmic_x);
     const positive = (values, logarithmic) => (logarithmic ? values.filter((value) => value > 0) : values);

@@ -210,13 +210,12 @@ def effects_figure(result: AllocationResult) -> tuple[Figure, ...]:
     largest, each = dict(list(effects(result).items())[:_EFFECTS]), effects(result, MICROMETRE)
     if not largest:
         return ()
-    kept, guarantee = with_unit(f"{result.chosen.quantile_bound:.4g}", result.leading), result.requirements[0].guarantee
-    key = "figure_effects" if isinstance(guarantee, AtYield) else "figure_effects_other"
-    names = list(largest)
+    guarantee, names = result.requirements[0].guarantee, list(largest)
+    share = f"{100 * guarantee.target:.4g} % " if isinstance(guarantee, AtYield) else ""
     figure = Figure(
         name="effects",
-        title=_say(key, output=short(result.leading), kept=kept, target=getattr(guarantee, "target", None)),
-        x_label=f"change of {result.leading}",
+        title=_say("figure_effects"),
+        x_label=f"change of {share}{short(result.leading)} [{unit_of(result.leading)}]",
         series=(
             Series(label=f"by {_STEP * 100:.0f} %", kind="bars", x=names, y=list(largest.values())),
             Series(label="by 1 µm", kind="bars", x=names, y=[each[name] for name in names]),

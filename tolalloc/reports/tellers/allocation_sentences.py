@@ -160,6 +160,7 @@ def today_values(result: AllocationResult) -> tuple[str, ...]:
     today = result.free.baseline
     several = len(result.requirements) > 1
     kept = today.joint if several else today.achieved
+    names = [short(own.output) for own in result.requirements if isinstance(own, OwnLimit)]
     said = _say(
         "today_values",
         simulated=portrait_of(result.model).simulated,
@@ -168,9 +169,9 @@ def today_values(result: AllocationResult) -> tuple[str, ...]:
         high=kept.high,
         units=kept.units,
         limits=_say("today_all" if several else "today_one"),
+        own=_say("own_limit", names=" and ".join(names)) if names else "",
     )
-    names = [short(own.output) for own in result.requirements if isinstance(own, OwnLimit)]
-    return (said, *((_say("own_limit", names=" and ".join(names)),) if names else ()))
+    return (said,)
 
 
 def _few_parts(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
