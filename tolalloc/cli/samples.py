@@ -13,6 +13,7 @@ from jaxtyping import Float
 
 from tolalloc.assembly.files import DATA as CHAINS
 from tolalloc.assembly.places import places_of
+from tolalloc.bench.lots import gauged
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
@@ -154,7 +155,9 @@ def assembly_files(reducer: Reducer) -> dict[str, str]:
     return {"chain.toml": text, "angles.csv": _MEASURED}
 
 
-_ANGLES, _PARTS, _UNITS = 720, 60, 2
+_ANGLES, _PARTS, _UNITS, _LOT = 720, 60, 2, 25
+_THICK = 1.3
+"""Deviation that all pins of the lot have in common, over the σ that fills the zone at Cp 1 [-]."""
 _NOISE = 0.5
 """Standard deviation of a simulated reading [arcsec]."""
 _BAD, _OTHERS = 6 * MICROMETRE, 0.2
@@ -195,6 +198,7 @@ class Samples:
             "cmm": lambda: {"pin_diameters.csv": self.measured_pins},
             "bench": lambda: bench_files(self.reducer, self._errors, self._units(_UNITS)),
             "curve": lambda: {"unit7.csv": self.curve},
+            "lot": lambda: {"lot.csv": self.lot},
             "parts": lambda: {"parts.csv": self.parts},
             "assembly": lambda: assembly_files(self.reducer),
         }
@@ -234,6 +238,18 @@ class Samples:
         found = kernel.model.equilibria(kernel.errors(x), kernel.torque, angle).transmission_error[0] / ARCSECOND
         read = found + _NOISE * SeedTree(1).child("readings").generator().standard_normal(_ANGLES)
         return _CURVE + "".join(f"{at:.1f},{value:.3f}\n" for at, value in zip(angle / DEGREE, read, strict=True))
+
+    @property
+    def lot(self) -> str:
+        """Gauge readings of a lot whose pins are all too thick, for ``tolalloc lot``."""
+        x, shown = self._units(_LOT), dict[str, Float[np.ndarray, " unit"]]()
+        for source, own in zip(self._errors.active, self._errors.columns_of_source, strict=True):
+            if source.each == 1 and not source.systematic:
+                header, values = gauged(source, x[:, own])
+                shown[header] = values + (_THICK * source.zone / 6 if source.name == "pin.diameter" else 0.0)
+        rows = (np.stack(list(shown.values()), axis=1) / MICROMETRE).round(3).tolist()
+        numbered = [[unit, *row] for unit, row in enumerate(rows, start=1)]
+        return table_text(("unit", *(f"{name} [µm]" for name in shown)), numbered, (_SIMULATED,))
 
     @property
     def parts(self) -> str:

@@ -17,6 +17,7 @@ from tolalloc.drawings.table_file import (
     DATA,
     read_table_file,
     require_columns,
+    setting_line,
     split_header,
     stated_currency,
     stated_settings,
@@ -169,7 +170,8 @@ class Drawing:
     def to_csv(self, path: str | Path) -> Path:
         """Write the tolerance table, which `load_drawing` reads again, into a new file, and return its path.
 
-        Process costs are not in the table: whoever reads it gives them again by ``costs=``. Nor are correlations.
+        The settings that belong to it stand below its rows. Process costs are not in the table: whoever reads it gives
+        them again by ``costs=``. Nor are correlations.
 
         Raises
         ------
@@ -177,7 +179,8 @@ class Drawing:
             The file is there already or cannot be made.
         """
         written = Path(path)
-        write_new(written, table_text(self.sources, written.parent, self.currency))
+        settings = "".join(f"{setting_line(name, value)}\n" for name, value in self.settings.items())
+        write_new(written, table_text(self.sources, written.parent, self.currency) + settings)
         return written
 
     def _repr_html_(self) -> str:
