@@ -69,6 +69,7 @@ class Gauge(StrEnum):
         return self in (Gauge.DEVIATION, Gauge.X, Gauge.Y)
 
 
+_GAUGES = {Feature.SIZE: Gauge.DEVIATION, Feature.POSITION: Gauge.RADIUS}
 _ENDINGS = {
     ".x": (Gauge.X, 1.0),
     ".y": (Gauge.Y, 1.0),
@@ -308,19 +309,27 @@ class Lots:
         seeds, width = self._seeds.child("parts"), len(source.columns)
         uniform = np.concatenate(list(uniform_chunks(SamplingDesign.SOBOL, seeds, _POINTS, width)))
         columns = source.standard_values(uniform)
-        return columns[:, 0] * source.lever if gauge in (Gauge.X, Gauge.Y) else gauged(source, columns)[1]
+        return columns[:, 0] * source.lever if gauge in (Gauge.X, Gauge.Y) else _gauged(source, columns)
 
 
-def gauged(source: Source, columns: Float[np.ndarray, "part column"]) -> tuple[str, Float[np.ndarray, " part"]]:
-    """Return how a file heads the readings of a source, without their unit, and what its gauge shows of parts [m].
-
-    Of a size the deviation from nominal, of a position the radius, of pitch and run-out the total deviation over a
-    turn; of like features the one that is worst, so that single ones are asked for with ``each`` 1.
-    """
+def _gauged(source: Source, columns: Float[np.ndarray, "part column"]) -> Float[np.ndarray, " part"]:
+    """Return what a gauge shows of a feature: deviation from nominal, radius, or total deviation over a turn [m]."""
     shown = limited_measure(source, columns)
     if source.feature is Feature.SIZE:
-        return source.name, shown + source.middle
-    return (f"{source.name}.radius", shown / 2.0) if source.feature is Feature.POSITION else (source.name, shown)
+        return shown + source.middle
+    return shown / 2.0 if source.feature is Feature.POSITION else shown
+
+
+def drawn_lot(sources: Sequence[Source], parts: int, generator: np.random.Generator) -> tuple[GaugedColumn, ...]:
+    """Return gauge readings of random parts of the drawing's processes, every source by itself."""
+    found = list[GaugedColumn]()
+    for source in (replace(own, each=1) for own in sources):
+        gauge = _GAUGES.get(source.feature, Gauge.RANGE)
+        uniform = generator.random((parts, len(source.columns)))
+        values = _gauged(source, source.standard_values(uniform) * source.zone + source.middles)
+        head = f"{source.name}.radius" if gauge is Gauge.RADIUS else source.name
+        found.append(GaugedColumn(header=f"{head} [µm]", source=source, gauge=gauge, values=values))
+    return tuple(found)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -346,6 +355,11 @@ class MeasuredProcess:
     def name(self) -> str:
         """The source, and which coordinate of it."""
         return self.column.name
+
+    @property
+    def probability(self) -> float:
+        """The smaller of both p values [-]."""
+        return min(self.shift_probability, self.spread_probability)
 
     @property
     def moved(self) -> bool:
@@ -416,7 +430,7 @@ class LotResult:
     def moved(self) -> tuple[MeasuredProcess, ...]:
         """The processes that are not the drawing's, the surest first."""
         found = [own for own in self.processes if own.moved]
-        return tuple(sorted(found, key=lambda own: min(own.shift_probability, own.spread_probability)))
+        return tuple(sorted(found, key=lambda own: own.probability))
 
     @property
     def detectable(self) -> float:
@@ -517,7 +531,7 @@ def _meant(path: Path, header: str, sources: Sequence[Source]) -> tuple[Source, 
     if source.feature is Feature.POSITION:
         allowed = f"{name}.radius or {name}.diameter, or both {name}.x and {name}.y"
         raise InputError.at(path, "the column of a position", header, allowed)
-    return source, Gauge.DEVIATION if source.feature is Feature.SIZE else Gauge.RANGE, 1.0
+    return source, _GAUGES.get(source.feature, Gauge.RANGE), 1.0
 
 
 def _require_together(table: TextTable, columns: Sequence[GaugedColumn]) -> None:
@@ -525,10 +539,10 @@ def _require_together(table: TextTable, columns: Sequence[GaugedColumn]) -> None
     faults = Faults()
     for source, own in _by_source(columns):
         gauges = sorted(column.gauge for column in own)
-        heads = " and ".join(repr(column.header) for column in own)
+        heads = ", ".join(column.header for column in own)
         with faults.kept():
             if gauges not in ([Gauge.X, Gauge.Y], *([one] for one in Gauge if one not in (Gauge.X, Gauge.Y))):
-                raise InputError.at(table.path, f"what is measured of {source.name}", heads, "one of them, or x and y")
+                raise InputError.at(table.path, f"what is measured of {source.name}", heads, "radius, diameter, or x with y")
         if gauges == [Gauge.X, Gauge.Y]:
             single = np.isfinite(own[0].values) != np.isfinite(own[1].values)
             for at in np.flatnonzero(single):

@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from tolalloc.assembly.files import DATA as CHAINS
 from tolalloc.assembly.places import places_of
-from tolalloc.bench.lots import gauged
+from tolalloc.bench.lots import drawn_lot
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
@@ -242,14 +242,13 @@ class Samples:
     @property
     def lot(self) -> str:
         """Gauge readings of a lot whose pins are all too thick, for ``tolalloc lot``."""
-        x, shown = self._units(_LOT), dict[str, Float[np.ndarray, " unit"]]()
-        for source, own in zip(self._errors.active, self._errors.columns_of_source, strict=True):
-            if source.each == 1 and not source.systematic:
-                header, values = gauged(source, x[:, own])
-                shown[header] = values + (_THICK * source.zone / 6 if source.name == "pin.diameter" else 0.0)
-        rows = (np.stack(list(shown.values()), axis=1) / MICROMETRE).round(3).tolist()
-        numbered = [[unit, *row] for unit, row in enumerate(rows, start=1)]
-        return table_text(("unit", *(f"{name} [µm]" for name in shown)), numbered, (_SIMULATED,))
+        sources = [own for own in self._errors.active if own.each == 1 and not own.systematic]
+        columns = drawn_lot(sources, _LOT, SeedTree(1).child("lot").generator())
+        read = np.array([own.values for own in columns])
+        at = [own.name for own in sources].index("pin.diameter")
+        read[at] += _THICK * sources[at].zone / 6
+        rows = [[unit, *row] for unit, row in enumerate((read.T / MICROMETRE).round(3).tolist(), start=1)]
+        return table_text(("unit", *(own.header for own in columns)), rows, (_SIMULATED,))
 
     @property
     def parts(self) -> str:

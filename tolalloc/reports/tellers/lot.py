@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from math import sqrt
 from pathlib import Path
@@ -19,6 +20,8 @@ from tolalloc.reports.wording import alike
 if TYPE_CHECKING:
     import pandas as pd
 
+_SHOWN = 10
+"""Rows of a table that a terminal shows [-]."""
 _NAMED = 5
 """Moved processes that the first sentence names [-]."""
 _LIMIT = 3.0
@@ -41,20 +44,21 @@ _PROCESSES: tuple[Column[MeasuredProcess], ...] = (
     Column(header="mean, low 2.5 % [µm]", value=lambda row: row.mean_interval[0] / MICROMETRE),
     Column(header="mean, high 97.5 % [µm]", value=lambda row: row.mean_interval[1] / MICROMETRE),
     Column(header="drawing's mean [µm]", value=lambda row: row.stated.mean / MICROMETRE, terminal=1),
-    Column(header="standard deviation [µm]", value=lambda row: row.deviation / MICROMETRE, terminal=1),
+    Column(header="standard deviation [µm]", value=lambda row: row.deviation / MICROMETRE),
     Column(header="standard deviation, low 2.5 % [µm]", value=lambda row: row.deviation_interval[0] / MICROMETRE),
     Column(header="standard deviation, high 97.5 % [µm]", value=lambda row: row.deviation_interval[1] / MICROMETRE),
-    Column(header="drawing's standard deviation [µm]", value=lambda row: row.stated.deviation / MICROMETRE, terminal=1),
-    Column(header="shift [drawing's σ]", value=lambda row: row.shift[0]),
-    Column(header="spread over the drawing's [-]", value=lambda row: row.spread[0]),
-    Column(header="p value of the mean [-]", value=lambda row: row.shift_probability, terminal=1),
-    Column(header="p value of the spread [-]", value=lambda row: row.spread_probability, terminal=1),
+    Column(header="drawing's standard deviation [µm]", value=lambda row: row.stated.deviation / MICROMETRE),
+    Column(header="shift [drawing's σ]", value=lambda row: row.shift[0], terminal=1),
+    Column(header="spread over the drawing's [-]", value=lambda row: row.spread[0], terminal=1),
+    Column(header="p value of the mean [-]", value=lambda row: row.shift_probability),
+    Column(header="p value of the spread [-]", value=lambda row: row.spread_probability),
+    Column(header="smaller p value [-]", value=lambda row: row.probability, key=None, terminal=1),
     Column(header="moved", value=_moved, terminal=1),
 )
 _CAPABILITIES: tuple[Column[LotCapability], ...] = (
     Column(header="source", value=lambda row: row.source.name, terminal=1),
     *own_words(lambda row: (row.source,)),
-    Column(header="parts [-]", value=lambda row: row.parts, terminal=1),
+    Column(header="parts [-]", value=lambda row: row.parts),
     Column(header="zone [µm]", value=lambda row: row.source.zone / MICROMETRE, terminal=1),
     Column(header="outside the zone [-]", value=lambda row: row.outside, terminal=1),
     Column(header="drawing's Cp [-]", value=lambda row: row.source.cp, terminal=1),
@@ -62,7 +66,7 @@ _CAPABILITIES: tuple[Column[LotCapability], ...] = (
     Column(header="Cp, low 2.5 % [-]", value=lambda row: row.cp_interval[0]),
     Column(header="Cp, high 97.5 % [-]", value=lambda row: row.cp_interval[1]),
     Column(header="Cpk [-]", value=lambda row: row.cpk, terminal=1),
-    Column(header="Cpk, low 2.5 % [-]", value=lambda row: row.cpk_interval[0], terminal=1),
+    Column(header="Cpk, low 2.5 % [-]", value=lambda row: row.cpk_interval[0]),
     Column(header="Cpk, high 97.5 % [-]", value=lambda row: row.cpk_interval[1]),
     Column(header="drawing's shift [half zone]", value=lambda row: row.source.shift),
     Column(header="shift [half zone]", value=lambda row: row.row.shift),
@@ -184,10 +188,14 @@ class LotTeller(Teller[LotResult]):
 
     @property
     def terminal(self) -> tuple[tuple[pd.DataFrame, str], ...]:
-        """Mean and spread, and capability."""
+        """The processes that are likeliest to have moved, and the zones that are kept least."""
+        surest = sorted(self.result.processes, key=lambda own: own.probability)
+        least = sorted(self.result.capabilities, key=lambda own: own.cpk)
+        processes = replace(self._processes, rows=surest[:_SHOWN])
+        capabilities = replace(self._capabilities, rows=least[:_SHOWN])
         return (
-            (self._processes.terminal(), _say("terminal_processes", lot=self.header.name)),
-            (self._capabilities.terminal(), _say("terminal_capability", lot=self.header.name)),
+            (processes.terminal(), _say("terminal_processes", lot=self.header.name)),
+            (capabilities.terminal(), _say("terminal_capability", lot=self.header.name)),
         )
 
     @property
