@@ -11,6 +11,7 @@ import pytest
 from scipy import stats
 
 import tolalloc as ta
+from tests.validation_manual import shown
 from tolalloc.bench.lots import (
     CONFIDENCE,
     Gauge,
@@ -178,6 +179,8 @@ def test_control_limits_have_the_printed_constants(parts, a, centre, b5, b6):
     assert c4(parts) == pytest.approx(centre, abs=5e-5)
     assert found.mean == pytest.approx((-a, a), abs=6e-4)
     assert found.deviation == pytest.approx((b5, b6), abs=6e-4)
+    if parts == 5:
+        shown("C8", found.deviation[1])
 
 
 def test_holm_rejects_no_less_than_bonferroni_and_nothing_behind_the_first_kept():

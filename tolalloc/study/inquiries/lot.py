@@ -51,7 +51,8 @@ class Lot(Inquiry["LotRequest"]):
         """Return what moved, the capabilities and the drawing of the lot."""
         from tolalloc.bench.lots import judge_lot
 
-        header = Header(name=prepared.path.name, model=prepared.drawing.name, seed=prepared.seed)
+        named = Path(prepared.drawing.name).name
+        header = Header(name=prepared.path.name, model=named, seed=prepared.seed)
         return Answer(kind="lot", header=header, result=judge_lot(prepared))
 
     def write(self, answer: Answer[Any]) -> tuple[str, ...]:
