@@ -36,7 +36,7 @@ def test_a_lot_is_told_reported_and_read_back_as_a_drawing(tmp_path):
     folder, table = tmp_path / "report", tmp_path / "zones.csv"
     done = tolalloc("lot", lot, drawing, "--next-parts", 5, "--write", table, "--out", folder)
     assert done.returncode == 0, done.stderr
-    assert "Moved: hub: its mean is" in done.stdout
+    assert "Moved: the mean of hub, " in done.stdout
     assert "The tolerance table of the lot is" in done.stderr
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert summary["moved"] == ["hub"]
@@ -55,6 +55,15 @@ def test_a_lot_is_told_reported_and_read_back_as_a_drawing(tmp_path):
 def test_a_lot_of_the_drawing_s_processes_moves_nothing(tmp_path):
     done = tolalloc("lot", *written(tmp_path, ("hub [µm]", HUB), ("bore.radius [µm]", BORE)))
     assert "No process moved: all 2 columns" in done.stdout, done.stdout
+
+
+def test_an_office_s_file_is_read_with_semicolons_and_decimal_commas(tmp_path):
+    lot, drawing = written(tmp_path, ("hub [µm]", HUB), ("bore.radius [µm]", BORE))
+    plain = tolalloc("lot", lot, drawing).stdout
+    text = lot.read_text(encoding="utf-8").replace(",", ";").replace(".5", ",5")
+    lot.write_text(text, encoding="cp1252")
+    assert ",5" in text
+    assert tolalloc("lot", lot, drawing).stdout == plain
 
 
 def test_readings_in_another_unit_are_doubted_and_their_row_is_cut_to_what_a_table_takes(tmp_path):

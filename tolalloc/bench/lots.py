@@ -44,6 +44,8 @@ _POINTS = 2**15
 """Parts of a process of which simulated lots are drawn [-]."""
 _LOTS = (2**14, 2**18)
 """Fewest and most simulated lots of one process [-]."""
+_DRAWN = 2**25
+"""Readings of simulated lots of one process from which on there are fewer lots [-]."""
 _BEYOND = 20
 """Simulated lots that are expected beyond the strictest level of a test [-]."""
 _CAPABILITY, _SHIFT = (0.1, 10.0), 1.0
@@ -293,10 +295,11 @@ class Lots:
         readings = self._parts[key]
         mean, deviation = float(readings.mean()), float(readings.std())
         generator = self._seeds.child("lots", str(parts)).generator()
-        means, deviations = np.empty(self.count), np.empty(self.count)
+        count = max(_LOTS[0], min(self.count, _DRAWN // parts))
+        means, deviations = np.empty(count), np.empty(count)
         step = max(1, _CHUNK // parts)
-        for start in range(0, self.count, step):
-            stop = min(start + step, self.count)
+        for start in range(0, count, step):
+            stop = min(start + step, count)
             lots = readings[generator.integers(readings.size, size=(stop - start, parts))]
             means[start:stop], deviations[start:stop] = lots.mean(axis=1), lots.std(axis=1, ddof=1)
         law = SimulatedLaw(
@@ -424,7 +427,7 @@ class LotResult:
     capabilities: tuple[LotCapability, ...]  # One per source
     rows: int  # Measured parts or units [-]
     level: float  # False-alarm rate over all columns [-]
-    lots: int  # Simulated lots of a process that is not normal [-]
+    lots: int  # Simulated lots of a process that is not normal, fewer where lots are very large [-]
 
     @property
     def moved(self) -> tuple[MeasuredProcess, ...]:
@@ -542,7 +545,8 @@ def _require_together(table: TextTable, columns: Sequence[GaugedColumn]) -> None
         heads = ", ".join(column.header for column in own)
         with faults.kept():
             if gauges not in ([Gauge.X, Gauge.Y], *([one] for one in Gauge if one not in (Gauge.X, Gauge.Y))):
-                raise InputError.at(table.path, f"what is measured of {source.name}", heads, "radius, diameter, or x with y")
+                what = f"what is measured of {source.name}"
+                raise InputError.at(table.path, what, heads, "radius, diameter, or x with y")
         if gauges == [Gauge.X, Gauge.Y]:
             single = np.isfinite(own[0].values) != np.isfinite(own[1].values)
             for at in np.flatnonzero(single):

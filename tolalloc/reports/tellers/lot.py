@@ -235,7 +235,7 @@ class LotTeller(Teller[LotResult]):
                     label="mean and 95 % interval", kind="bars", x=[own.name for own in rows], y=one, low=low, high=high
                 ),
             ),
-            vertical=((-_LIMIT, "control limit"), (_LIMIT, "control limit")),
+            vertical=((-_LIMIT, ""), (_LIMIT, "control limits")),
         )
 
     @property
