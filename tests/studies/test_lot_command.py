@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import pandas as pd
 import pytest
 
 import tolalloc as ta
@@ -64,6 +65,16 @@ def test_an_office_s_file_is_read_with_semicolons_and_decimal_commas(tmp_path):
     lot.write_text(text, encoding="cp1252")
     assert ",5" in text
     assert tolalloc("lot", lot, drawing).stdout == plain
+
+
+def test_a_workbook_is_read_as_its_csv(tmp_path):
+    lot, drawing = written(tmp_path, ("hub [µm]", ("", *HUB[1:])), ("bore.radius [µm]", BORE))
+    book = tmp_path / "lot.xlsx"
+    pd.read_csv(lot).to_excel(book, index=False)
+    said = [tolalloc("lot", path, drawing).stdout for path in (lot, book)]
+    assert said[0].replace("lot.csv", "lot.xlsx").split() == said[1].split()
+    pd.DataFrame(columns=["hub [µm]"]).to_excel(tmp_path / "empty.xlsx", index=False)
+    refused(tolalloc("lot", tmp_path / "empty.xlsx", drawing), "the table has no rows")
 
 
 def test_readings_in_another_unit_are_doubted_and_their_row_is_cut_to_what_a_table_takes(tmp_path):

@@ -183,6 +183,22 @@ def test_control_limits_have_the_printed_constants(parts, a, centre, b5, b6):
         shown("C8", found.deviation[1])
 
 
+def test_no_control_limit_of_a_radius_is_below_zero():
+    drawing = drawing_of({"id": "a", **ROUND}, {"id": "b", **ROW})
+    request = LotRequest(
+        path=Path("lot.csv"),
+        drawing=drawing,
+        columns=drawn_lot(drawing.sources, PARTS, np.random.default_rng(1)),
+        level=LEVEL,
+        next_parts=2,
+        seed=1,
+    )
+    radius, size = judge_lot(request).processes
+    assert radius.next.mean[0] == 0.0
+    assert radius.next.mean[1] == pytest.approx(radius.stated.mean + 3 * radius.stated.deviation / np.sqrt(2))
+    assert size.next.mean == pytest.approx((-3e-6 / np.sqrt(2), 3e-6 / np.sqrt(2)))
+
+
 def test_holm_rejects_no_less_than_bonferroni_and_nothing_behind_the_first_kept():
     assert holm([0.001, 0.02, 0.011, 0.5], 0.05).tolist() == [True, True, True, False]
     assert holm([0.001, 0.03, 0.03, 0.04], 0.05).tolist() == [True, False, False, False]

@@ -20,7 +20,7 @@ from tolalloc.drawings.fields import UNITS
 from tolalloc.drawings.measured_parts import LARGEST_DEVIATION
 from tolalloc.drawings.seeds import SamplingDesign, SeedTree, require_seed, uniform_chunks
 from tolalloc.drawings.sources import Source, known_as, limited_measure
-from tolalloc.drawings.table_file import TextTable, read_text_table, split_header
+from tolalloc.drawings.table_file import TextTable, read_table_file, read_text_table, split_header
 from tolalloc.drawings.zones import Feature, ZoneMapping
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.units import MICROMETRE
@@ -477,7 +477,7 @@ def load_lot(path: Path, sources: Sequence[Source]) -> tuple[GaugedColumn, ...]:
     InputError, UnknownNameError
         The file, row, column and value that are not allowed; all such of one file together.
     """
-    table, faults, columns = read_text_table(path), Faults(), list[GaugedColumn]()
+    table, faults, columns = _table(path), Faults(), list[GaugedColumn]()
     for header in table.headers:
         if header.lower() in WORDS:
             continue
@@ -488,6 +488,17 @@ def load_lot(path: Path, sources: Sequence[Source]) -> tuple[GaugedColumn, ...]:
         raise InputError(f"{path}: no column holds readings; allowed are heads such as 'disc1.pitch [µm]'.")
     _require_together(table, columns)
     return tuple(columns)
+
+
+def _table(path: Path) -> TextTable:
+    """Return the cells of a CSV file, or of the first sheet of a workbook."""
+    if path.suffix.lower() not in (".xlsx", ".xlsm"):
+        return read_text_table(path)
+    (_, headers), *others = read_table_file(path)
+    if not others:
+        raise InputError(f"{path}: the table has no rows; a line of headers and one row or more are needed.")
+    rows, cells = zip(*others, strict=True)
+    return TextTable(path=path, headers=headers, rows=rows, cells=cells)
 
 
 def _column(table: TextTable, header: str, sources: Sequence[Source]) -> GaugedColumn:
@@ -595,6 +606,9 @@ def _measured(column: GaugedColumn, lots: Lots, next_parts: int | None) -> Measu
     values = column.taken
     stated = lots.process(column.source, column.gauge, values.size)
     mean, deviation = float(values.mean()), float(values.std(ddof=1))
+    limits = control_limits(stated.mean, stated.deviation, next_parts or values.size)
+    if not column.gauge.has_sign:  # no radius lies below zero
+        limits = replace(limits, mean=(max(limits.mean[0], 0.0), limits.mean[1]))
     return MeasuredProcess(
         column=column,
         stated=stated,
@@ -604,7 +618,7 @@ def _measured(column: GaugedColumn, lots: Lots, next_parts: int | None) -> Measu
         deviation_interval=stated.deviation_interval(deviation),
         shift_probability=stated.law.shift_probability((mean - stated.mean) / stated.deviation),
         spread_probability=stated.law.spread_probability(deviation / stated.deviation),
-        next=control_limits(stated.mean, stated.deviation, next_parts or values.size),
+        next=limits,
     )
 
 

@@ -23,9 +23,9 @@ class Lot(Inquiry["LotRequest"]):
     by_position: ClassVar[int] = 2
 
     readings: Annotated[
-        Path, Word("CSV: a row per part or unit, a column per source, 'disc1.pitch [µm]'; cells may be empty.")
+        Path, Word("CSV or XLSX: a row per part or unit, a column per source, 'disc1.pitch [µm]'; cells may be empty.")
     ]
-    tolerances: Annotated[str, Word("Tolerance table of the drawing: shipped name, CSV or XLSX.")]
+    tolerances: Annotated[Path, Word("Tolerance table of the drawing: shipped name, CSV or XLSX.")]
     sheet: Annotated[str, Word("Sheet of a workbook that holds the table; the first unless given.")] = ""
     false_alarms: Annotated[float, Word("Probability that any process is called moved if none is.")] = 0.05
     next_parts: Annotated[
