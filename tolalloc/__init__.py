@@ -142,7 +142,19 @@ _WHERE = {
 }
 """Public name → where it stands, with its name there if that is another one, empty for a whole module."""
 
-_INQUIRIES = ("assemble", "compare", "contact", "costs", "diagnose", "identify", "modify", "mount", "simulate", "te")
+_INQUIRIES = (
+    "assemble",
+    "compare",
+    "contact",
+    "costs",
+    "diagnose",
+    "identify",
+    "lot",
+    "modify",
+    "mount",
+    "simulate",
+    "te",
+)
 """Questions that need no study, asked by a function of their own name and by the command of the same."""
 
 __all__ = sorted([*_WHERE, *_INQUIRIES])

@@ -23,6 +23,7 @@ MEANT = {
     },
     "--write": {
         "Reducer file to write, new: the reducer with these amounts.",
+        "Tolerance table to write, new: Cp and shift of the lot.",
         "Stiffness file to write, new, for --stiffness elsewhere.",
     },
 }

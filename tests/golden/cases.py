@@ -98,7 +98,7 @@ study = ta.Study(
 
 COMMANDS = (
     *("new", "check", "open", "run", "rank", "allocate", "whatif", "series", "compare", "costs", "te", "contact"),
-    *("modify", "identify", "diagnose", "assemble", "mount", "simulate", "schema", "doctor"),
+    *("modify", "identify", "diagnose", "lot", "assemble", "mount", "simulate", "schema", "doctor"),
 )
 
 
@@ -200,6 +200,7 @@ LONGER = (
             "assemble @mine/chain.toml --measured @mine/angles.csv --out @assemble",
             "assemble bx40e",
             "costs @mine/shop.csv --out @costs",
+            "lot @mine/lot.csv @mine/zones.csv --write @lot.csv --out @lot",
             "schema reducer",
             "schema bench",
             "te --reducer rv21e",

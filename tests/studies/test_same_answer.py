@@ -48,6 +48,13 @@ def test_costs(shop):
     assert [fit.process for fit in answer.result] == ["ground"]
 
 
+def test_lot(tmp_path):
+    path = tmp_path / "lot.csv"
+    path.write_text("pin.diameter [µm]\n" + "".join(f"{0.6 + at / 10}\n" for at in range(9)), encoding="utf-8")
+    answer = same("lot", path, "rv20e_drawing", seed=2)
+    assert [own.name for own in answer.result.moved] == ["pin.diameter"]
+
+
 @pytest.mark.slow
 def test_te():
     answer = same("te", typed="--attribute", reducer="rv20e", unit="table4", attributed=True)
@@ -155,6 +162,12 @@ def test_mount(mine):
         ),
         ("diagnose", {"curve": "unit7.csv", "noise": 0}, "ta.diagnose: noise is 0.0; allowed is above 0 up to 60."),
         ("mount", {"parts": "parts.csv", "starts": 0}, "ta.mount: starts is 0; allowed is 1 to 64."),
+        ("lot", {"readings": 5, "tolerances": "rv20e_drawing"}, "ta.lot: readings is 5; allowed is a path."),
+        (
+            "lot",
+            {"readings": "lot.csv", "tolerances": "rv20e_drawing", "false_alarms": 0},
+            "ta.lot: false_alarms is 0.0; allowed is 0.001 to 0.5.",
+        ),
         ("assemble", {"chain": "bx40e", "precision": -1}, "ta.assemble: precision is -1.0; allowed is 0 to 1e+06."),
     ],
 )

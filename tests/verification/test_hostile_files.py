@@ -138,7 +138,9 @@ def test_what_is_no_file_is_refused(read, name, tmp_path):
     os.symlink(tmp_path / "loop.csv", tmp_path / "loop.csv")
     (tmp_path / "folder.csv").mkdir()
     sentence = refusal(read, tmp_path / name)
-    assert any(words in sentence for words in ("no such file", "cannot be read as a", "is a folder, a device or a pipe"))
+    assert any(
+        words in sentence for words in ("no such file", "cannot be read as a", "is a folder, a device or a pipe")
+    )
 
 
 def test_a_device_is_not_read():

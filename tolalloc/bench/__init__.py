@@ -1,1 +1,1 @@
-"""What a test bench reads: measured data, identified stiffnesses, diagnosed units."""
+"""What a test bench and gauges read: measured data, identified stiffnesses, diagnosed units, lots."""

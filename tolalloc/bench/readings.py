@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import isfinite, pi, sqrt
 from pathlib import Path
@@ -78,18 +78,33 @@ def read_column(table: TextTable, name: str) -> tuple[str, float, Float[np.ndarr
         )
     if len(headers) > 1:
         raise InputError(f"{table.path}: the column {name!r} stands there {len(headers)} times; allowed is once.")
-    unit = split_header(headers[0])[1]
+    return (headers[0], *column_readings(table, headers[0], known))
+
+
+def column_readings(
+    table: TextTable, header: str, known: Mapping[str, float]
+) -> tuple[float, Float[np.ndarray, " row"]]:
+    """Return factor to SI, and values in SI units of the column below a header; not a number where a cell holds none.
+
+    Known are units as they may be written, with their factors to SI.
+
+    Raises
+    ------
+    InputError
+        Its unit is missing or unknown, or a cell holds text.
+    """
+    unit, units = split_header(header)[1], " or ".join(known)
     if unit not in known:
-        raise InputError.at(table.path, f"the unit of column {headers[0]!r}", unit, f"{units} in square brackets")
-    position, factor = table.headers.index(headers[0]), known[unit]
+        raise InputError.at(table.path, f"the unit of column {header!r}", unit, f"{units} in square brackets")
+    position, factor = table.headers.index(header), known[unit]
     values = np.full(len(table.rows), np.nan)
     faults = Faults()
     for number, (row, cells) in enumerate(zip(table.rows, table.cells, strict=True)):
         if cells[position].lower() not in MISSING:
             with faults.kept():
-                values[number] = factor * _reading(cells[position], f"{table.path}, row {row}", headers[0])
+                values[number] = factor * _reading(cells[position], f"{table.path}, row {row}", header)
     faults.require_none()
-    return headers[0], factor, values
+    return factor, values
 
 
 def _reading(cell: str, place: str, header: str) -> float:

@@ -1,8 +1,10 @@
-"""Capability of a characteristic: indices, parts per million, and intervals that assume no distribution."""
+"""Capability of a characteristic: indices, parts per million, intervals that assume no distribution, control limits."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import exp, lgamma, sqrt
 from typing import Literal
 
 import numpy as np
@@ -291,6 +293,79 @@ def quantile_interval(sample: Float[np.ndarray, " unit"], share: float, confiden
         units=units,
         needed=int(np.ceil(np.log(tail) / np.log(max(share, 1 - share)))),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControlLimits:
+    """Between which mean and standard deviation of a sample lie while its process is the one that is known."""
+
+    parts: int  # Of the sample [-]
+    # [unit of the characteristic]
+    mean: tuple[float, float]
+    deviation: tuple[float, float]
+
+
+def c4(parts: int) -> float:
+    """Return the mean of s over σ of normal samples, c4 = √(2/(n − 1))·Γ(n/2)/Γ((n − 1)/2) [-].
+
+    References
+    ----------
+    ISO 7870-2:2013, table of constants; any handbook of statistics has the formula.
+
+    Examples
+    --------
+    >>> round(c4(5), 4), round(c4(25), 4)
+    (0.94, 0.9896)
+    """
+    return sqrt(2.0 / (parts - 1)) * exp(lgamma(parts / 2.0) - lgamma((parts - 1) / 2.0))
+
+
+def control_limits(mean: float, deviation: float, parts: int) -> ControlLimits:
+    """Return the limits of x̄ and s charts at ±3σ of a process that is known, B5·σ…B6·σ = (c4 ∓ 3·√(1 − c4²))·σ.
+
+    For normal readings 99.73 % of the means lie between them; for radii and total deviations nearly so.
+
+    References
+    ----------
+    ISO 7870-2:2013, Shewhart control charts, the process parameters given.
+
+    Examples
+    --------
+    Of five parts with σ = 1, A = 3/√5 = 1.342 and B6 = 1.964:
+
+    >>> own = control_limits(0.0, 1.0, 5)
+    >>> [round(one, 3) for one in (*own.mean, *own.deviation)]
+    [-1.342, 1.342, 0.0, 1.964]
+    """
+    centre, reach = c4(parts), 3.0 * sqrt(max(1.0 - c4(parts) ** 2, 0.0))
+    off = 3.0 * deviation / sqrt(parts)
+    return ControlLimits(
+        parts=parts,
+        mean=(mean - off, mean + off),
+        deviation=(max(centre - reach, 0.0) * deviation, (centre + reach) * deviation),
+    )
+
+
+def holm(probabilities: Sequence[float], level: float) -> Bool[np.ndarray, " test"]:
+    """Return which hypotheses are rejected, at most one of them wrongly so with probability `level`, however dependent.
+
+    The smallest p value is held against level/m, the next against level/(m − 1), up to the first that is above.
+
+    References
+    ----------
+    Holm, A simple sequentially rejective multiple test procedure, Scand. J. Stat. 6, 1979, 65–70.
+
+    Examples
+    --------
+    >>> holm([0.01, 0.04, 0.03, 0.005], 0.05).tolist()
+    [True, False, False, True]
+    """
+    values = np.asarray(probabilities, dtype=float)
+    order = np.argsort(values, kind="stable")
+    kept = values[order] <= level / (values.size - np.arange(values.size))
+    rejected = np.zeros(values.size, dtype=bool)
+    rejected[order[np.logical_and.accumulate(kept)]] = True
+    return rejected
 
 
 def _deviation_within(sample: Float[np.ndarray, " unit"], subgroup: int) -> float:

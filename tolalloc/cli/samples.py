@@ -13,6 +13,7 @@ from jaxtyping import Float
 
 from tolalloc.assembly.files import DATA as CHAINS
 from tolalloc.assembly.places import places_of
+from tolalloc.bench.lots import drawn_lot
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
@@ -154,7 +155,9 @@ def assembly_files(reducer: Reducer) -> dict[str, str]:
     return {"chain.toml": text, "angles.csv": _MEASURED}
 
 
-_ANGLES, _PARTS, _UNITS = 720, 60, 2
+_ANGLES, _PARTS, _UNITS, _LOT = 720, 60, 2, 25
+_THICK = 1.3
+"""Deviation that all pins of the lot have in common, over the σ that fills the zone at Cp 1 [-]."""
 _NOISE = 0.5
 """Standard deviation of a simulated reading [arcsec]."""
 _BAD, _OTHERS = 6 * MICROMETRE, 0.2
@@ -195,6 +198,7 @@ class Samples:
             "cmm": lambda: {"pin_diameters.csv": self.measured_pins},
             "bench": lambda: bench_files(self.reducer, self._errors, self._units(_UNITS)),
             "curve": lambda: {"unit7.csv": self.curve},
+            "lot": lambda: {"lot.csv": self.lot},
             "parts": lambda: {"parts.csv": self.parts},
             "assembly": lambda: assembly_files(self.reducer),
         }
@@ -234,6 +238,17 @@ class Samples:
         found = kernel.model.equilibria(kernel.errors(x), kernel.torque, angle).transmission_error[0] / ARCSECOND
         read = found + _NOISE * SeedTree(1).child("readings").generator().standard_normal(_ANGLES)
         return _CURVE + "".join(f"{at:.1f},{value:.3f}\n" for at, value in zip(angle / DEGREE, read, strict=True))
+
+    @property
+    def lot(self) -> str:
+        """Gauge readings of a lot whose pins are all too thick, for ``tolalloc lot``."""
+        sources = [own for own in self._errors.active if own.each == 1 and not own.systematic]
+        columns = drawn_lot(sources, _LOT, SeedTree(1).child("lot").generator())
+        read = np.array([own.values for own in columns])
+        at = [own.name for own in sources].index("pin.diameter")
+        read[at] += _THICK * sources[at].zone / 6
+        rows = [[unit, *row] for unit, row in enumerate((read.T / MICROMETRE).round(3).tolist(), start=1)]
+        return table_text(("unit", *(own.header for own in columns)), rows, (_SIMULATED,))
 
     @property
     def parts(self) -> str:

@@ -281,7 +281,7 @@ def table_workbook(sources: Sequence[Source]) -> bytes:
     return book.content()
 
 
-SAMPLES = ("costs", "processes", "cmm", "bench", "curve", "parts", "assembly")
+SAMPLES = ("costs", "processes", "cmm", "bench", "curve", "lot", "parts", "assembly")
 """Kinds of samples that a folder may have."""
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,59}")
 _USUAL = 60.0
@@ -342,6 +342,7 @@ _SAID = {
     },
     "bench": {"bench.toml": "curves and loops of two units, simulated; its tables are `bench_….csv`"},
     "curve": {"unit7.csv": "the curve of a bad unit, simulated"},
+    "lot": {"lot.csv": "gauge readings of a lot of 25 units, simulated"},
     "parts": {"parts.csv": "measured parts of two units, simulated"},
     "assembly": {
         "chain.toml": "which part is adjusted against which, as zhang2025 has it",
@@ -354,6 +355,7 @@ _ASKED = {
     "processes": "tolalloc check with_processes.py",
     "bench": "tolalloc identify bench.toml --reducer reducer.toml",
     "curve": "tolalloc diagnose unit7.csv --reducer reducer.toml --tolerances zones.csv",
+    "lot": "tolalloc lot lot.csv zones.csv",
     "parts": "tolalloc mount parts.csv --reducer reducer.toml",
     "assembly": "tolalloc assemble chain.toml --measured angles.csv",
 }

@@ -17,6 +17,7 @@ from tolalloc.drawings.table_file import (
     DATA,
     read_table_file,
     require_columns,
+    setting_line,
     split_header,
     stated_currency,
     stated_settings,
@@ -173,8 +174,9 @@ class Drawing:
     def to_csv(self, path: str | Path) -> Path:
         """Write the tolerance table, which `load_drawing` reads again, into a new file, and return its path.
 
-        Heads of an office's are written again, and what they mean into a TOML file beside the table.
-        Process costs are not in the table: whoever reads it gives them again by ``costs=``. Nor are correlations.
+        Heads of an office's are written again, and what they mean into a TOML file beside the table. The settings that
+        belong to it stand below its rows. Process costs are not in the table: whoever reads it gives them again by
+        ``costs=``. Nor are correlations.
 
         Raises
         ------
@@ -182,7 +184,8 @@ class Drawing:
             The file is there already or cannot be made.
         """
         written, called = Path(path), self.errors.called
-        write_new(written, table_text(self.sources, written.parent, self.currency, called))
+        settings = "".join(f"{setting_line(name, value)}\n" for name, value in self.settings.items())
+        write_new(written, table_text(self.sources, written.parent, self.currency, called) + settings)
         if called:
             write_new(heads_file(written), heads_text(called))
         return written
