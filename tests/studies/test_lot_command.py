@@ -86,8 +86,8 @@ def test_readings_in_another_unit_are_doubted_and_their_row_is_cut_to_what_a_tab
 @pytest.mark.parametrize(
     ("columns", "sentence"),
     [
-        ([("hub", HUB)], "the unit of column 'hub' is ''; allowed is µm or um or mm in square brackets"),
-        ([("hub [inch]", HUB)], "the unit of column 'hub [inch]' is 'inch'"),
+        ([("hub", HUB)], "the unit of column 'hub' is ''; allowed is µm or um or mm or in or inch in square brackets"),
+        ([("hub [yard]", HUB)], "the unit of column 'hub [yard]' is 'yard'"),
         ([("hup [µm]", HUB)], "the source of a column 'hup' is not known; the nearest known is hub"),
         ([("bore [µm]", HUB)], "allowed is bore.radius or bore.diameter, or both bore.x and bore.y"),
         ([("hub.radius [µm]", HUB)], "the source of a column 'hub.radius' is not known"),
@@ -96,9 +96,9 @@ def test_readings_in_another_unit_are_doubted_and_their_row_is_cut_to_what_a_tab
         ([("bore.x [µm]", HUB), ("bore.y [µm]", ("", *HUB[1:]))], "row 2: bore has one coordinate"),
         ([("hub [µm]", HUB), ("hub [µm]", HUB)], "the column 'hub [µm]' is there twice; each has one"),
         ([("hub [µm]", ("thick", *HUB[1:]))], "row 2: hub [µm] is 'thick'; allowed is a number"),
-        ([("hub [µm]", ("9999", *HUB[1:]))], "row 2: hub [µm] is 9999.0; allowed is -2000 to 2000 µm"),
-        ([("bore.radius [µm]", ("-1", *HUB[1:]))], "row 2: bore.radius [µm] is -1.0; allowed is 0 to 2000 µm"),
-        ([("ring.pitch [mm]", ("3", *HUB[1:]))], "row 2: ring.pitch [mm] is 3.0; allowed is 0 to 2000 µm"),
+        ([("hub [µm]", ("9999999", *HUB[1:]))], "row 2: hub [µm] is 9999999.0; allowed is -1,000,000 to 1,000,000 µm"),
+        ([("bore.radius [µm]", ("-1", *HUB[1:]))], "row 2: bore.radius [µm] is -1.0; allowed is 0 to 1,000,000 µm"),
+        ([("ring.pitch [mm]", ("3000", *HUB[1:]))], "row 2: ring.pitch [mm] is 3000.0; allowed is 0 to 1,000,000 µm"),
         ([("hub [µm]", ("1", "2", "3", "4", "", "n/a", "-"))], "the number of readings of 'hub [µm]' is 4; allowed"),
         ([("hub [µm]", ["2"] * 7)], "every reading of 'hub [µm]' is 2; allowed are readings that differ"),
         ([("exact [µm]", HUB)], "the zone of exact is 0; allowed is a zone above 0"),

@@ -518,7 +518,7 @@ def _column(table: TextTable, header: str, sources: Sequence[Source]) -> GaugedC
     least = -largest if gauge.has_sign else 0.0
     for at in np.flatnonzero((shown < least) | (shown > largest)):
         with faults.kept():
-            allowed = f"{least / MICROMETRE:g} to {LARGEST_DEVIATION:g} µm"
+            allowed = f"{least / MICROMETRE:,.0f} to {LARGEST_DEVIATION:,.0f} µm"
             raise InputError.at(f"{path}, row {table.rows[at]}", header, float(f"{shown[at] / factor:.9g}"), allowed)
     faults.require_none()
     column = GaugedColumn(header=header, source=source, gauge=gauge, values=values)
