@@ -81,6 +81,7 @@ def _add_pins(at, weight, tables, layout, weight_of_pin, out):
             out[layout.pin + k] += own * table[d, 0, k]
             out[layout.pin + pins + k] += own * table[d, 1, k]
             out[layout.pin + 2 * pins + k] += own
+            out[layout.flank] -= own * abs(tables.contact_by_disc[at, d, 2, k])
             for m in range(layout.waves):
                 out[layout.wave + d * layout.waves + m] += own * table[d, 2 + m, k]
             for kind in range(2):

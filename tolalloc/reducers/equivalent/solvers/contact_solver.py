@@ -505,6 +505,10 @@ def _undisturbed(at, tables, layout, values, out):
             if _any_nonzero(values, start, start + layout.teeth):
                 for k in range(pins):
                     row[k] += coefficient[2 + layout.waves + kind, k] * values[start + tables.tooth[at, d, k]]
+        turned = values[layout.flank]
+        if turned != 0.0:
+            for k in range(pins):
+                row[k] -= abs(tables.contact_by_disc[at, d, 2, k]) * turned
 
 
 @jit_in_place
