@@ -109,7 +109,14 @@ MODIFICATION_CONVENTION = (
     "the discs are ground with a pin of radius r_rp + Δr_rp on a pin circle of radius R_p + Δr_p; a positive "
     "equidistant amount and a negative shift remove material"
 )
-"""What the signs of the two amounts mean on a drawing."""
+"""What the signs of these two amounts mean on a drawing."""
+
+
+ROTATION_CONVENTION = (
+    "a positive rotation turns every flank by δ about the axis of the disc towards the middle of its tooth, which "
+    "removes material on the flanks and none at tip and root; δ·r_d is its arc at the radius r_d = {radius:g} mm"
+)
+"""What the sign of the third one means there, the radius in millimetres."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,9 +128,7 @@ class Modification:
     rotation: float = 0.0  # δ: each flank is turned towards its tooth's middle by δ about the disc's centre [rad]
 
     @classmethod
-    def from_convention(
-        cls, convention: str, equidistant: float, shift: float, rotation: float = 0.0
-    ) -> Modification:
+    def from_convention(cls, convention: str, equidistant: float, shift: float, rotation: float = 0.0) -> Modification:
         """Return the modification that a source with the convention ``plus`` or ``minus`` prints [m, m, rad].
 
         Raises
@@ -144,6 +149,10 @@ class Modification:
         """Return the part of the flank clearance that turned flanks leave, δ·r_d [m]."""
         return self.rotation * stage.disc_pitch_radius
 
+    def clearances(self, stage: CycloidStage) -> tuple[float, float, float]:
+        """Return flank, radial and rotation clearance, from which `from_clearances` finds the amounts [m]."""
+        return self.flank_clearance(stage), self.radial_clearance, self.rotation_clearance(stage)
+
     @property
     def deviations(self) -> dict[str, float]:
         """The amounts as error columns of the model, the equidistant first and the rotation last [m, m, rad]."""
@@ -155,9 +164,7 @@ class Modification:
         return self.equidistant - self.shift
 
     @classmethod
-    def from_clearances(
-        cls, flank: float, radial: float, stage: CycloidStage, rotation: float = 0.0
-    ) -> Modification:
+    def from_clearances(cls, flank: float, radial: float, stage: CycloidStage, rotation: float = 0.0) -> Modification:
         """Return the amounts that leave a flank and a radial clearance, of which turned flanks leave some [m].
 
         F = Δr_rp − q·Δr_p + δ·r_d is the whole clearance of the flank, J = Δr_rp − Δr_p that at tip and root, which
