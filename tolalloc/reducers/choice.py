@@ -64,7 +64,7 @@ def bind(
     carried = reducer.torque_on_carrier(torque, place)
     # The next question of the same reducer finds the tables as they are.
     model = cached_model(at_torque(reducer, carried), AngleSearch(), orders or HARMONICS)
-    listed = {*errors.columns, *errors.fixed}
+    listed = {*errors.columns, *errors.fixed, *reducer.modification.deviations}
     patterns = dict.fromkeys((*neglected, _NOMINAL))
     left_out = {pattern: neglected_columns((pattern,), model.columns) - listed for pattern in patterns}
     fixed: Mapping[str, float] = {

@@ -280,18 +280,18 @@ class ReducerModel(Model):
         A rotation that is locked stays as it is, whatever its step. Zones of the first two stand beside them, that of
         the rotation in a frame of its own, because it holds at a radius that its row states.
         """
-        names, steps, finest = ("equidistant Δr_rp [µm]", "shift Δr_p [µm]"), (0.5, 0.5), (0.1, 0.1)
-        lever, convention = np.ones(len(self._amounts)), MODIFICATION_CONVENTION
+        names, convention = ["equidistant Δr_rp [µm]", "shift Δr_p [µm]"], MODIFICATION_CONVENTION
+        radius, locked = self.reducer.cycloid_stage.disc_pitch_radius, 0.0
         if len(self._amounts) > len(names):
-            radius, locked = self.reducer.cycloid_stage.disc_pitch_radius, self.settings[-1]
-            lever[-1], convention = radius, f"{convention}; {ROTATION_CONVENTION.format(radius=radius / MILLIMETRE)}"
-            own = abs(locked.value) if locked.lower == locked.upper else 0.0
-            names, steps, finest = (*names, "rotation δ·r_d [µm]"), (*steps, own or 0.5), (*finest, own or 0.1)
+            names, turned = [*names, "rotation δ·r_d [µm]"], self.settings[-1]
+            locked = abs(turned.value) if turned.lower == turned.upper else 0.0
+            convention = f"{convention}; {ROTATION_CONVENTION.format(radius=radius / MILLIMETRE)}"
+        count, lever = len(names), np.array([[1.0], [1.0], [radius]])
         return DrawnAmounts(
-            names=names,
-            by_setting=lever[:, np.newaxis] * self._modification_by_clearance,
-            steps=steps,
-            finest=finest,
+            names=tuple(names),
+            by_setting=lever[:count] * self._modification_by_clearance,
+            steps=(0.5, 0.5, locked or 0.5)[:count],
+            finest=(0.1, 0.1, locked or 0.1)[:count],
             convention=convention,
             sources=self._amounts[:2],
         )
