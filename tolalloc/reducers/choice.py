@@ -180,7 +180,7 @@ class ReducerChoice:
 
     @property
     def _ranges(self) -> tuple[tuple[float, float] | None, ...]:
-        return self.flank_clearance, self.radial_clearance, self.rotation_clearance
+        return self.rotation_clearance, self.flank_clearance, self.radial_clearance
 
     def set_to(self, settings: Mapping[str, float]) -> ReducerChoice:
         """Return the reducer with a tooth modification that leaves other clearances [µm], or other conditions [N·m, K].
@@ -202,7 +202,7 @@ class ReducerChoice:
         require_settings(place, known, clearances)
         if not clearances:
             return replace(self, torque=torque, disc_temperature=warmer)
-        flank, radial, turned = (clearances.get(setting.name, setting.value) * MICROMETRE for setting in known)
+        turned, flank, radial = (clearances.get(setting.name, setting.value) * MICROMETRE for setting in known)
         modification = Modification.from_clearances(flank, radial, stage, turned)
         reducer = replace(self.reducer, modification=modification)
         return replace(self, torque=torque, disc_temperature=warmer, reducer=reducer)
@@ -228,7 +228,7 @@ class ReducerChoice:
         from tolalloc.reducers.model import ReducerModel
 
         kernel, assumptions = bind(self.reducer, errors, self.torque, place, self.neglected, self.unit)
-        flank, radial, turned = ((own[0] * MICROMETRE, own[1] * MICROMETRE) if own else None for own in self._ranges)
+        turned, flank, radial = ((own[0] * MICROMETRE, own[1] * MICROMETRE) if own else None for own in self._ranges)
         return ReducerModel(
             kernel=kernel.at_disc_temperature(self.disc_temperature),
             further_disc_temperatures=self.further_disc_temperatures,

@@ -166,9 +166,9 @@ class ReducerModel(Model):
 
     @property
     def settings(self) -> tuple[Setting, ...]:
-        """Flank and radial clearance, and the rotation clearance where flanks are turned or may be."""
+        """Flank and radial clearance, before them the rotation clearance where flanks are turned or may be."""
         present = self.present_clearances
-        ranges = (self.flank, self.radial, self.turned)[: len(present)]
+        ranges = (self.turned, self.flank, self.radial)[-len(present) :]
         return clearance_settings(
             present, ((own[0] / MICROMETRE, own[1] / MICROMETRE) if own else None for own in ranges)
         )
@@ -178,7 +178,7 @@ class ReducerModel(Model):
         """Values of the settings in force [µm]."""
         own = self.reducer.modification
         count = 3 if self.turned or own.rotation else 2
-        present = own.clearances(self.reducer.cycloid_stage)[:count]
+        present = own.clearances(self.reducer.cycloid_stage)[-count:]
         return self.clearances or tuple(clearance / MICROMETRE for clearance in present)
 
     def at(self, values: Float[np.ndarray, " setting"]) -> ReducerModel:
@@ -188,7 +188,7 @@ class ReducerModel(Model):
 
     def modification(self, values: Float[np.ndarray, " setting"]) -> Modification:
         """Return the amounts that leave the clearances [µm]."""
-        flank, radial, *turned = (float(value) * MICROMETRE for value in values)
+        *turned, flank, radial = (float(value) * MICROMETRE for value in values)
         return Modification.from_clearances(flank, radial, self.reducer.cycloid_stage, *turned)
 
     @property
@@ -283,7 +283,7 @@ class ReducerModel(Model):
         names, convention = ["equidistant Δr_rp [µm]", "shift Δr_p [µm]"], MODIFICATION_CONVENTION
         radius, locked = self.reducer.cycloid_stage.disc_pitch_radius, 0.0
         if len(self._amounts) > len(names):
-            names, turned = [*names, "rotation δ·r_d [µm]"], self.settings[-1]
+            names, turned = [*names, "rotation δ·r_d [µm]"], self.settings[0]
             locked = abs(turned.value) if turned.lower == turned.upper else 0.0
             convention = f"{convention}; {ROTATION_CONVENTION.format(radius=radius / MILLIMETRE)}"
         count, lever = len(names), np.array([[1.0], [1.0], [radius]])

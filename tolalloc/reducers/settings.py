@@ -18,13 +18,13 @@ _STEP = 0.1
 
 
 def clearance_settings(present: Sequence[float], bounds: Iterable[tuple[float, float] | None]) -> tuple[Setting, ...]:
-    """Return flank, radial and, if there is a third value, rotation clearance as settings [µm].
+    """Return flank and radial clearance as settings, before them the rotation clearance if there is a third [µm].
 
     Without bounds one is locked at its present value.
     """
     return tuple(
         Setting(name=name, value=value, lower=own[0] if own else value, upper=own[1] if own else value, step=_STEP)
-        for name, value, own in zip((FLANK, RADIAL, TURNED)[: len(present)], present, bounds, strict=True)
+        for name, value, own in zip((TURNED, FLANK, RADIAL)[-len(present) :], present, bounds, strict=True)
     )
 
 

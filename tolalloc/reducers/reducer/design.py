@@ -150,8 +150,8 @@ class Modification:
         return self.rotation * stage.disc_pitch_radius
 
     def clearances(self, stage: CycloidStage) -> tuple[float, float, float]:
-        """Return flank, radial and rotation clearance, from which `from_clearances` finds the amounts [m]."""
-        return self.flank_clearance(stage), self.radial_clearance, self.rotation_clearance(stage)
+        """Return rotation, flank and radial clearance, from which `from_clearances` finds the amounts [m]."""
+        return self.rotation_clearance(stage), self.flank_clearance(stage), self.radial_clearance
 
     @property
     def deviations(self) -> dict[str, float]:

@@ -134,7 +134,7 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
             "shift Δr_p [µm]": modification.shift / MICROMETRE,
             "rotation δ [µrad]": modification.rotation / MICRORADIAN,
         }
-        settings = dict(zip((FLANK, RADIAL, TURNED), map(float, values), strict=False))
+        settings = dict(zip((TURNED, FLANK, RADIAL)[-len(values) :], map(float, values), strict=True))
         return {**dict(list(drawn.items())[: len(values)]), **settings}
 
     def effects(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, str]:
@@ -277,7 +277,7 @@ def twist_table(reducer: Reducer) -> pd.DataFrame:
 def _examination(portrait: ReducerPortrait, figures: Mapping[str, float]) -> Examination:
     """Return what is said of the nominal clearances, of the counted random units and of the catalogue."""
     model, count, solved = portrait.model, int(figures["units [-]"]), int(figures["units in equilibrium [-]"])
-    stage, (flank, radial, *_) = model.reducer.cycloid_stage, model.present_clearances
+    stage, (*_, flank, radial) = model.reducer.cycloid_stage, model.present_clearances
     if not solved:
         none = f"None of {count:,} simulated reducers has an equilibrium without torque."
         but = f"none of its units has an equilibrium: {_advice(model)}"
@@ -359,7 +359,7 @@ def _reasons(model: ReducerModel, figures: Mapping[str, float]) -> list[str]:
 
 def _advice(model: ReducerModel) -> str:
     """Return what frees preloaded units, as the end of a sentence."""
-    flank = model.present_clearances[0]
+    flank = model.present_clearances[-2]
     freely = (
         "flank_clearance of ta.reducer(...) lets the allocation open it, at present from "
         f"{model.flank[0] / MICROMETRE:.3g} to {model.flank[1] / MICROMETRE:.3g} µm"

@@ -124,11 +124,11 @@ def drawn_amounts(result: AllocationResult) -> tuple[str, ...]:
         return ()
     before, chosen = (drawn.by_setting @ design.settings for design in (result.free.baseline, result.chosen))
     amount = "amount" if np.allclose(before, chosen, rtol=1e-6, atol=_WRITTEN) else "amount_changed"
-    amounts = " and ".join(
+    *others, last = (
         _say(amount, name=short(name), value=with_unit(_signed(new), name), before=_signed(was))
         for name, was, new in zip(drawn.names, before, chosen, strict=True)
     )
-    word = portrait_of(result.model).settings_word
+    word, amounts = portrait_of(result.model).settings_word, " and ".join(filter(None, (", ".join(others), last)))
     return (_say("amounts_many" if word.endswith("s") else "amounts_one", word=word, amounts=amounts),)
 
 
