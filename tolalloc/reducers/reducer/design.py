@@ -113,8 +113,8 @@ MODIFICATION_CONVENTION = (
 
 
 ROTATION_CONVENTION = (
-    "a positive rotation turns every flank by δ about the axis of the disc towards the middle of its tooth, which "
-    "removes material on the flanks and none at tip and root; δ·r_d is its arc at the radius r_d = {radius:g} mm"
+    "a positive rotation turns every flank by δ about the axis of the disc towards the middle of its tooth and removes "
+    "material on the flanks alone; δ·r_d is its arc at the radius r_d = {radius:g} mm"
 )
 """What the sign of the third one means there, the radius in millimetres."""
 
