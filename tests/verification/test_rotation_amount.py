@@ -9,6 +9,7 @@ import pytest
 
 import tolalloc as ta
 from tests.random_cases import random_cycloid_stage, seeds
+from tests.studies.test_allocate_command import few_sources
 from tests.verification.test_cycloid_clearance import second_order
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import MICROMETRE
@@ -32,6 +33,36 @@ def prepared(drawing="rv20e_drawing", **reducer):
     given = {"rotation_clearance": (-3.0, 6.0), **RANGES, **reducer}
     table = ta.drawing(drawing) if isinstance(drawing, str) else drawing
     return Prepared(study=ta.Study(ta.reducer("rv20e", **given), table, limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)}))
+
+
+@pytest.mark.slow
+def test_an_allocation_with_turned_flanks_is_not_dearer_than_without(tmp_path):
+    """Four sources of the RV-20E of liu2020 on few units; both answers are verified on units of their own."""
+    effort = ta.Effort(
+        allocation=ta.AllocationEffort(
+            verification_units=512, confirmation_units=2048, shared_units=16, search=ta.SearchEffort(steps=4)
+        )
+    )
+
+    def found(low, high):
+        reducer = ta.reducer(
+            "rv20e_liu2020",
+            neglected=("*",),
+            flank_clearance=(1.0, 5.0),
+            radial_clearance=(5.0, 20.0),
+            rotation_clearance=(low, high),
+        )
+        limits = {ta.PEAK_TO_PEAK: ta.Limit(upper=50.0, show=ta.AtYield(target=0.95))}
+        questions = (ta.Allocation(front=False, what_if=False),)
+        drawing = ta.drawing(few_sources(tmp_path))
+        return ta.Study(reducer, drawing, limits=limits, questions=questions, effort=effort).allocate().result
+
+    fixed, free = found(0.0, 0.0), found(-4.0, 4.0)
+    assert fixed.met
+    assert free.met
+    assert fixed.chosen.settings[0] == 0.0
+    assert -4.0 <= free.chosen.settings[0] <= 4.0
+    assert free.chosen.cost < fixed.chosen.cost
 
 
 def units(study, count):
