@@ -142,7 +142,7 @@ def exact_units() -> pd.DataFrame:
                 "part of them [-]": part,
                 "flank clearance [µm]": flank / MICROMETRE,
                 "radial clearance [µm]": radial / MICROMETRE,
-                "peak-to-peak at rated torque [arcsec]": float(found.extremes.peak_to_peak[0]) / ARCSECOND,
+                "peak-to-peak at rated torque [arcsec]": round(float(found.extremes.peak_to_peak[0]) / ARCSECOND, 3),
                 "most pins in contact [-]": int(found.equilibria.pins_in_contact.max()),
                 "backlash at the carrier [arcmin]": float(found.loop.backlash[0]) / ARCMINUTE,
             }
@@ -224,8 +224,8 @@ def build(quick: bool, progress: Progress) -> Document:
             paragraphs=(
                 "The rotated profile on the equivalent model, beside the amounts that come close to it. As published "
                 "they leave a third of a millimetre or more, where its linear gaps miss the exact backlash by up to "
-                f"1.3 %; at a hundredth they can be built. Random units: {UNITS} of rv40e_drawing, the zones of its other pin "
-                "circle taken as they are (assumption).",
+                f"1.3 %; at a hundredth they can be built. Random units: {UNITS} of rv40e_drawing, the zones of its "
+                "other pin circle taken as they are (assumption).",
             ),
             tables=(("exact parts", exact_units()), ("random units", random_units())),
         ),
