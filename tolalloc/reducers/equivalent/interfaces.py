@@ -511,8 +511,9 @@ def flank_terms(reducer: Reducer) -> Terms:
     Examples
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> flank_terms(load_reducer("rv20e_liu2020"))  # r_d = e·zc, 39 teeth at 0.9 mm [m/rad]
-    {'modification.rotation': [(0, 0.0351)]}
+    >>> ((_, lever),) = flank_terms(load_reducer("rv20e_liu2020"))["modification.rotation"]
+    >>> round(lever, 9)  # r_d = e·zc, 39 teeth at 0.9 mm [m]
+    0.0351
     """
     return {"modification.rotation": [(0, reducer.cycloid_stage.disc_pitch_radius)]}
 
