@@ -20,7 +20,7 @@ from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import Examination, portrait_of
 from tolalloc.reports.tellers.allocation_assembly import assembly_cost_sentences
 from tolalloc.reports.templates import Sentences
-from tolalloc.reports.wording import QUICK_RUN, number, quantity, short, with_unit
+from tolalloc.reports.wording import QUICK_RUN, enumerated, number, quantity, short, with_unit
 from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
 
 _NOTHING = 1e-3
@@ -124,11 +124,11 @@ def drawn_amounts(result: AllocationResult) -> tuple[str, ...]:
         return ()
     before, chosen = (drawn.by_setting @ design.settings for design in (result.free.baseline, result.chosen))
     amount = "amount" if np.allclose(before, chosen, rtol=1e-6, atol=_WRITTEN) else "amount_changed"
-    *others, last = (
+    amounts = enumerated(
         _say(amount, name=short(name), value=with_unit(_signed(new), name), before=_signed(was))
         for name, was, new in zip(drawn.names, before, chosen, strict=True)
     )
-    word, amounts = portrait_of(result.model).settings_word, " and ".join(filter(None, (", ".join(others), last)))
+    word = portrait_of(result.model).settings_word
     return (_say("amounts_many" if word.endswith("s") else "amounts_one", word=word, amounts=amounts),)
 
 
@@ -415,7 +415,7 @@ def cheapest_settings(result: AllocationResult, cost_unit: str) -> tuple[str, ..
     error = ""
     if np.isfinite(trade.error):
         error = _say("trade_error", error=with_unit(f"{trade.error:.2g}", result.leading))
-    settings = " and ".join(
+    settings = enumerated(
         f"{quantity(name)} {with_unit(f'{value:.3g}', name)}"
         for name, value in zip(trade.names, trade.cheapest, strict=True)
     )
