@@ -81,7 +81,6 @@ def _add_pins(at, weight, tables, layout, weight_of_pin, out):
             out[layout.pin + k] += own * table[d, 0, k]
             out[layout.pin + pins + k] += own * table[d, 1, k]
             out[layout.pin + 2 * pins + k] += own
-            out[layout.flank] -= own * abs(tables.contact_by_disc[at, d, 2, k])
             for m in range(layout.waves):
                 out[layout.wave + d * layout.waves + m] += own * table[d, 2 + m, k]
             for kind in range(2):
@@ -166,6 +165,10 @@ def _add_derivative(position, factor, carrier, of_pins, tables, layout, design, 
             derivative.by_value[s], derivative.by_row[s],
         )  # fmt: skip
     _add_tilt(problem, turn, design.face_width, layout, values, tilt_by_pin, factor, derivative.by_value[s])
+    for d in range(problem.by_disc.shape[0]):
+        for k in range(layout.pins):
+            lever = abs(problem.by_disc[d, 2, k])
+            derivative.by_value[s, layout.flank] -= factor * weight_of_pin[d * layout.pins + k] * lever
     return status
 
 
