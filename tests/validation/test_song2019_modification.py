@@ -145,7 +145,7 @@ def exact_parts(amounts: Modification, part: float) -> TransmissionErrorResult:
 
 @pytest.mark.parametrize("part", [1.0, 0.01])
 def test_the_rotated_profile_leaves_its_angle_as_play_and_nearly_all_pins_in_contact(part):
-    """Its gap grows as the lever does, so the flank of every pin closes at once: δ to either side, hardly an error left.
+    """Its gap grows as the lever does, so the flank of every pin closes at once: δ either side, hardly an error left.
 
     The carrier turns less than the discs, by 1 − 1/i of the torque that the pins hold and zc/zp of it about the discs.
     """
