@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 from types import SimpleNamespace
 
 import pytest
 from openpyxl import load_workbook
 
+import tolalloc as ta
 from tests.studies.command import refused, tolalloc
 from tolalloc.allocation.cost.process_costs import load_process_costs
 from tolalloc.assembly.files import load_errors, load_plan
@@ -17,6 +19,7 @@ from tolalloc.cli.main import EXAMPLES, app
 from tolalloc.cli.samples import FACTOR, STIFFER
 from tolalloc.cli.start import modification_of
 from tolalloc.drawings.drawing import load_drawing
+from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.family import RV
@@ -34,7 +37,9 @@ def test_a_new_folder_is_in_order_and_has_every_source(tmp_path, preset, cranks,
     drawing = load_drawing(place / "zones.xlsx")
     assert drawing.sources == load_drawing(place / "zones.csv").sources
     columns = {source_name(name) for name in EquivalentModel(reducer).columns}
-    assert {own.name for own in drawing.sources} == {name for name in columns if not name.endswith(".clearance")}
+    # A clearance has the nominal value of the reducer file without a row, and flanks are not turned unless it says so.
+    unlisted = {name for name in columns if name.endswith(".clearance")} | {"modification.rotation"}
+    assert {own.name for own in drawing.sources} == columns - unlisted
     assert not any(own.nominal for own in drawing.sources if own.name.startswith("modification"))
     for own in drawing.sources:
         first_stage = own.name.startswith(("sun.", "planet", "mesh"))
@@ -88,6 +93,41 @@ def test_samples_fit_every_reducer(tmp_path, cranks, discs):
     ways = load_process_costs(place / "process_costs.csv", drawing.sources)
     assert {len(ways[name]) for name in ("pin.diameter", "crank2.journal1.eccentricity")} == {3}
     assert tolalloc("check", place / "with_processes.py").returncode == 0
+
+
+CLEARANCES = ("rotation clearance", "flank clearance", "radial clearance")
+
+
+def mean_twist(reducer) -> float:
+    """Return the mean transmission error of exact parts that the command prints [arcsec]."""
+    result = tolalloc("te", "--reducer", reducer, "--json")
+    assert result.returncode == 0, result.stderr
+    (mean,) = (own for own in json.loads(result.stdout)["outputs"] if own["name"] == "mean transmission error")
+    return mean["value"]
+
+
+def test_a_reducer_of_three_cranks_with_turned_flanks_is_asked_and_checked(tmp_path):
+    """40 µrad of rotation leave 2.03 µm more on the flank, which the carrier turns through, and no radial clearance."""
+    made = ta.new(tmp_path / "mine", like="rv40e", cranks=3)
+    path = made / "reducer.toml"
+    plain, text = mean_twist(path), path.read_text("utf-8")
+    path.write_text(re.sub(r"^(shift_um = .*)$", r"\1\nrotation_urad = 40", text, flags=re.MULTILINE), "utf-8")
+    turned, reducer = mean_twist(path), load_reducer(path)
+    angle = 40e-6 * (1 - 1 / reducer.ratio) * 39 / 40 / ARCSECOND
+    assert turned - plain == pytest.approx(-angle, rel=0.01)
+    checked = tolalloc("check", made / "study.py")
+    assert checked.returncode == 0, checked.stderr
+    clearances = {name: float(re.search(rf"{name}: ([\d.]+) µm", checked.stdout)[1]) for name in CLEARANCES}
+    arc = 40 * reducer.cycloid_stage.disc_pitch_radius
+    assert clearances["rotation clearance"] == pytest.approx(arc, abs=0.01)
+    assert clearances["flank clearance"] == pytest.approx(3.8 + clearances["rotation clearance"], abs=0.02)
+    assert clearances["radial clearance"] == pytest.approx(8.6)
+    for field, value, words in (
+        ("rotation_um", 2, ("'modification.rotation_um' is not known", "rotation_urad")),
+        ("rotation_urad", 9000, ("modification.rotation_urad is 9000", "5000")),
+    ):
+        path.write_text(re.sub(r"^(shift_um = .*)$", rf"\1\n{field} = {value}", text, flags=re.MULTILINE), "utf-8")
+        refused(tolalloc("te", "--reducer", path), *words)
 
 
 @pytest.mark.slow

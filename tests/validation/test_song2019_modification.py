@@ -6,16 +6,21 @@ printed there was found by another program.
 
 from __future__ import annotations
 
+from dataclasses import asdict, replace
+
 import numpy as np
 import pytest
 
 from studies.published.modification_searches import Recorder, polish
 from tolalloc.exceptions import InputError
-from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.clearance import clearance_of, formula_gap
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile, flank_angle
 from tolalloc.reducers.modification import reference, rotated_profile_fit
 from tolalloc.reducers.reducer.design import CycloidStage, Modification
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.transmission_error import TransmissionErrorResult, transmission_error
+from tolalloc.reducers.unit_file import load_unit
 
 STAGE = CycloidStage(
     pin_count=40, disc_teeth=39, pin_circle_radius=0.082, pin_radius=0.005, eccentricity=0.0015, face_width=0.01
@@ -126,3 +131,36 @@ def test_distances_against_the_tooth_profile(amounts):
 def test_rotation_beyond_reason_is_refused(rotation):
     with pytest.raises(InputError, match="rotation"):
         rotated_profile_fit(STAGE, rotation=rotation)
+
+
+ROTATED = Modification(equidistant=0.0, shift=0.0, rotation=0.005)
+
+
+def exact_parts(amounts: Modification, part: float) -> TransmissionErrorResult:
+    """Return what an RV-40E with song2019's stage and a part of these amounts does under rated torque, parts exact."""
+    modification = Modification(**{name: part * amount for name, amount in asdict(amounts).items()})
+    own = replace(load_reducer("rv40e_xi2015"), cycloid_stage=STAGE, modification=modification)
+    return transmission_error(own, load_unit("exact"), -own.load.rated_torque)
+
+
+@pytest.mark.parametrize("part", [1.0, 0.01])
+def test_the_rotated_profile_leaves_its_angle_as_play_and_nearly_all_pins_in_contact(part):
+    """Its gap grows as the lever does, so the flank of every pin closes at once: δ either side, hardly an error left.
+
+    The carrier turns less than the discs, by 1 − 1/i of the torque that the pins hold and zc/zp of it about the discs.
+    """
+    found = exact_parts(ROTATED, part)
+    assert found.extremes.peak_to_peak[0] < 0.005 * ARCSECOND  # a pin that passes a root, where it has no lever
+    touching = found.equilibria.pins_in_contact  # of both discs' 80 half have a lever of that sign, some hardly any
+    assert (touching.min(), touching.max()) == (36, 38)
+    play = 2 * part * ROTATED.rotation * (1 - 1 / found.reducer.ratio) * 39 / 40
+    assert found.loop.backlash[0] == pytest.approx(play, rel=2e-4)
+
+
+def test_the_optimum_comes_close_to_the_play_of_the_rotated_profile_and_carries_on_fewer_pins(optimum):
+    """At a hundredth of the amounts, 2.9 µm on the flank; exact distances close first elsewhere than at φ0."""
+    found, aim = exact_parts(optimum.modification, 0.01), exact_parts(ROTATED, 0.01)
+    assert found.loop.backlash[0] / aim.loop.backlash[0] == pytest.approx(0.976, abs=0.001)
+    assert found.extremes.peak_to_peak[0] / ARCSECOND == pytest.approx(0.0199, abs=0.0002)
+    assert found.extremes.peak_to_peak[0] > 5 * aim.extremes.peak_to_peak[0]
+    assert (found.equilibria.pins_in_contact.min(), found.equilibria.pins_in_contact.max()) == (24, 26)

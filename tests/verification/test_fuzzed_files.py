@@ -323,7 +323,7 @@ MADE = (
     (ta.Allocation, ("grades", "fixed_first", "front", "what_if", "unit_price", "quality_loss")),
     (ta.Difference, ("zones", "units")),
     (ta.Effort, ("ranking", "allocation", "is_quick")),
-    (partial(ta.reducer, "rv20e"), ("flank_clearance", "radial_clearance", "neglected")),
+    (partial(ta.reducer, "rv20e"), ("flank_clearance", "radial_clearance", "rotation_clearance", "neglected")),
 )
 """What a user builds, and the names of its fields."""
 

@@ -96,7 +96,8 @@ def test_nearly_all_samples_settle_in_their_register(rv20e, table4, generator):
     batch.values[:, :BATCH] = values.T
     rows, waves = nonzero_rows(batch.values, 0, layout.torque + 1), nonzero_waves(layout, batch.values)
     teeth_deviate = np.any(batch.values[layout.tooth : layout.tilt] != 0.0)
-    solve_batch_at(LINEAR, (0, 0), 0, tables, layout, rows, waves, teeth_deviate, BATCH, batch, careful)
+    given = (tables, layout, rows, waves, teeth_deviate, np.any(batch.values[layout.flank] != 0.0))
+    solve_batch_at(LINEAR, (0, 0), 0, *given, BATCH, batch, careful)
     settled = ~careful
     found = rv20e.equilibria(units, -1.0, angle).transmission_error[:, 0]
     np.testing.assert_allclose(batch.rotation[:BATCH][settled], found[settled], rtol=1e-9)

@@ -72,7 +72,8 @@ def units_of(study: Prepared, count: int) -> np.ndarray:
 
 @pytest.mark.parametrize("clearances", CLEARANCES)
 def test_rows_with_zone_zero_change_no_bit(clearances):
-    without, still = prepared(), prepared(grinding("equidistant", 0, 0), grinding("shift", 0, 0))
+    rows = [grinding("equidistant", 0, 0), grinding("shift", 0, 0), grinding("rotation", 0, 0, over=35.1)]
+    without, still = prepared(), prepared(*rows)
     found = [model_of(own, clearances).reading(OUTPUTS)(units_of(own, 12)) for own in (without, still)]
     np.testing.assert_array_equal(found[0].values, found[1].values)
 

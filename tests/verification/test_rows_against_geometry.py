@@ -115,14 +115,19 @@ def crank_carrier_rows(at: DisplacedReducer) -> Iterator[np.ndarray]:
 
 
 def disc_profile(at: DisplacedReducer, disc: int, parameter: np.ndarray) -> np.ndarray:
-    """Points of a disc's teeth in its own frame: parallel to the path of the pin when ground, then displaced."""
+    """Points of a disc's teeth in its own frame: parallel to the path of the pin when ground, then displaced.
+
+    A rotation amount turns the two flanks of a tooth, which reaches from root to root, towards each other.
+    """
     stage, name = at.stage, f"disc{disc + 1}"
     long = (stage.pin_circle_radius + at.error("modification.shift")) * unit_vector(parameter)
     short = stage.eccentricity * unit_vector(stage.pin_count * parameter)
     forward = 1j * (long - stage.pin_count * short)
     ground = long - short + (stage.pin_radius + at.error("modification.equidistant")) * 1j * forward / np.abs(forward)
+    teeth = parameter * stage.disc_teeth / (2 * np.pi)
+    ground = ground * unit_vector(np.where(teeth % 1 < 0.5, 1, -1) * at.error("modification.rotation"))
     outward, deviation = ground / np.abs(ground), 0.0
-    tooth = np.floor(parameter * stage.disc_teeth / (2 * np.pi)).astype(int) % stage.disc_teeth
+    tooth = np.floor(teeth).astype(int) % stage.disc_teeth
     for kind, direction in (("runout", outward), ("pitch", 1j * outward)):
         own = np.take_along_axis(at.each(f"{name}.each_tooth.{kind}.{{}}", stage.disc_teeth), tooth, axis=1)
         deviation = deviation + (own + at.harmonics(f"{name}.{kind}", np.angle(ground))) * direction

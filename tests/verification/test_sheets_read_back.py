@@ -24,13 +24,13 @@ from tolalloc.allocation.verify.verification import Verifier
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.zones import Feature
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
-from tolalloc.reducers.reducer.design import MODIFICATION_CONVENTION, Modification
+from tolalloc.reducers.reducer.design import MODIFICATION_CONVENTION, ROTATION_CONVENTION, Modification
 from tolalloc.reports.tellers.allocation_drawing import write_drawing
 from tolalloc.study.prepared import Prepared
 
 UM = 1e-6
 SIZES = ("rv20e", "rv40e", "rv80e", "rv110e")
-OWN = "three cranks"
+OWN, TURNED = "three cranks", "turned flanks"
 TOLERANCES = {"equidistant Δr_rp": "modification.equidistant", "shift Δr_p": "modification.shift"}
 """Amount → source whose zone is its tolerance."""
 
@@ -40,6 +40,9 @@ def prepared(case, folder):
     if case == OWN:
         ta.new(folder / "mine", like="rv40e", cranks=3)
         reducer, drawing = ta.reducer(folder / "mine" / "reducer.toml"), ta.drawing(folder / "mine" / "zones.xlsx")
+    elif case == TURNED:
+        turned = ta.reducer("rv20e", rotation_clearance=(0.0, 4.0)).set_to({"rotation clearance [µm]": 2.0})
+        reducer, drawing = turned, ta.drawing("rv20e_drawing")
     else:
         reducer, drawing = ta.reducer(case), ta.drawing(f"{case}_drawing")
     limits = {ta.PEAK_TO_PEAK: ta.Limit(upper=90.0, show=ta.AtYield(target=0.5))}
@@ -78,7 +81,7 @@ def as_it_stands(study):
     )
 
 
-@pytest.fixture(scope="module", params=[*SIZES, OWN])
+@pytest.fixture(scope="module", params=[*SIZES, OWN, TURNED])
 def drawn(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("shop")
     study = prepared(request.param, folder)
@@ -89,13 +92,23 @@ def drawn(request, tmp_path_factory):
 
 def amounts(result):
     """Return the amounts and clearances of the drawing by their names on it [µm]."""
-    modification = result.model.modification(result.chosen.settings)
+    modification, stage = result.model.modification(result.chosen.settings), result.model.reducer.cycloid_stage
+    turned = modification.rotation * stage.disc_pitch_radius / UM
     return {
         "equidistant Δr_rp": modification.equidistant / UM,
         "shift Δr_p": modification.shift / UM,
-        "flank clearance": modification.flank_clearance(result.model.reducer.cycloid_stage) / UM,
+        **({"rotation δ·r_d": turned, "rotation clearance": turned} if turned else {}),
+        "flank clearance": modification.flank_clearance(stage) / UM,
         "radial clearance": modification.radial_clearance / UM,
     }
+
+
+def convention(result):
+    """Return what the signs of the amounts mean, in the words that the drawing has for it."""
+    if len(result.space.settings) == 2:
+        return MODIFICATION_CONVENTION
+    radius = result.model.reducer.cycloid_stage.disc_pitch_radius * 1e3
+    return f"{MODIFICATION_CONVENTION}; {ROTATION_CONVENTION.format(radius=radius)}"
 
 
 def tolerances(result):
@@ -125,13 +138,13 @@ def test_the_table_has_zones_and_amounts(drawn):
     comments = [line.removeprefix("# ") for line in lines if line.startswith("# ")]
     stated = dict(line.removeprefix("setting: ").split(" = ") for line in comments if line.startswith("setting: "))
     meant = amounts(result)
-    for name in ("flank clearance", "radial clearance"):
+    for name in (own for own in meant if own.endswith("clearance")):
         assert float(stated[f"{name} [µm]"]) == pytest.approx(meant[name], abs=1e-6)
     said = " ".join(comments)
-    for name in ("equidistant Δr_rp", "shift Δr_p"):
+    for name in (own for own in meant if not own.endswith("clearance")):
         found = re.search(rf"{name} ([−\d.]+) µm", said)
         assert number(found[1]) == pytest.approx(meant[name], abs=0.0051)
-    assert says(comments, "allocation.convention", convention=MODIFICATION_CONVENTION.replace(";", " -"))
+    assert says(comments, "allocation.convention", convention=convention(result).replace(";", " -"))
     assert says(comments, "allocation.table_block", fields="revision B")
 
 
@@ -150,7 +163,7 @@ def test_the_workbook_has_zones_and_amounts(drawn):
         for name, value in meant.items():
             assert table[name][0] == pytest.approx(value, abs=1e-6)
             assert table[name][3] == (pytest.approx(half[name]) if name in half else None)
-        assert says([str(name) for name in table], "allocation.convention", convention=MODIFICATION_CONVENTION)
+        assert says([str(name) for name in table], "allocation.convention", convention=convention(result))
     written = {row[0]: row for row in book["drawing"].iter_rows(min_row=2, values_only=True)}
     for line in result.lines:
         name = result.line_name(line)
@@ -198,6 +211,6 @@ def test_the_sheet_has_zones_amounts_and_signs(drawn):
         # Less material is left where the root lies nearer to the middle of the disc.
         deeper = ToothProfile(stage=stage).root_radius - ToothProfile(stage=stage, modification=alone).root_radius
         assert stated[name][4].endswith("removes material" if deeper > 0 else "leaves material")
-    assert says(paragraphs(folder / "frames.dxf"), "allocation.convention", convention=MODIFICATION_CONVENTION)
+    assert says(paragraphs(folder / "frames.dxf"), "allocation.convention", convention=convention(result))
     block = {text for row in cells(folder / "frames.dxf", "TITLE_BLOCK") for text in row}
     assert {"revision B", "author", "material", "drawing number"} <= block

@@ -294,7 +294,7 @@ def test_bad_input_is_refused(rigid):
     with pytest.raises(InputError, match=r"'crank3\.journal1\.eccentricity\.x'"):
         brief_run(rigid, -1.0, {"crank3.journal1.eccentricity.x": 1e-6})
     turned = replace(rigid, modification=replace(rigid.modification, rotation=1e-5))
-    with pytest.raises(InputError, match="rotation modification is 1e-05"):
+    with pytest.raises(InputError, match=r"rotation modification \[µrad\] is 10\.0"):
         brief_run(turned, -1.0)
     with pytest.raises(InputError, match="in this order"):
         TimeSteps(duration=1.0, step=0.0)

@@ -274,12 +274,17 @@ class DrawingQuestion:
         return replace(self.space, errors=design.space.errors)
 
     def trade(self, free: ZoneAllocation) -> SettingTrade | None:
-        """Return the cost of the cheapest zones over the settings; nothing without settings or beyond two."""
-        if not 1 <= len(self.space.settings) <= len(self.effort.setting_steps):
+        """Return the cost of the cheapest zones over the last settings, those before them as they were chosen.
+
+        There are as many as the effort has numbers of steps; nothing without settings.
+        """
+        if not self.space.settings:
             return None
-        values = tuple(
-            _denser_below(setting.lower, setting.upper, steps)
-            for setting, steps in zip(self.space.settings, self.effort.setting_steps, strict=False)
+        still = max(len(self.space.settings) - len(self.effort.setting_steps), 0)
+        traded = zip(self.space.settings[still:], self.effort.setting_steps, strict=False)
+        values = (
+            *free.chosen.settings[:still, np.newaxis],
+            *(_denser_below(setting.lower, setting.upper, steps) for setting, steps in traded),
         )
         quantile = replace(self.quantile(free.chosen.spread), space=self._at_ratios_of(free.chosen))
         return setting_trade(quantile, free, values)

@@ -64,7 +64,7 @@ def bind(
     carried = reducer.torque_on_carrier(torque, place)
     # The next question of the same reducer finds the tables as they are.
     model = cached_model(at_torque(reducer, carried), AngleSearch(), orders or HARMONICS)
-    listed = {*errors.columns, *errors.fixed}
+    listed = {*errors.columns, *errors.fixed, *reducer.modification.deviations}
     patterns = dict.fromkeys((*neglected, _NOMINAL))
     left_out = {pattern: neglected_columns((pattern,), model.columns) - listed for pattern in patterns}
     fixed: Mapping[str, float] = {
@@ -157,10 +157,11 @@ class ReducerChoice:
 
     reducer: Reducer  # The reducer with the stiffness in use
     identified: IdentifiedStiffness | None = None  # Identified stiffnesses that replaced its own, if any
-    # As in `tolalloc.reducer` [N·m, µm, µm]
+    # As in `tolalloc.reducer` [N·m, µm, µm, µm]
     torque: float | None = None
     flank_clearance: tuple[float, float] | None = None
     radial_clearance: tuple[float, float] | None = None
+    rotation_clearance: tuple[float, float] | None = None
     # As there [K]
     disc_temperature: float = 0.0
     further_disc_temperatures: tuple[float, ...] = ()
@@ -177,6 +178,10 @@ class ReducerChoice:
         """The reducer's."""
         return self.reducer.name
 
+    @property
+    def _ranges(self) -> tuple[tuple[float, float] | None, ...]:
+        return self.rotation_clearance, self.flank_clearance, self.radial_clearance
+
     def set_to(self, settings: Mapping[str, float]) -> ReducerChoice:
         """Return the reducer with a tooth modification that leaves other clearances [µm], or other conditions [N·m, K].
 
@@ -190,16 +195,15 @@ class ReducerChoice:
         warmer = settings.get(DISC_TEMPERATURE, self.disc_temperature)
         require_temperature(place, DISC_TEMPERATURE, warmer)
         clearances = {name: value for name, value in settings.items() if name not in (TORQUE, DISC_TEMPERATURE)}
-        own, stage = self.reducer.modification, self.reducer.cycloid_stage
-        present = (own.flank_clearance(stage) / MICROMETRE, own.radial_clearance / MICROMETRE)
+        stage = self.reducer.cycloid_stage
+        present = [own / MICROMETRE for own in self.reducer.modification.clearances(stage)]
         # Without a range a clearance is not chosen by an allocation; whoever states one may state any.
-        anywhere = (-_FARTHEST, _FARTHEST)
-        known = clearance_settings(present, (self.flank_clearance or anywhere, self.radial_clearance or anywhere))
+        known = clearance_settings(present, (own or (-_FARTHEST, _FARTHEST) for own in self._ranges))
         require_settings(place, known, clearances)
         if not clearances:
             return replace(self, torque=torque, disc_temperature=warmer)
-        flank, radial = (clearances.get(setting.name, setting.value) * MICROMETRE for setting in known)
-        modification = Modification.from_clearances(flank, radial, stage)
+        turned, flank, radial = (clearances.get(setting.name, setting.value) * MICROMETRE for setting in known)
+        modification = Modification.from_clearances(flank, radial, stage, turned)
         reducer = replace(self.reducer, modification=modification)
         return replace(self, torque=torque, disc_temperature=warmer, reducer=reducer)
 
@@ -224,15 +228,13 @@ class ReducerChoice:
         from tolalloc.reducers.model import ReducerModel
 
         kernel, assumptions = bind(self.reducer, errors, self.torque, place, self.neglected, self.unit)
-        flank, radial = (
-            (own[0] * MICROMETRE, own[1] * MICROMETRE) if own else None
-            for own in (self.flank_clearance, self.radial_clearance)
-        )
+        turned, flank, radial = ((own[0] * MICROMETRE, own[1] * MICROMETRE) if own else None for own in self._ranges)
         return ReducerModel(
             kernel=kernel.at_disc_temperature(self.disc_temperature),
             further_disc_temperatures=self.further_disc_temperatures,
             flank=flank,
             radial=radial,
+            turned=turned,
             identified=self.identified,
             unit=self.unit,
             left_out=assumptions,
@@ -255,6 +257,7 @@ def reducer(
     torque: float | None = None,
     flank_clearance: tuple[float, float] | None = None,
     radial_clearance: tuple[float, float] | None = None,
+    rotation_clearance: tuple[float, float] | None = None,
     disc_temperature: float = 0.0,
     further_disc_temperatures: tuple[float, ...] = (),
     neglected: tuple[str, ...] = NEGLECTED,
@@ -273,6 +276,9 @@ def reducer(
     flank_clearance, radial_clearance
         Smallest and largest nominal clearance that the tooth modification may leave on the flank, and at tip and root;
         as they are unless given [µm].
+    rotation_clearance
+        Smallest and largest part of the flank clearance that flanks may leave which are turned towards the middles of
+        their teeth, δ·r_d; as it is unless given [µm].
     disc_temperature
         Temperature of the discs less that of the ring of pins [K].
     further_disc_temperatures
@@ -294,14 +300,16 @@ def reducer(
     >>> reducer("rv20e_liu2020", stiffness="rv20e_table6").reducer.crank_count
     2
     """
-    for field, own in (("flank_clearance", flank_clearance), ("radial_clearance", radial_clearance)):
+    ranges = {"flank": flank_clearance, "radial": radial_clearance, "rotation": rotation_clearance}
+    for field, own in ranges.items():
         if own is not None and not (
             isinstance(own, Sequence)
             and len(own) == 2
             and all(map(is_number, own))
             and -_FARTHEST <= own[0] <= own[1] <= _FARTHEST
         ):
-            raise InputError.at(f"reducer {name}", field, own, "two numbers from -50 to 50 µm, the smaller one first")
+            allowed = "two numbers from -50 to 50 µm, the smaller one first"
+            raise InputError.at(f"reducer {name}", f"{field}_clearance", own, allowed)
     _require_temperatures(f"reducer {name}", disc_temperature, further_disc_temperatures)
     if isinstance(neglected, str) or not (
         isinstance(neglected, Sequence) and all(isinstance(pattern, str) for pattern in neglected)
@@ -318,6 +326,7 @@ def reducer(
         torque=torque,
         flank_clearance=flank_clearance,
         radial_clearance=radial_clearance,
+        rotation_clearance=rotation_clearance,
         disc_temperature=float(disc_temperature),
         further_disc_temperatures=tuple(dict.fromkeys(map(float, further_disc_temperatures))),
         neglected=tuple(neglected),

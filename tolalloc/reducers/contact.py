@@ -68,8 +68,7 @@ def contact_of(
     1144
     """
     found = assess(reducer, torque, law=law, exact=exact, phases=phases)
-    linear = reducer.modification.rotation == 0.0 and not found.clearance.exact  # the gaps are the linear formula's
-    yielding = _yielding(perfect_reducer(found.reducer, torque)) if linear else None
+    yielding = None if found.clearance.exact else _yielding(perfect_reducer(found.reducer, torque))
     return ContactResult(assessment=found, torque=torque, yielding=yielding)
 
 

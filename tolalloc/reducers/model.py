@@ -14,11 +14,17 @@ from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.models.model import Model, Observer, Response, SettingDerivatives
 from tolalloc.models.settings import DrawnAmounts, Setting
-from tolalloc.reading.units import MICROMETRE
+from tolalloc.reading.units import MICROMETRE, MILLIMETRE
 from tolalloc.reducers import DISC_TEMPERATURE, FRICTION_TORQUE, PEAK_TO_PEAK, PRELOAD, RADIAL_CLEARANCE, TORQUE
 from tolalloc.reducers.equivalent.hysteresis import HysteresisLoop
 from tolalloc.reducers.equivalent.perfect import exact_loop, preload, rated_pin_force
-from tolalloc.reducers.reducer.design import MODIFICATION_CONVENTION, Modification, Reducer, thermal_shift
+from tolalloc.reducers.reducer.design import (
+    MODIFICATION_CONVENTION,
+    ROTATION_CONVENTION,
+    Modification,
+    Reducer,
+    thermal_shift,
+)
 from tolalloc.reducers.reducer.idle_torque import IdleTorque
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.reducers.response.kernel import (
@@ -58,13 +64,15 @@ class ReducerModel(Model):
     """The equivalent model of a reducer at the sources of a drawing."""
 
     kernel: KernelResponse  # Its peak-to-peak at the modification in force
-    # Smallest and largest clearance that the modification may leave on the flank and at tip and root; none locks it [m]
+    # Smallest and largest clearance that the modification may leave on the flank, at tip and root, and by turned flanks
+    # alone; none locks it [m]
     flank: tuple[float, float] | None = None
     radial: tuple[float, float] | None = None
+    turned: tuple[float, float] | None = None
     identified: IdentifiedStiffness | None = None  # Stiffnesses that replaced the reducer's own, if any
     further_disc_temperatures: tuple[float, ...] = ()  # At which outputs may be limited beside that in force [K]
     # Values of the settings in force; those of the reducer's own modification unless given [µm]
-    clearances: tuple[float, float] | None = None
+    clearances: tuple[float, ...] | None = None
     unit: BuiltUnit | None = None  # Built unit whose curve is shown beside others, if any
     left_out: tuple[str, ...] = ()  # What binding the drawing to the reducer assumed
     mismatches: tuple[str, ...] = ()  # Where sizes of the drawing are not those of the reducer, in sentences
@@ -158,32 +166,41 @@ class ReducerModel(Model):
 
     @property
     def settings(self) -> tuple[Setting, ...]:
-        """Flank and radial clearance."""
-        bounds = ((own[0] / MICROMETRE, own[1] / MICROMETRE) if own else None for own in (self.flank, self.radial))
-        return clearance_settings(self.present_clearances, bounds)
+        """Flank and radial clearance, before them the rotation clearance where flanks are turned or may be."""
+        present = self.present_clearances
+        ranges = (self.turned, self.flank, self.radial)[-len(present) :]
+        return clearance_settings(
+            present, ((own[0] / MICROMETRE, own[1] / MICROMETRE) if own else None for own in ranges)
+        )
 
     @property
-    def present_clearances(self) -> tuple[float, float]:
-        """Flank and radial clearance in force [µm]."""
-        own, stage = self.reducer.modification, self.reducer.cycloid_stage
-        return self.clearances or (own.flank_clearance(stage) / MICROMETRE, own.radial_clearance / MICROMETRE)
+    def present_clearances(self) -> tuple[float, ...]:
+        """Values of the settings in force [µm]."""
+        own = self.reducer.modification
+        count = 3 if self.turned or own.rotation else 2
+        present = own.clearances(self.reducer.cycloid_stage)[-count:]
+        return self.clearances or tuple(clearance / MICROMETRE for clearance in present)
 
     def at(self, values: Float[np.ndarray, " setting"]) -> ReducerModel:
         """Return the model whose modification leaves other clearances [µm]."""
         kernel = self.kernel.with_modification(self.modification(values))
-        return replace(self, kernel=kernel, clearances=(float(values[0]), float(values[1])))
+        return replace(self, kernel=kernel, clearances=tuple(map(float, values)))
 
     def modification(self, values: Float[np.ndarray, " setting"]) -> Modification:
         """Return the amounts that leave the clearances [µm]."""
-        stage = self.reducer.cycloid_stage
-        return Modification.from_clearances(float(values[0]) * MICROMETRE, float(values[1]) * MICROMETRE, stage)
+        *turned, flank, radial = (float(value) * MICROMETRE for value in values)
+        return Modification.from_clearances(flank, radial, self.reducer.cycloid_stage, *turned)
+
+    @property
+    def _amounts(self) -> tuple[str, ...]:
+        """Error columns of the amounts that the settings choose, as many as settings."""
+        return tuple(self.reducer.modification.deviations)[: len(self.present_clearances)]
 
     @cached_property
-    def _modification_by_clearance(self) -> Float[np.ndarray, "2 2"]:
-        """Change of equidistant and shift amount (rows) with flank and radial clearance (columns) [-]."""
-        stage = self.reducer.cycloid_stage
-        columns = [Modification.from_clearances(*clearances, stage) for clearances in ((1.0, 0.0), (0.0, 1.0))]
-        return np.array([[column.equidistant for column in columns], [column.shift for column in columns]])
+    def _modification_by_clearance(self) -> Float[np.ndarray, "amount setting"]:
+        """Change of equidistant, shift and rotation amount (rows) with the settings (columns) [-, rotation rad/m]."""
+        columns = [self.modification(unit / MICROMETRE).deviations for unit in np.eye(len(self._amounts))]
+        return np.array([[column[name] for column in columns] for name in self._amounts])
 
     @property
     def exact(self) -> tuple[str, ...]:
@@ -214,15 +231,13 @@ class ReducerModel(Model):
         return SettingDerivatives(
             evaluation=found.evaluation,
             by_column=found.by_column,
-            by_setting=found.by_modification @ self._modification_by_clearance * MICROMETRE,
+            by_setting=found.by_modification[:, : len(self._amounts)] @ self._modification_by_clearance * MICROMETRE,
         )
 
     def _output_derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
         evaluation, slopes = output_derivatives(self.kernel, output, x)
         columns = self.kernel.model.columns
-        varied, amounts = (
-            [columns.index(name) for name in names] for names in (self.columns, self.reducer.modification.deviations)
-        )
+        varied, amounts = ([columns.index(name) for name in names] for names in (self.columns, self._amounts))
         return SettingDerivatives(
             evaluation=evaluation,
             by_column=slopes[:, varied],
@@ -260,15 +275,25 @@ class ReducerModel(Model):
 
     @property
     def drawn_amounts(self) -> DrawnAmounts:
-        """Equidistant and shift amount of the modification, in steps of half a micrometre."""
-        names = ("equidistant Δr_rp [µm]", "shift Δr_p [µm]")
+        """Equidistant, shift and, as an arc at r_d, rotation amount of the modification, in steps of 0.5 µm.
+
+        A rotation that is locked stays as it is, whatever its step. Zones of the first two stand beside them, that of
+        the rotation in a frame of its own, because it holds at a radius that its row states.
+        """
+        names, convention = ["equidistant Δr_rp [µm]", "shift Δr_p [µm]"], MODIFICATION_CONVENTION
+        radius, locked = self.reducer.cycloid_stage.disc_pitch_radius, 0.0
+        if len(self._amounts) > len(names):
+            names, turned = [*names, "rotation δ·r_d [µm]"], self.settings[0]
+            locked = abs(turned.value) if turned.lower == turned.upper else 0.0
+            convention = f"{convention}; {ROTATION_CONVENTION.format(radius=radius / MILLIMETRE)}"
+        count, lever = len(names), np.array([[1.0], [1.0], [radius]])
         return DrawnAmounts(
-            names=names,
-            by_setting=self._modification_by_clearance,
-            steps=(0.5, 0.5),
-            finest=(0.1, 0.1),
-            convention=MODIFICATION_CONVENTION,
-            sources=tuple(self.reducer.modification.deviations),
+            names=tuple(names),
+            by_setting=lever[:count] * self._modification_by_clearance,
+            steps=(0.5, 0.5, locked or 0.5)[:count],
+            finest=(0.1, 0.1, locked or 0.1)[:count],
+            convention=convention,
+            sources=self._amounts[:2],
         )
 
     @property

@@ -213,6 +213,8 @@ def _compressions(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]
         for kind, own in enumerate(values[first : first + 2 * layout.teeth].reshape(2, layout.teeth)):
             if own.any():
                 undisturbed = undisturbed + by_error[:, 2 + layout.waves + kind] * own[tables.tooth[:, disc]]
+        if values[layout.flank]:
+            undisturbed = undisturbed - np.abs(by_disc[:, 2]) * values[layout.flank]
         x, y, turn = (equilibria.retained[0, :, 3 * disc + axis, np.newaxis] for axis in range(3))
         found[:, disc] = by_disc[:, 0] * x + by_disc[:, 1] * y + by_disc[:, 2] * turn + undisturbed
     return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from tolalloc.exceptions import InputError
@@ -12,17 +12,19 @@ from tolalloc.reducers import DISC_TEMPERATURE, TORQUE
 
 FLANK = "flank clearance [µm]"
 RADIAL = "radial clearance [µm]"
+TURNED = "rotation clearance [µm]"
 _STEP = 0.1
 """Step of a difference by a clearance, to either side [µm]."""
 
 
-def clearance_settings(
-    present: tuple[float, float], bounds: Iterable[tuple[float, float] | None]
-) -> tuple[Setting, ...]:
-    """Return flank and radial clearance as settings [µm]; without bounds one is locked at its present value."""
+def clearance_settings(present: Sequence[float], bounds: Iterable[tuple[float, float] | None]) -> tuple[Setting, ...]:
+    """Return flank and radial clearance as settings, before them the rotation clearance if there is a third [µm].
+
+    Without bounds one is locked at its present value.
+    """
     return tuple(
         Setting(name=name, value=value, lower=own[0] if own else value, upper=own[1] if own else value, step=_STEP)
-        for name, value, own in zip((FLANK, RADIAL), present, bounds, strict=True)
+        for name, value, own in zip((TURNED, FLANK, RADIAL)[-len(present) :], present, bounds, strict=True)
     )
 
 

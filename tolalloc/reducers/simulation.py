@@ -219,8 +219,8 @@ def prepare_simulation(asked: SimulationRequest) -> PreparedSimulation:
 def _with_modification_of(unit: BuiltUnit, reducer: Reducer) -> Reducer:
     """Return the reducer with the unit's own modification, which the prototype takes from the teeth."""
     stated = {**reducer.modification.deviations, **unit.deviations}
-    equidistant, shift = (stated[column] for column in reducer.modification.deviations)
-    return replace(reducer, modification=replace(reducer.modification, equidistant=equidistant, shift=shift))
+    amounts = {name.rpartition(".")[2]: stated[name] for name in reducer.modification.deviations}
+    return replace(reducer, modification=replace(reducer.modification, **amounts))
 
 
 def with_ideal_gears(reducer: Reducer) -> Reducer:

@@ -105,6 +105,16 @@ def quantity(name: str) -> str:
     return name.split(" [")[0]
 
 
+def enumerated(texts: Iterable[str]) -> str:
+    """Return texts as a sentence counts them up.
+
+    >>> enumerated(["one", "two"]), enumerated(["one", "two", "three"])
+    ('one and two', 'one, two and three')
+    """
+    *others, last = texts
+    return f"{', '.join(others)} and {last}" if others else last
+
+
 def short(name: str) -> str:
     """Return the shortest name of an output that is understood.
 

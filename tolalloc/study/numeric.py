@@ -122,8 +122,8 @@ def deviations(reducer: Reducer, by_name: Mapping[str, Any]) -> Float[np.ndarray
         The reducer.
     by_name
         Name of a column → its deviation, a number for all samples or an array of one for each [m, angles rad]. A
-        deviation that is not named is 0; ``modification.equidistant`` and ``modification.shift`` are the amounts
-        themselves, those of the reducer unless named.
+        deviation that is not named is 0; ``modification.equidistant``, ``modification.shift`` and
+        ``modification.rotation`` are the amounts themselves, those of the reducer unless named.
 
     Raises
     ------

@@ -91,7 +91,7 @@ class AllocationEffort(NamedFields):
     exact_points
         Limits of the exact front of the local models [-].
     setting_steps
-        Values of each setting for which the cheapest zones are looked for, the first setting's first [-].
+        Values of each of the last settings for which the cheapest zones are looked for, one number for each [-].
     changed_costs
         Random corners of the box in which every cost is wrong [-].
     changed_stiffnesses, stiffness_units

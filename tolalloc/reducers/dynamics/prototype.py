@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.exceptions import InputError, SolveError
+from tolalloc.reading.units import MICRORADIAN
 from tolalloc.reducers.cycloid.loaded_contact import contact_stiffness
 from tolalloc.reducers.cycloid.solvers import LAWS
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
@@ -163,10 +164,8 @@ def mesh_of(reducer: Reducer, errors: PartErrors) -> Mesh:
     -8.0
     """
     stiffness, stage = reducer.stiffness, reducer.cycloid_stage
-    if reducer.modification.rotation != 0.0:
-        raise InputError.at(
-            f"virtual prototype of {reducer.name}", "rotation modification", reducer.modification.rotation, "0"
-        )
+    if turned := round(reducer.modification.rotation / MICRORADIAN, 6):
+        raise InputError.at(f"virtual prototype of {reducer.name}", "rotation modification [µrad]", turned, "0")
     ground = ToothProfile(stage=stage, modification=reducer.modification).ground
     angle = Positions(reducer, np.zeros(1)).pin_direction
     deviation = errors.pin[:, 0] + 1j * errors.pin[:, 1]

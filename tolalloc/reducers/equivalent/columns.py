@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.reducers.cycloid.solvers import LAWS, LINEAR
-from tolalloc.reducers.equivalent.interfaces import Terms, pin_terms, tilt_terms, tooth_terms, wave_terms
+from tolalloc.reducers.equivalent.interfaces import Terms, flank_terms, pin_terms, tilt_terms, tooth_terms, wave_terms
 from tolalloc.reducers.equivalent.springs import SpringGroup
 from tolalloc.reducers.reducer.design import Reducer
 
@@ -31,6 +31,7 @@ class Layout(NamedTuple):
 
     torque: int  # Torque on the carrier, behind the spring rows' columns [-]
     clearance: int  # Clearance of every element with play [-]
+    flank: int  # δ·r_d, by which the flanks of all discs are turned towards the middles of their teeth [-]
     pin: int  # Radial, tangential and radius deviation of every pin [-]
     wave: int  # Of each disc: harmonic amplitudes of pitch, then run-out [-]
     tooth: int  # Pitch, then run-out of single teeth [-]
@@ -81,11 +82,12 @@ def columns_of(reducer: Reducer, groups: Sequence[SpringGroup], orders: tuple[in
     discs, pins, teeth = reducer.disc_count, reducer.cycloid_stage.pin_count, reducer.cycloid_stage.disc_teeth
     waves, torque = 4 * len(orders), len(names)
     clearance = torque + 1
-    pin = clearance + sum(len(group.clearance_columns) for group in played)
+    flank = clearance + sum(len(group.clearance_columns) for group in played)
+    pin = flank + 1
     wave = pin + 3 * pins
     tooth = wave + discs * waves
     tilt = tooth + discs * 2 * teeth
-    layout = Layout(torque, clearance, pin, wave, tooth, tilt, tilt + discs * 2, pins, waves, teeth)
+    layout = Layout(torque, clearance, flank, pin, wave, tooth, tilt, tilt + discs * 2, pins, waves, teeth)
 
     def add(first: int, terms: Terms) -> None:
         for name, moved in terms.items():
@@ -93,6 +95,7 @@ def columns_of(reducer: Reducer, groups: Sequence[SpringGroup], orders: tuple[in
             entries.extend((first + entry, column, factor) for entry, factor in moved)
 
     add(pin, pin_terms(reducer, orders))
+    add(flank, flank_terms(reducer))
     for disc in range(discs):
         add(wave + disc * waves, wave_terms(disc, orders))
         add(tooth + disc * 2 * teeth, tooth_terms(reducer, disc))

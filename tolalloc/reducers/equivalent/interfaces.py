@@ -502,6 +502,22 @@ def pin_terms(reducer: Reducer, orders: tuple[int, ...]) -> Terms:
     return terms
 
 
+def flank_terms(reducer: Reducer) -> Terms:
+    """Return the rotation amount of the modification, ``modification.rotation`` δ, as an arc at the pitch radius.
+
+    Every flank is turned towards its tooth's middle by δ about the disc's centre, about which the normal of a pin has
+    the lever r_d·S. So a gap on either flank opens by δ·r_d·|S|, theory page (35), own derivation [rad].
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> ((_, lever),) = flank_terms(load_reducer("rv20e_liu2020"))["modification.rotation"]
+    >>> round(lever, 9)  # r_d = e·zc, 39 teeth at 0.9 mm [m]
+    0.0351
+    """
+    return {"modification.rotation": [(0, reducer.cycloid_stage.disc_pitch_radius)]}
+
+
 def wave_terms(disc: int, orders: tuple[int, ...]) -> Terms:
     """Return the harmonic deviations of a disc's teeth: ``disc{j}.pitch`` along the arc, ``disc{j}.runout`` outward."""
     names = (*harmonic_columns(f"disc{disc + 1}.pitch", orders), *harmonic_columns(f"disc{disc + 1}.runout", orders))
@@ -559,6 +575,7 @@ PIN_SOURCES = (
         name="modification.shift",
         nominal=Nominal(said="its shift amount", of=lambda reducer: reducer.modification.shift, chosen=True),
     ),
+    ErrorSource(name="modification.rotation", silent=True, characteristic=ROTATION, fine=True),
     ErrorSource(name="housing.runout", shape="waves", place="housing.pins"),
     ErrorSource(name="housing.pitch", shape="waves", place="housing.pins"),
     ErrorSource(
@@ -625,6 +642,7 @@ def dense_rows(at: Positions) -> SpringGroup:
         column = columns.setdefault(name, np.zeros((angles, discs, pins)))
         for entry, factor in terms:
             column[:, :, entry % pins] += factor * own_pin[:, :, entry // pins, entry % pins]
+    columns |= dict.fromkeys(flank_terms(reducer), -np.abs(contact.by_disc[:, :, 2]))
     for disc in range(discs):
         first = coordinates.disc(disc)
         displacement[:, disc, :, first : first + 3] = np.swapaxes(contact.by_disc[:, disc], 1, 2)

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int, Integer, UInt8, UInt16
 
-from tolalloc.exceptions import InputError
 from tolalloc.reducers.equivalent.columns import Columns
 from tolalloc.reducers.equivalent.condensation import CondensedAngles, condense, error_columns
 from tolalloc.reducers.equivalent.solvers.records import (
@@ -128,23 +127,12 @@ class EquivalentModel:
 
     Methods take ``errors`` in the order of `columns` [m, angles rad], the ``torque`` on the carrier, which resists the
     rotation where it is negative [N·m], and carrier angles, the coarse ones of the search unless given [rad].
-
-    Raises
-    ------
-    InputError
-        The reducer's teeth have a rotation modification, which no column of the model can stand for.
     """
 
     reducer: Reducer  # Nominal design, stiffness and load
     search: AngleSearch = field(default_factory=AngleSearch)  # At which angles the extremes are looked for
     # Orders of the harmonic deviations of pitch and run-out, per turn of their part [-]
     orders: tuple[int, ...] = HARMONICS
-
-    def __post_init__(self) -> None:
-        if self.reducer.modification.rotation != 0.0:
-            raise InputError.at(
-                self.reducer.name, "rotation modification", self.reducer.modification.rotation, "0 in this model"
-            )
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Travel to another process without tables; there, every chunk of work finds the same model again."""

@@ -109,7 +109,14 @@ MODIFICATION_CONVENTION = (
     "the discs are ground with a pin of radius r_rp + Δr_rp on a pin circle of radius R_p + Δr_p; a positive "
     "equidistant amount and a negative shift remove material"
 )
-"""What the signs of the two amounts mean on a drawing."""
+"""What the signs of these two amounts mean on a drawing."""
+
+
+ROTATION_CONVENTION = (
+    "a positive rotation turns every flank by δ about the axis of the disc towards the middle of its tooth and removes "
+    "material on the flanks alone; δ·r_d is its arc at the radius r_d = {radius:g} mm"
+)
+"""What the sign of the third one means there, the radius in millimetres."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,27 +128,35 @@ class Modification:
     rotation: float = 0.0  # δ: each flank is turned towards its tooth's middle by δ about the disc's centre [rad]
 
     @classmethod
-    def from_convention(cls, convention: str, equidistant: float, shift: float) -> Modification:
-        """Return the modification that a source with the convention ``plus`` or ``minus`` prints [m].
+    def from_convention(cls, convention: str, equidistant: float, shift: float, rotation: float = 0.0) -> Modification:
+        """Return the modification that a source with the convention ``plus`` or ``minus`` prints [m, m, rad].
 
         Raises
         ------
         KeyError
             Another convention.
         """
-        return cls(equidistant=equidistant, shift=SHIFT_SIGNS[convention] * shift)
+        return cls(equidistant=equidistant, shift=SHIFT_SIGNS[convention] * shift, rotation=rotation)
 
     def flank_clearance(self, stage: CycloidStage) -> float:
         """Return the nominal gap on the flank where cos φ = K1: Δr_rp − Δr_p·√(1−K1²) + δ·r_d [m].
 
-        It is the smallest gap unless the shift is positive.
+        It is the smallest gap unless shift or rotation are positive.
         """
-        return self.equidistant - self.shift * stage.flank_ratio + self.rotation * stage.disc_pitch_radius
+        return self.equidistant - self.shift * stage.flank_ratio + self.rotation_clearance(stage)
+
+    def rotation_clearance(self, stage: CycloidStage) -> float:
+        """Return the part of the flank clearance that turned flanks leave, δ·r_d [m]."""
+        return self.rotation * stage.disc_pitch_radius
+
+    def clearances(self, stage: CycloidStage) -> tuple[float, float, float]:
+        """Return rotation, flank and radial clearance, from which `from_clearances` finds the amounts [m]."""
+        return self.rotation_clearance(stage), self.flank_clearance(stage), self.radial_clearance
 
     @property
     def deviations(self) -> dict[str, float]:
-        """The two amounts as error columns of the model, the equidistant first [m]."""
-        return {"modification.equidistant": self.equidistant, "modification.shift": self.shift}
+        """The amounts as error columns of the model, the equidistant first and the rotation last [m, m, rad]."""
+        return {f"modification.{name}": amount for name, amount in vars(self).items()}
 
     @property
     def radial_clearance(self) -> float:
@@ -149,10 +164,15 @@ class Modification:
         return self.equidistant - self.shift
 
     @classmethod
-    def from_clearances(cls, flank: float, radial: float, stage: CycloidStage) -> Modification:
-        """Return the two amounts that give a flank and a radial clearance [m]."""
-        shift = (flank - radial) / (1 - stage.flank_ratio)
-        return cls(equidistant=radial + shift, shift=shift)
+    def from_clearances(cls, flank: float, radial: float, stage: CycloidStage, rotation: float = 0.0) -> Modification:
+        """Return the amounts that leave a flank and a radial clearance, of which turned flanks leave some [m].
+
+        F = Δr_rp − q·Δr_p + δ·r_d is the whole clearance of the flank, J = Δr_rp − Δr_p that at tip and root, which
+        turned flanks do not change, and R = δ·r_d the rotation clearance, a part of F. So each may be chosen without
+        the others: Δr_p = (F − R − J)/(1 − q), Δr_rp = J + Δr_p, δ = R/r_d; theory page (34), own derivation.
+        """
+        shift = (flank - rotation - radial) / (1 - stage.flank_ratio)
+        return cls(equidistant=radial + shift, shift=shift, rotation=rotation / stage.disc_pitch_radius)
 
 
 @dataclass(frozen=True, kw_only=True)

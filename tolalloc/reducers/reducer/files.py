@@ -19,7 +19,7 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag,
 from tolalloc.exceptions import InputError
 from tolalloc.reading.file_content import read_text
 from tolalloc.reading.files import Record, as_toml, read_toml, shipped_or_path, times, validated, write_new
-from tolalloc.reading.units import ARCMINUTE, MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import ARCMINUTE, MICROMETRE, MICRORADIAN, MILLIMETRE
 from tolalloc.reducers.reducer.bearings import (
     BallBearing,
     Friction,
@@ -325,6 +325,7 @@ class ModificationRecord(Record):
 
     equidistant_um: Micrometres
     shift_um: Micrometres
+    rotation_urad: Annotated[float, Field(ge=-5000, le=5000), times(MICRORADIAN)] = 0.0
     convention: Literal["plus", "minus"] = "plus"
 
 
@@ -385,7 +386,10 @@ class ReducerRecord(Record):
             pin_material=pin,
             stiffness=self.stiffness.stiffness(disc, pin, self.first_stage, self.cycloid_stage),
             modification=Modification.from_convention(
-                grinding.convention, equidistant=grinding.equidistant_um, shift=grinding.shift_um
+                grinding.convention,
+                equidistant=grinding.equidistant_um,
+                shift=grinding.shift_um,
+                rotation=grinding.rotation_urad,
             ),
             load=self.load,
             clearances=self.clearances,
@@ -433,10 +437,12 @@ def write_modified(name: str | Path, modification: Modification, path: Path) -> 
         The new file is there already or cannot be made, or the old one has no table ``[modification]``.
     """
     source = shipped_or_path(name, PRESETS, ".reducer.toml", "reducer")
+    turned = f"rotation_urad = {as_toml(modification.rotation / MICRORADIAN)}\n" if modification.rotation else ""
     table = (
         "[modification] # pin radius + equidistant, pin circle radius + shift, at grinding\n"
         f"equidistant_um = {as_toml(modification.equidistant / MICROMETRE)}\n"
         f"shift_um = {as_toml(modification.shift / MICROMETRE)}\n"
+        f"{turned}"
         'convention = "plus"\n\n'
     )
     text, found = _MODIFICATION.subn(table, read_text(source, "a text file in TOML"))

@@ -31,7 +31,8 @@ class WithDerivatives:
 
     evaluation: Evaluation  # Peak-to-peak and status of every sample
     by_column: Float[np.ndarray, "sample column"]  # Derivative by every varied column [arcsec/m]
-    by_modification: Float[np.ndarray, "sample 2"]  # By the equidistant and the shift amount [arcsec/m]
+    # By the equidistant, the shift and the rotation amount [arcsec/m, arcsec/rad]
+    by_modification: Float[np.ndarray, "sample 3"]
     # Derivative by the relative change of each stiffness of `tolalloc.reducers.reducer.stiffness.Stiffness` [arcsec]
     by_stiffness: dict[str, Float[np.ndarray, " sample"]]
 
@@ -52,9 +53,9 @@ class KernelResponse:
     torque: float  # Torque on the carrier, negative resists the rotation [N·m]
     columns: tuple[str, ...]  # Columns that vary, in the order of X
     # Value of every other column of the model, and what a column that varies varies around: the amounts of the
-    # modification, which a row of a tolerance table lets deviate [m]
+    # modification, which a row of a tolerance table lets deviate [m, angles rad]
     fixed: Mapping[str, float]
-    offsets: Mapping[str, float] = field(default_factory=dict)  # Added to columns that are fixed [m]
+    offsets: Mapping[str, float] = field(default_factory=dict)  # Added to columns that are fixed [m, angles rad]
     disc_temperature: float = 0.0  # Of the discs less that of the ring [K]
     observe: Observer = unobserved  # Told the statuses of each chunk
     mapper: Mapper = map  # What solves the chunks, `tolalloc.running.chunks.map_chunks`
@@ -96,7 +97,8 @@ class KernelResponse:
     def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> WithDerivatives:
         """Return the peak-to-peak of every sample and its derivatives, at hardly more cost than without."""
         values, status = np.empty((x.shape[0], 1)), np.empty(x.shape[0], np.uint8)
-        by_column, by_modification = np.empty(x.shape), np.empty((x.shape[0], 2))
+        by_column = np.empty(x.shape)
+        by_modification = np.empty((x.shape[0], len(self.model.reducer.modification.deviations)))
         by_stiffness: dict[str, Float[np.ndarray, " sample"]] = defaultdict(lambda: np.empty(x.shape[0]))
         for rows, (extremes, derivatives) in map_chunks(self.alone._derivatives, x, self.mapper):
             values[rows, 0] = extremes.peak_to_peak / ARCSECOND

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from tolalloc.allocation.space.requirement import USUAL_YIELD
 from tolalloc.exceptions import InputError
 from tolalloc.models.model import Units
-from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE
+from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE, MICRORADIAN
 from tolalloc.reducers import DISC_TEMPERATURE, FRICTION_TORQUE, PEAK_TO_PEAK, PRELOAD, RADIAL_CLEARANCE
 from tolalloc.reducers.contact import contact_of
 from tolalloc.reducers.cycloid.clearance import LARGE, is_large
@@ -25,7 +25,7 @@ from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.reducer.design import CycloidStage, Modification, Reducer
 from tolalloc.reducers.reducer.idle_torque import IdleTorque
 from tolalloc.reducers.scene import PER_CRANK_TURN, Scene, is_placed, scene_of
-from tolalloc.reducers.settings import FLANK, RADIAL
+from tolalloc.reducers.settings import FLANK, RADIAL, TURNED
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.portrait import Examination, Portrait, SignSketch, sections_of
@@ -129,12 +129,13 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
     def amounts(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, float]:
         """Return the amounts that a grinder sets, and the clearances that they leave [µm]."""
         modification = self.model.modification(values)
-        return {
+        drawn = {
             "equidistant Δr_rp [µm]": modification.equidistant / MICROMETRE,
             "shift Δr_p [µm]": modification.shift / MICROMETRE,
-            FLANK: float(values[0]),
-            RADIAL: float(values[1]),
+            "rotation δ [µrad]": modification.rotation / MICRORADIAN,
         }
+        settings = dict(zip((TURNED, FLANK, RADIAL)[-len(values) :], map(float, values), strict=True))
+        return {**dict(list(drawn.items())[: len(values)]), **settings}
 
     def effects(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, str]:
         """Return what the sign of each amount does to the teeth, and where the clearances are measured."""
@@ -142,8 +143,10 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
         return {
             "equidistant Δr_rp [µm]": _effect(modification.equidistant, "wheel larger", "wheel smaller"),
             "shift Δr_p [µm]": _effect(-modification.shift, "wheel deeper in the disc", "wheel farther out"),
+            "rotation δ·r_d [µm]": _effect(modification.rotation, "tooth narrower", "tooth wider"),
             FLANK: "target: nominal gap where cos φ = K1",
             RADIAL: "target: nominal gap at tip and root",
+            TURNED: "target: what turned flanks leave of the flank clearance",
         }
 
     @property
@@ -274,7 +277,7 @@ def twist_table(reducer: Reducer) -> pd.DataFrame:
 def _examination(portrait: ReducerPortrait, figures: Mapping[str, float]) -> Examination:
     """Return what is said of the nominal clearances, of the counted random units and of the catalogue."""
     model, count, solved = portrait.model, int(figures["units [-]"]), int(figures["units in equilibrium [-]"])
-    stage, (flank, radial) = model.reducer.cycloid_stage, model.present_clearances
+    stage, (*_, flank, radial) = model.reducer.cycloid_stage, model.present_clearances
     if not solved:
         none = f"None of {count:,} simulated reducers has an equilibrium without torque."
         but = f"none of its units has an equilibrium: {_advice(model)}"
@@ -356,7 +359,7 @@ def _reasons(model: ReducerModel, figures: Mapping[str, float]) -> list[str]:
 
 def _advice(model: ReducerModel) -> str:
     """Return what frees preloaded units, as the end of a sentence."""
-    flank, _ = model.present_clearances
+    flank = model.present_clearances[-2]
     freely = (
         "flank_clearance of ta.reducer(...) lets the allocation open it, at present from "
         f"{model.flank[0] / MICROMETRE:.3g} to {model.flank[1] / MICROMETRE:.3g} µm"
@@ -486,6 +489,7 @@ def _contact_table(model: ReducerModel, units: Units) -> pd.DataFrame:
         columns[label] = {
             "equidistant Δr_rp [µm]": amounts.equidistant / MICROMETRE,
             "shift Δr_p [µm]": amounts.shift / MICROMETRE,
+            **({"rotation δ [µrad]": amounts.rotation / MICRORADIAN} if amounts.rotation else {}),
             "flank clearance, smallest nominal gap [µm]": amounts.flank_clearance(model.reducer.cycloid_stage)
             / MICROMETRE,
             "radial clearance at tip and root [µm]": amounts.radial_clearance / MICROMETRE,

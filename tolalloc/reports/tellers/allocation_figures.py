@@ -81,20 +81,21 @@ def trade_figures(result: AllocationResult, trade: SettingTrade, cost_unit: str)
     if not np.isfinite(trade.cost).any():
         return ()
     curves = _trade_figure(result, trade, cost_unit)
-    return (curves, _trade_map(trade, cost_unit)) if len(trade.names) == 2 else (curves,)
+    over_two = len(trade.names) > 1 and all(values.size == 1 for values in trade.values[:-2])
+    return (curves, _trade_map(trade, cost_unit)) if over_two else (curves,)
 
 
 def _trade_map(trade: SettingTrade, cost_unit: str) -> HeatMap:
-    """Return the cost of the cheapest zones over both settings."""
-    first, second = trade.values
+    """Return the cost of the cheapest zones over the last two settings, those before them with one value each."""
+    (first, second), name = trade.values[-2:], trade.names[-2]
     return HeatMap(
         name="modification_cost",
         title=_say("figure_trade_map"),
         columns=[f"{value:.3g}" for value in second],
-        rows=[f"{quantity(trade.names[0])} {value:.3g} {unit_of(trade.names[0])}" for value in first],
-        x_label=trade.names[1],
+        rows=[f"{quantity(name)} {value:.3g} {unit_of(name)}" for value in first],
+        x_label=trade.names[-1],
         label=f"cost [{cost_unit}]",
-        values=[[float(value) for value in row] for row in trade.cost],
+        values=trade.cost.reshape(first.size, second.size).tolist(),
     )
 
 

@@ -23,7 +23,7 @@ from tolalloc.reports.portrait import Examination, portrait_of
 from tolalloc.reports.tellers.allocation_assembly import assembly_cost_sentences
 from tolalloc.reports.tellers.check import MORE_PARTS, few_parts
 from tolalloc.reports.templates import Sentences
-from tolalloc.reports.wording import QUICK_RUN, number, quantity, short, with_unit
+from tolalloc.reports.wording import QUICK_RUN, enumerated, number, quantity, short, with_unit
 from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
 
 _NOTHING = 1e-3
@@ -200,7 +200,7 @@ def drawn_amounts(result: AllocationResult) -> tuple[str, ...]:
         return ()
     before, chosen = (drawn.by_setting @ design.settings for design in (result.free.baseline, result.chosen))
     amount = "amount" if np.allclose(before, chosen, rtol=1e-6, atol=_WRITTEN) else "amount_changed"
-    amounts = " and ".join(
+    amounts = enumerated(
         _say(amount, name=short(name), value=with_unit(_signed(new), name), before=_signed(was))
         for name, was, new in zip(drawn.names, before, chosen, strict=True)
     )
@@ -491,7 +491,7 @@ def cheapest_settings(result: AllocationResult, cost_unit: str) -> tuple[str, ..
     error = ""
     if np.isfinite(trade.error):
         error = _say("trade_error", error=with_unit(f"{trade.error:.2g}", result.leading))
-    settings = " and ".join(
+    settings = enumerated(
         f"{quantity(name)} {with_unit(f'{value:.3g}', name)}"
         for name, value in zip(trade.names, trade.cheapest, strict=True)
     )

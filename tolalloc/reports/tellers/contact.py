@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tolalloc.reading.units import ARCMINUTE, DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import ARCMINUTE, DEGREE, MEGAPASCAL, MICROMETRE, MICRORADIAN, MILLIMETRE
 from tolalloc.reducers.contact import ContactResult, YieldingContact
 from tolalloc.reducers.cycloid.clearance import FLANK, linear_clearance
 from tolalloc.reducers.cycloid.loaded_contact import Assessment, LoadedContact
@@ -213,9 +213,11 @@ def _largest(own: dict[str, Any], force_at: str = "", pressure_at: str = "") -> 
 def _profile_summary(found: Assessment) -> dict[str, float | str | None]:
     """Return profile and clearance, units in the names."""
     profile, clearance = found.profile, found.clearance
+    turned = profile.modification.rotation
     return {
         "equidistant amount [µm]": profile.modification.equidistant / MICROMETRE,
         "shift amount [µm]": profile.modification.shift / MICROMETRE,
+        **({"rotation amount [µrad]": turned / MICRORADIAN} if turned else {}),
         "tip radius [mm]": profile.tip_radius / MILLIMETRE,
         "root radius [mm]": profile.root_radius / MILLIMETRE,
         "K1 at grinding [-]": profile.ground.shortening,

@@ -20,7 +20,7 @@ from tolalloc.reports.teller import Teller
 from tolalloc.reports.tellers import ranking_tables as tables
 from tolalloc.reports.tellers.check import few_parts
 from tolalloc.reports.templates import Sentences
-from tolalloc.reports.wording import QUICK_RUN, alike, number, quantity, sign_of
+from tolalloc.reports.wording import QUICK_RUN, alike, enumerated, number, quantity, sign_of
 from tolalloc.sensitivity.ranking import Convergence, Neighbours
 from tolalloc.sensitivity.result import RankingResult
 from tolalloc.sensitivity.sobol import SobolIndices
@@ -314,12 +314,12 @@ class RankingTeller(Teller[RankingResult]):
     def assumptions(self) -> tuple[str, ...]:
         """What no source states."""
         model = self.result.model
-        settings = " and ".join(quantity(setting.name) for setting in model.settings)
+        settings = [quantity(setting.name) for setting in model.settings]
         return (
             *self.header.assumptions,
             _say("as_stated"),
             _say("correlations" if self.result.errors.is_correlated else "independent"),
-            *((_say("settings", names=settings),) if settings else ()),
+            *((_say("settings", names=enumerated(settings)),) if settings else ()),
             _say("no_drift"),
             *(_say("first_order", source=source.name) for source in model.uncertain),
         )

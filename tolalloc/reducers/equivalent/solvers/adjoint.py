@@ -165,6 +165,10 @@ def _add_derivative(position, factor, carrier, of_pins, tables, layout, design, 
             derivative.by_value[s], derivative.by_row[s],
         )  # fmt: skip
     _add_tilt(problem, turn, design.face_width, layout, values, tilt_by_pin, factor, derivative.by_value[s])
+    for d in range(problem.by_disc.shape[0]):
+        for k in range(layout.pins):
+            lever = abs(problem.by_disc[d, 2, k])
+            derivative.by_value[s, layout.flank] -= factor * weight_of_pin[d * layout.pins + k] * lever
     return status
 
 

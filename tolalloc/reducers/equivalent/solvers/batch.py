@@ -177,7 +177,7 @@ def _by_pin_of_four(table, values, row, pins, k):
 
 
 @jit_within
-def _undisturbed(at, tables, layout, waves, teeth_deviate, used, batch):
+def _undisturbed(at, tables, layout, waves, teeth_deviate, flanks_turned, used, batch):
     """Set the pin compressions at undisplaced discs: two contacts of four registers at a time share what they load."""
     pins, values, out, contacts = layout.pins, batch.values, batch.undisturbed, batch.undisturbed.shape[1]
     apart = contacts * WIDTH
@@ -204,13 +204,19 @@ def _undisturbed(at, tables, layout, waves, teeth_deviate, used, batch):
                     for v in range(0, used, WIDTH):
                         place = v * contacts + (first + k) * WIDTH
                         store(out, place, fma(factor, load(values, row + v), load(out, place)))
+        if flanks_turned:
+            for k in range(pins):
+                factor = spread(-abs(tables.contact_by_disc[at, disc, 2, k]))
+                for v in range(0, used, WIDTH):
+                    place = v * contacts + (first + k) * WIDTH
+                    store(out, place, fma(factor, load(values, layout.flank * ROW + v), load(out, place)))
 
 
 @jit_within
-def _displace_nothing(at, tables, layout, rows, waves, teeth_deviate, used, batch):
+def _displace_nothing(at, tables, layout, rows, waves, teeth_deviate, flanks_turned, used, batch):
     """Set all that the errors do at one node while the discs are undisplaced."""
     _forces(at, tables, rows, used, batch)
-    _undisturbed(at, tables, layout, waves, teeth_deviate, used, batch)
+    _undisturbed(at, tables, layout, waves, teeth_deviate, flanks_turned, used, batch)
 
 
 _LAST, _AHEAD, _HERE, _BEHIND = 0.3, 0.5, 0.35, -0.15
@@ -433,10 +439,10 @@ def _settle_all(law, discs, here, samples, batch, careful):
 
 
 @jit_within
-def solve_batch_at(law, discs, at, tables, layout, rows, waves, teeth_deviate, samples, batch, careful):
+def solve_batch_at(law, discs, at, tables, layout, rows, waves, teeth_deviate, flanks_turned, samples, batch, careful):
     """Solve the first samples of a batch at one node from the warm starts in ``batch.q``; set which need more care."""
     used = (samples + FOUR - 1) // FOUR * FOUR
-    _displace_nothing(at, tables, layout, rows, waves, teeth_deviate, used, batch)
+    _displace_nothing(at, tables, layout, rows, waves, teeth_deviate, flanks_turned, used, batch)
     here = VectorTables(
         Common(tables.stiffness[at]),
         Common(tables.contact_by_disc[at]),

@@ -485,7 +485,7 @@ def _any_nonzero(values, first, last):
 
 @jit_in_place
 def _undisturbed(at, tables, layout, values, out):
-    """Set out to the pins' compression at undisplaced discs."""
+    """Set out to the pins' compression at undisplaced discs, without what turned flanks leave."""
     discs, pins = tables.contact_by_disc.shape[1], layout.pins
     for d in range(discs):
         coefficient = tables.contact_by_error[at, d]
@@ -510,6 +510,9 @@ def _undisturbed(at, tables, layout, values, out):
 @jit_in_place
 def fill_loads(at, tables, layout, values, force, undisturbed, play_offset):
     """Set force, undisturbed compressions and play offsets at a node; return the carrier rotation at fixed discs.
+
+    Turned flanks are left to `sample_constants`: what they leave has a kink at root and tip, so between nodes it
+    follows from the levers there, and not from the compressions at the nodes.
 
     f = F·ε and θca = t·ε at undisplaced discs, theory page (19) and (20), own derivation [N, rad].
 
@@ -540,24 +543,28 @@ def fill_loads(at, tables, layout, values, force, undisturbed, play_offset):
 
 @jit_in_place
 def sample_constants(problem, turn, face_width, layout, values):
-    """Set what does not depend on the angle: clearances; and the tilted depths, which need the turned tilt only.
+    """Set what does not depend on the angle, clearances; what the levers alone make of a sample: tilt, turned flanks.
 
-    c = max(c, 0) [m]; half tilt = b/2·|γ_y·n_x − γ_x·n_y| [m], theory page (31), own derivation.
+    c = max(c, 0) [m]; half tilt = b/2·|γ_y·n_x − γ_x·n_y| [m], theory page (31); turned flanks take δ·r_d·|S| from the
+    compressions [m], theory page (35), own derivation.
 
     Examples
     --------
     >>> from types import SimpleNamespace
     >>> none = np.zeros((1, 3, 1))
     >>> own = SimpleNamespace(clearance=np.empty(1), by_disc=none, half_tilt=np.ones(1))
-    >>> layout = SimpleNamespace(clearance=0, tilt=1, pins=1)
-    >>> sample_constants.py_func(own, np.array([1.0, 0.0]), 0.01, layout, np.array([-2e-6, 0.0, 0.0]))
+    >>> layout = SimpleNamespace(clearance=0, flank=1, tilt=2, pins=1)
+    >>> sample_constants.py_func(own, np.array([1.0, 0.0]), 0.01, layout, np.array([-2e-6, 0.0, 0.0, 0.0]))
     >>> own.clearance.tolist(), own.half_tilt.tolist()  # a clearance that its deviations make negative is none
     ([0.0], [0.0])
     """
     for e in range(problem.clearance.size):
         problem.clearance[e] = max(values[layout.clearance + e], 0.0)
-    pins = layout.pins
+    pins, turned = layout.pins, values[layout.flank]
     for d in range(problem.by_disc.shape[0]):
+        if turned != 0.0:
+            for k in range(pins):
+                problem.undisturbed[d * pins + k] -= abs(problem.by_disc[d, 2, k]) * turned
         x, y = values[layout.tilt + 2 * d], values[layout.tilt + 2 * d + 1]
         if x == 0.0 and y == 0.0:
             problem.half_tilt[d * pins : (d + 1) * pins] = 0.0

@@ -130,10 +130,12 @@ def _side_by_side(discs, first, stride, turn_of_crank, tables, layout, mapped, d
     _fill_batch(layout, values, finite, used, batch, tilted)
     rows, waves = nonzero_rows(batch.values, 0, layout.torque + 1), nonzero_waves(layout, batch.values)
     teeth_deviate = np.any(batch.values[layout.tooth : layout.tilt] != 0.0)
+    flanks_turned = np.any(batch.values[layout.flank] != 0.0)
     start, history = np.empty(size), make_history(turn_of_crank, size)
     for angle in range(turn.rotation.shape[1]):
         at = first + angle * stride
-        solve_batch_at(design.law, discs, at, tables, layout, rows, waves, teeth_deviate, samples, batch, careful)
+        given = (tables, layout, rows, waves, teeth_deviate, flanks_turned)
+        solve_batch_at(design.law, discs, at, *given, samples, batch, careful)
         _take_over(samples, angle, batch, turn)
         for s in range(samples):
             if finite[s] and (careful[s] or tilted[s]):

@@ -331,6 +331,15 @@ def _take_near(lane, start, side, law, workspace):
 
 
 @jit_within
+def _turn_flanks(turned, workspace):
+    """Take what turned flanks leave from the depths, by the levers where the lane looks."""
+    pins = workspace.pin.size
+    for d in range(workspace.taken.shape[1]):
+        for k in range(pins):
+            workspace.depth[d * pins + k] -= abs(workspace.normal[(3 * d + 2) * pins + k]) * turned
+
+
+@jit_within
 def fill_lane(lane, position, start, side, law, tables, layout, values, workspace):
     """Put a sample's problem where its lane looks into the lane."""
     here = workspace.tables
@@ -348,6 +357,8 @@ def fill_lane(lane, position, start, side, law, tables, layout, values, workspac
     _blend_into_lane(tables.pole_by_rotation, first, weights, lane, here.pole.entries)
     _blend_slots(workspace.undisturbed[lane], slots, weights, workspace.depth)
     _blend(tables.contact_by_disc[around], weights, workspace.normal)
+    if values[layout.flank] != 0.0:
+        _turn_flanks(values[layout.flank], workspace)
     _blend(tables.contact_stiffness[around], weights, workspace.stiffness)
     if law != LINEAR:
         _blend(tables.contact_log_length[around], weights, workspace.log_length)
