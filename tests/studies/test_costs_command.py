@@ -44,7 +44,7 @@ def test_a_report_is_written_once(shop, tmp_path):
     [
         ("ground,5,µm,1\nground,8,µm,2\nground,12,µm,3\n", "fall"),
         ("ground,5,µm,2\nground,8,µm,1\n", "number of points for a fit is 2"),
-        ("ground,5,inch,2\nground,8,µm,1\n", "inch"),
+        ("ground,5,yard,2\nground,8,µm,1\n", "yard"),
         ("", "no rows"),
     ],
 )

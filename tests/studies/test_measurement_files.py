@@ -340,7 +340,7 @@ def test_curves_that_are_no_measurement_are_refused(folder, text, sentence):
 
 def test_binary_files_are_refused(folder):
     (folder / "curve.csv").write_bytes(b"PK\x03\x04\xff\xfe")
-    assert "curve.csv: cannot be read as a table in CSV (UTF-8)" in refused(folder)
+    assert "curve.csv: this is a workbook or an archive under another ending" in refused(folder)
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ class KnownSample(OutputSample):
     """A trial whose values are known."""
 
     design, groups, failed, confidence = np.array([1.0, 2.0, 3.0, 4.0]), 2, 0, 0.95
-    law = near = None
+    law = near = doubt = None
 
     def __init__(self, values, failed=0, confidence=0.95):
         vars(self).update(values=values, failed=failed, output="x [mm]", confidence=confidence)

@@ -42,7 +42,7 @@ class Quadratic:
     def with_derivatives(self, x: np.ndarray) -> WithDerivatives:
         by_column = self.slope + x @ self.bend
         return WithDerivatives(
-            evaluation=self(x), by_column=by_column, by_modification=np.zeros((len(x), 2)), by_stiffness={}
+            evaluation=self(x), by_column=by_column, by_modification=np.zeros((len(x), 3)), by_stiffness={}
         )
 
 
