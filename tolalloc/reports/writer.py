@@ -107,7 +107,7 @@ def _(value: Integral, unit: str) -> str:  # noqa: ARG001
 
 _LARGE = (24, 15)
 """Rows and columns beyond which a table is folded [-]."""
-_SENTENCES = 4
+_SENTENCES = 5
 """Sentences of the first answer on a first page that shows more than sentences [-]."""
 _MOVING = "moving"
 _LISTED = 6

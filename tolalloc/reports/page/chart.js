@@ -8,6 +8,7 @@ pen.font = '12px system-ui, "Segoe UI", sans-serif';
 const wide = (text) => pen.measureText(text).width;
 const TURNED = 0.755, TURNED_DARK = 0.62; // shares of a cell's colour from which its number is light, or dark on a dark page
 const ROW = 15; // height of a line of names above a chart
+const BAR = 12; // height of a bar with the gap below it
 const NARROW = 520; // below, names of bars that take more than two fifths stand above them
 
 export const colour = (number) => `var(--series-${number % COLOURS.length}, ${COLOURS[number % COLOURS.length]})`;
@@ -332,7 +333,7 @@ export class Chart {
     const longest = Math.max(...names.map((name) => String(name).length), 4);
     const narrow = this.width < NARROW && 16 + LETTER * longest > 0.4 * this.width;
     const left = narrow ? 12 : Math.min(16 + LETTER * longest, 0.45 * this.width), right = 16;
-    const row = (narrow ? 16 : 4) + 14 * items.length + 4;
+    const row = (narrow ? 16 : 4) + BAR * items.length + 4;
     const values = items.flatMap((item) => [0, ...item.y, ...(item.low ?? []), ...(item.high ?? [])]);
     const marked = (figure.vertical ?? []).map(([value]) => value);
     const positive = figure.logarithmic_x ? values.filter((value) => value > 0) : [...values, ...marked];
@@ -348,14 +349,14 @@ export class Chart {
     const zero = x.at(figure.logarithmic_x ? low : Math.max(low, Math.min(0, high)));
     names.forEach((name, place) => {
       const from = top + row * place + (narrow ? 16 : 2);
-      svg.append(node("text", narrow ? { class: "tick", x: left, y: from - 4 } : { class: "tick", x: left - 6, y: from + 7 * items.length + 4, "text-anchor": "end" }, name));
+      svg.append(node("text", narrow ? { class: "tick", x: left, y: from - 4 } : { class: "tick", x: left - 6, y: from + (BAR * items.length) / 2 + 4, "text-anchor": "end" }, name));
       items.forEach((item, set) => {
-        const end = x.at(item.y[place]), at = from + 14 * set;
-        const bar = node("rect", { x: Math.min(zero, end), y: at + 1, width: Math.max(Math.abs(end - zero), 0.5), height: 12, fill: item.colour ?? colour(figure.series.indexOf(item)) });
+        const end = x.at(item.y[place]), at = from + BAR * set;
+        const bar = node("rect", { x: Math.min(zero, end), y: at + 1, width: Math.max(Math.abs(end - zero), 0.5), height: BAR - 2, fill: item.colour ?? colour(figure.series.indexOf(item)) });
         const text = `${name}, ${item.label}: ${number(item.y[place])}` + (item.low?.length ? ` (${number(item.low[place])}…${number(item.high[place])})` : "");
         this.tell(bar, text);
         svg.append(bar);
-        if (item.low?.length) svg.append(node("path", { class: "interval", d: `M${x.at(item.low[place])} ${at + 7}H${x.at(item.high[place])}M${x.at(item.low[place])} ${at + 4}v6M${x.at(item.high[place])} ${at + 4}v6` }));
+        if (item.low?.length) svg.append(node("path", { class: "interval", d: `M${x.at(item.low[place])} ${at + BAR / 2}H${x.at(item.high[place])}M${x.at(item.low[place])} ${at + BAR / 2 - 3}v6M${x.at(item.high[place])} ${at + BAR / 2 - 3}v6` }));
       });
     });
     this.marks(svg, x, new Axis(0, 1, height, 0), { left, right, top, bottom: 44, height, above });

@@ -86,7 +86,8 @@ def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     """Return the answer in sentences; the first ones stand in the headline of a report."""
     chosen = result.chosen
     found = [*verdict(result), *drawn_amounts(result), *zones_changed(result), _cost(result, cost_unit)]
-    found += assembly_cost_sentences(result, cost_unit)
+    certificate = _certificate(result)
+    found += (*assembly_cost_sentences(result, cost_unit), *certificate[:1])
     if len(result.requirements) > 1 and not chosen.jointly:
         found.append(_say("all_limits", share=chosen.joint.estimate))
     found += _few_parts(result, cost_unit)
@@ -94,7 +95,7 @@ def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
         found.append(_say("error", error=result.error))
     return (
         *found,
-        *_certificate(result),
+        *certificate[1:],
         *_solved(chosen),
         _compared(result),
         *_modification(result, cost_unit),
