@@ -222,6 +222,21 @@ def test_a_setting_moves_the_answer_and_keeps_its_bounds(desk):
         ask(desk, "units", design={"settings": {"shim [mm]": 0.06}}, units=256)
 
 
+def test_turned_flanks_are_chosen_on_the_page_and_saved_with_the_study(tmp_path):
+    """What the page says at 2 µm is what the model says there, and the saved study says it again."""
+    text = (ROOT / "studies" / "liu2020_allocation.py").read_text("utf-8")
+    script = tmp_path / "turned.py"
+    ranges = "radial_clearance=(5.0, 20.0), rotation_clearance=(0.0, 4.0)"
+    script.write_text(text.replace("radial_clearance=(5.0, 20.0)", ranges), encoding="utf-8")
+    desk, turned = desk_of(script), {"rotation clearance [µm]": 2.0}
+    named = [own["name"] for own in desk.session.described["settings"][:3]]
+    assert named == ["rotation clearance [µm]", "flank clearance [µm]", "radial clearance [µm]"]
+    plain, found = (ask(desk, "units", design={"settings": own}, units=64) for own in ({}, turned))
+    assert found["outputs"] != plain["outputs"]
+    ask(desk, "save", design={"settings": turned}, name="chosen")
+    assert ask(desk_of(tmp_path / "chosen.py"), "units", design={}, units=64)["outputs"] == found["outputs"]
+
+
 def test_a_setting_outside_what_it_may_become_is_said_until_it_is_moved_inside(script):
     script.write_text(STUDY.replace("lower=0.0", "lower=0.02"), encoding="utf-8")
     desk = desk_of(script)
