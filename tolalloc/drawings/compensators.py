@@ -214,9 +214,10 @@ class Shim(NamedFields):
 
     Notes
     -----
-    The gap g = d + Σ w·dₛ of measured deviations becomes g + step·k with the whole number k, at most (sizes − 1)/2 either way, that
-    leaves the least of it; d becomes d + step·k. Measuring errs by nothing (an assumption). Derivatives with respect to
-    zones are those of the sizes chosen, as a unit that changes its size has none (own derivation).
+    The gap g = d + Σ w·dₛ of measured deviations becomes g + step·k with the whole number k, at most (sizes − 1)/2
+    either way, that leaves the least of it; d becomes d + step·k. Measuring errs by nothing (an assumption).
+    Derivatives with respect to zones are those of the sizes chosen, as a unit that changes its size has none (own
+    derivation).
 
     Examples
     --------
