@@ -76,7 +76,7 @@ def report(title: str, *, first: bool = False, rows: int = 60) -> Document:
     return Document(
         title=title,
         subtitle="seed 1",
-        answer=tuple(f"{title}: sentence {at} on the yield." for at in range(5)),
+        answer=tuple(f"{title}: sentence {at} on the yield." for at in range(6)),
         warnings=(f"{title} is quick.",),
         sections=(
             Section(heading="What to write", tables=((f"{title} drawing", framed),), first=first, unfolded=True),
@@ -114,7 +114,7 @@ def test_a_page_is_sound_and_begins_with_answer_and_drawing(written):
     assert text.index("Allocation drawing" if "Allocation drawing" in text else "⌀0.0047") < text.index("<nav>")
     assert text.count("More on this answer") == 4
     for title in ("Allocation", "Ranking"):
-        assert text.count(f"{title}: sentence 0") == 1 == text.count(f"{title}: sentence 4")  # none is said twice
+        assert text.count(f"{title}: sentence 0") == 1 == text.count(f"{title}: sentence 5")  # none is said twice
     assert "display: table-header-group" in text
     assert "<dt>yield</dt>" in text and "<dt>preloaded</dt>" not in text
 
@@ -157,8 +157,8 @@ def test_a_printed_report_has_lost_nothing(written, tmp_path, paper, size):
         assert all(f"{title}.part{at}.position" in text for at in range(60))
     # The answer of the first page stands in full, that of the other report behind its heading.
     said = " ".join(text.split())
-    assert "Allocation: sentence 4 on the yield." in said
-    assert "Ranking: sentence 4 on the yield." not in said
+    assert "Allocation: sentence 5 on the yield." in said
+    assert "Ranking: sentence 5 on the yield." not in said
     assert "More on this answer: in the report" in said
     assert text.count("⌀0.0047") == 2
     assert "Both" in pages[0] and "drawing number" in pages[0] and "⌀0.0047" in pages[0]
