@@ -191,7 +191,7 @@ def test_a_refused_value_marks_its_row_alone_and_numbers_are_grey_until_theirs_a
 
     shown(driver, study)
     cost = by_id(driver, "cost").text
-    for selector, typed, good in (("#zones", "3000", "40"), ("#zones", "abc", "40"), ("#settings", "9", "0.01")):
+    for selector, typed, good in (("#zones", "3000000", "40"), ("#zones", "abc", "40"), ("#settings", "9", "0.01")):
         field = driver.find_element("css selector", f"{selector} input[inputmode=decimal]")
         field.send_keys(Keys.CONTROL + "a" + Keys.NULL, typed, Keys.TAB)
         until(lambda own=field: own.get_attribute("aria-invalid") == "true")

@@ -15,6 +15,7 @@ from enum import Enum
 from io import BytesIO, StringIO
 from pathlib import Path
 from typing import Any
+from unicodedata import category
 
 import numpy as np
 from openpyxl import load_workbook
@@ -104,9 +105,15 @@ def _meant(text: str) -> object:
 
 
 def _cells(rows: list[list[str]]) -> Said:
-    """Return row and column → cell; rows that are blank do not count, nor titles above a header that has an id."""
-    kept = [[cell.strip() for cell in row] for row in rows if any(cell.strip() for cell in row)]
+    """Return row and column → cell; rows that are blank do not count, nor titles above a header that has an id.
+
+    A damaged header above a whole one is a title; signs that nobody sees are none.
+    """
+    seen = [["".join(sign for sign in cell if category(sign) != "Cf").strip() for cell in row] for row in rows]
+    kept = [row for row in seen if any(row)]
     kept = kept[next((at for at, row in enumerate(kept) if "id" in row), 0) :]
+    while len(kept) > 1 and "id" in kept[0] and "id" in kept[1]:
+        kept = kept[1:]
     header = kept[0] if kept else []
     found: Said = {f"header {at}": re.sub(r"\s*\[\s*\]$", "", name) for at, name in enumerate(header) if name}
     for number, row in enumerate(kept[1:], start=1):

@@ -19,7 +19,7 @@ from tolalloc.reports.excel import write_sheets
 Row = dict[str, object]
 
 NAMES = (
-    st.text(st.characters(exclude_categories=["Cs", "Cc"]), max_size=8)
+    st.text(st.characters(exclude_categories=["Cs", "Cc", "Cf", "Zs"], include_characters=" "), max_size=8)
     .map(str.strip)
     .filter(
         lambda text: (
