@@ -159,8 +159,7 @@ class DrawingQuestion:
         """Return the allocation of tolerances and settings at once, from proportional scaling."""
         verifier = self.verifier("direct", self.space)
         scaled = scale_in_proportion(verifier, self.effort.search.steps)
-        start = None if self.start is None else self._cheaper_start(verifier, cheapest_met(scaled))
-        return allocate(verifier, scaled, self.effort.search, start)
+        return allocate(verifier, scaled, self.effort.search, self._cheaper_start(verifier, cheapest_met(scaled)))
 
     def fixed(self) -> ZoneAllocation:
         """Return the allocation of tolerances with the settings as they are."""

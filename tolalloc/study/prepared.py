@@ -30,7 +30,7 @@ from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.effort import RankingEffort
 from tolalloc.study.problem import COMMON, Limit, Problem
 
-_ASSEMBLED = "Units are judged as they are assembled: {label}."
+_ASSEMBLED = "Units are judged as they are assembled, by an allocation with its own choice, else with {label}."
 _SHARED = "Rows without a group are one line where identical parts have the same zone, limits and price: {lines}."
 """What is said of the lines that `Prepared.errors` made, with the number of rows of each."""
 
