@@ -2,8 +2,8 @@
 Sorted parts
 ============
 
-The cheapest zones of a hole and a shaft whose gap must stay within ±8 µm, for random parts and for parts that are sorted
-into classes and mated class by class; sorting and parts that find no mate cost as well.
+The cheapest zones of a hole and a shaft whose gap must stay within ±8 µm, for random parts and for parts that are
+sorted into classes and mated class by class; sorting and parts that find no mate cost as well.
 
 **Read off it:** where one more class saves less in the zones than it costs at assembly.
 """
