@@ -22,7 +22,7 @@ from tolalloc.drawings.drawing import load_drawing
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.family import RV
+from tolalloc.reducers.families.rv import RV
 from tolalloc.reducers.reducer.files import load_reducer
 
 

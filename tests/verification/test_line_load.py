@@ -25,7 +25,7 @@ from tolalloc.reducers.equivalent.outputs import (
     unit_pressure,
 )
 from tolalloc.reducers.response.kernel import KernelResponse
-from tolalloc.reducers.response.outputs import OutputsResponse
+from tolalloc.reducers.response.outputs import OutputsResponse, requirements_of
 
 TORQUE = -100.0
 
@@ -126,7 +126,10 @@ def test_pressure_of_an_even_load_is_hertz_s(rv20e):
 
 def stress(model, errors):
     fixed = dict(zip(model.columns, errors, strict=True))
-    response = OutputsResponse(kernel=KernelResponse(model=model, torque=TORQUE, columns=(), fixed=fixed))
+    response = OutputsResponse(
+        kernel=KernelResponse(model=model, torque=TORQUE, columns=(), fixed=fixed),
+        readings=requirements_of(model.reducer),
+    )
     return dict(zip(response.outputs, response(np.empty((1, 0))).values[0], strict=True))
 
 

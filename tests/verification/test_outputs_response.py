@@ -12,7 +12,7 @@ from tolalloc.reading.units import ARCMINUTE, ARCSECOND
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop
 from tolalloc.reducers.equivalent.model import Status, count_statuses
 from tolalloc.reducers.equivalent.outputs import order_spectrum
-from tolalloc.reducers.response.outputs import REQUIREMENTS, OutputsResponse, Reading, orders_reading
+from tolalloc.reducers.response.outputs import OutputsResponse, Reading, orders_reading, requirements_of
 
 ORDERS = (1, 39, 40)
 
@@ -26,7 +26,9 @@ def x(prepared):
 
 @pytest.fixture(scope="module")
 def response(prepared):
-    return OutputsResponse(kernel=prepared.model.kernel, readings=(*REQUIREMENTS, orders_reading(ORDERS)))
+    return OutputsResponse(
+        kernel=prepared.model.kernel, readings=(*requirements_of(prepared.model.reducer), orders_reading(ORDERS))
+    )
 
 
 @pytest.mark.slow
@@ -69,7 +71,7 @@ def test_a_failed_reading_fails_its_sample_alone(prepared, x):
     seen = []
     response = OutputsResponse(
         kernel=replace(prepared.model.kernel, observe=seen.append),
-        readings=(REQUIREMENTS[0], Reading(outputs=("broken [-]",), read=broken)),
+        readings=(requirements_of(prepared.model.reducer)[0], Reading(outputs=("broken [-]",), read=broken)),
     )
     found = response(x)
     assert np.flatnonzero(~found.good).tolist() == [3]

@@ -15,7 +15,7 @@ from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES
 from tolalloc.reducers.equivalent.model import Status
 from tolalloc.reducers.equivalent.outputs import forces, radial_clearance
 from tolalloc.reducers.reducer.design import Modification
-from tolalloc.reducers.response.outputs import REQUIREMENTS, OutputsResponse
+from tolalloc.reducers.response.outputs import OutputsResponse, requirements_of
 
 CLEARANCE = "radial clearance at tip and root [µm]"
 
@@ -82,7 +82,7 @@ def test_errors_that_are_tangential_or_move_a_disc_do_not_count(rv20e):
 
 
 def test_an_error_that_is_no_number_is_a_status(prepared):
-    reading = REQUIREMENTS[-1]
+    reading = requirements_of(prepared.model.reducer)[-1]
     errors = prepared.model.kernel.errors(np.zeros((2, len(prepared.model.kernel.columns))))
     errors[1, prepared.model.kernel.model.columns.index("pin.diameter")] = np.nan
     values, status = reading.read(prepared.model.kernel.model, errors, -1.0)
@@ -94,7 +94,7 @@ def test_an_error_that_is_no_number_is_a_status(prepared):
 def test_line_load_and_pressure_are_those_of_the_most_loaded_pin(prepared, generator):
     kernel, stage = prepared.model.kernel, prepared.model.reducer.cycloid_stage
     x = generator.normal(0.0, 0.5e-6, (3, len(kernel.columns)))
-    response = OutputsResponse(kernel=kernel)
+    response = OutputsResponse(kernel=kernel, readings=requirements_of(kernel.model.reducer))
     values = dict(zip(response.outputs, response(x).values.T, strict=True))
     force = values["largest pin force, rated torque [N]"]
     line_load = values["largest line load, rated torque [N/mm]"]

@@ -20,7 +20,7 @@ from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.reducer.design import Modification
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.reducers.response.kernel import KernelResponse, StiffnessResponse
-from tolalloc.reducers.response.outputs import REQUIREMENTS, OutputsResponse, orders_reading
+from tolalloc.reducers.response.outputs import OutputsResponse, orders_reading, requirements_of
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.study.prepared import Prepared
 
@@ -54,13 +54,13 @@ def x(model) -> np.ndarray:
 
 def test_readings_are_those_of_kernel_and_outputs_in_the_order_asked_for(model, x):
     assert model.reading((PEAK_TO_PEAK,)) is model.kernel
-    every = OutputsResponse(kernel=model.kernel, readings=(*REQUIREMENTS, orders_reading((1,))))
+    every = OutputsResponse(kernel=model.kernel, readings=(*requirements_of(model.reducer), orders_reading((1,))))
     asked = (RADIAL, WAVE, LOST_MOTION)
     found = model.reading(asked)
     assert found.outputs == asked
     columns = [every.outputs.index(name) for name in asked]
     np.testing.assert_array_equal(found(x).values, every(x).values[:, columns])
-    assert model.reading(model.outputs) == OutputsResponse(kernel=model.kernel)
+    assert model.reading(model.outputs) == OutputsResponse(kernel=model.kernel, readings=requirements_of(model.reducer))
     with pytest.raises(UnknownNameError, match="lost motoin"):
         model.reading(("lost motoin [arcmin]",))
 

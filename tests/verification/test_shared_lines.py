@@ -13,7 +13,7 @@ import tolalloc as ta
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_text
 from tolalloc.models.function_model import FunctionModel
-from tolalloc.reducers.family import RV
+from tolalloc.reducers.families.rv import RV
 from tolalloc.study.prepared import Prepared
 
 GROUPS = {own.name: own.group for own in load_tolerance_table("rv20e_drawing")}

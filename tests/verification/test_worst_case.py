@@ -20,7 +20,7 @@ from tolalloc.exceptions import InputError, SolveError, UnknownNameError
 from tolalloc.models.differences import DifferencedResponse
 from tolalloc.models.model import Evaluation
 from tolalloc.reducers.response.kernel import KernelResponse, WithDerivatives
-from tolalloc.reducers.response.outputs import REQUIREMENTS, OutputsResponse
+from tolalloc.reducers.response.outputs import OutputsResponse, requirements_of
 
 SEEDS = SeedTree(0).child("worst case")
 
@@ -194,7 +194,7 @@ def test_differences_are_the_exact_derivatives(kernel, errors):
 
 @pytest.mark.slow
 def test_other_outputs_have_a_worst_unit_by_differences(kernel, errors):
-    outputs = OutputsResponse(kernel=kernel, readings=(REQUIREMENTS[-1],))
+    outputs = OutputsResponse(kernel=kernel, readings=requirements_of(kernel.model.reducer)[-1:])
     output, steps = outputs.outputs[0], np.full(len(errors.columns), 1e-9)
     response = DifferencedResponse(response=outputs, output=output, steps=steps)
     found = worst_unit(Experiment.of(response, errors, SEEDS), starts=8, steps=20, sense=-1)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from math import cos, gcd, pi, sin
 from typing import NamedTuple
 
-from tolalloc.reducers.family import RV
+from tolalloc.reducers.families.known import family_of
 from tolalloc.reducers.reducer.design import Reducer
 
 _WAVE = re.compile(r"(.*)\.(cos|sin)(\d+)")
@@ -85,7 +85,7 @@ def carrier_turn(reducer: Reducer, bores: int) -> PartTurn:
 
 def sun_turn(reducer: Reducer, teeth: int) -> PartTurn:
     """Return the sun meshed so many teeth on."""
-    shift = RingShift(teeth, reducer.first_stage.sun_teeth)
+    shift = RingShift(teeth, reducer.gears.sun_teeth)
     return PartTurn(number=teeth, direction=shift.angle, ring=shift)
 
 
@@ -118,10 +118,10 @@ def places_of(reducer: Reducer) -> tuple[Place, ...]:
     The carrier has n_crank turns against discs and cranks. Counting the crank positions from another one is no other
     mounting; it is possible where teeth of discs and planets fit again, and those turns of the carrier are left out.
     """
-    cranks, first = reducer.crank_count, reducer.first_stage
+    cranks, first = reducer.crank_count, reducer.gears
     gears = first.sun_teeth + first.planet_teeth
     alike = cranks // gcd(cranks, reducer.cycloid_stage.disc_teeth, gears)
-    fixed = tuple(kind.name for kind in RV.sources.kinds if kind.fixed)
+    fixed = tuple(kind.name for kind in family_of(reducer).sources.kinds if kind.fixed)
     housing = Place(
         name="housing",
         kind="housing",

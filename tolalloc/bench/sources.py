@@ -18,7 +18,7 @@ from tolalloc.bench.posterior import CurveProblem, LogDensity
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.exceptions import SolveError
 from tolalloc.reducers.equivalent.sources import ErrorSource
-from tolalloc.reducers.family import RV
+from tolalloc.reducers.families.known import SOURCES
 from tolalloc.reducers.reducer.design import Reducer
 
 _OTHER = {"1": "2", "2": "1"}
@@ -39,7 +39,7 @@ def exchanged(name: str) -> str:
 
 def _image(name: str, reducer: Reducer) -> str:
     """Return the column that a column becomes; of a wave, the one with the same function."""
-    kind = RV.sources.of_column(name)
+    kind = SOURCES.of_column(name)
     if not kind.each:
         return exchanged(name)
     number = kind.member(name)
@@ -77,10 +77,10 @@ def half_turn(columns: Sequence[str], reducer: Reducer) -> Float[np.ndarray, "co
         to = where[_image(name, reducer)]
         wave = re.search(r"\.(cos|sin)(\d+)$", name)
         if wave is None:
-            kind = RV.sources.of_column(name)
+            kind = SOURCES.of_column(name)
             matrix[to, at] = -1.0 if kind.shape == "vector" and kind.mirror == "reversed" else 1.0
             continue
-        past = _past(RV.sources.of_column(name), name) / reducer.cycloid_stage.disc_teeth
+        past = _past(SOURCES.of_column(name), name) / reducer.cycloid_stage.disc_teeth
         lag = int(wave[2]) * np.pi * (1.0 + past)
         other = where[exchanged(name[: wave.start()] + (".sin" if wave[1] == "cos" else ".cos") + wave[2])]
         matrix[to, at] = np.cos(lag)

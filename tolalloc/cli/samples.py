@@ -20,7 +20,7 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.table_file import DATA as TABLES
 from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE
 from tolalloc.reducers.choice import bind
-from tolalloc.reducers.family import RV
+from tolalloc.reducers.families.known import SOURCES
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import with_stiffness
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
@@ -266,7 +266,7 @@ class Samples:
 
 def _part_and_error(column: str) -> tuple[str, str]:
     """Return which measured part of a unit a column belongs to and what the parts table calls it; none of others."""
-    kind = RV.sources.of_column(column)
+    kind = SOURCES.of_column(column)
     if kind.first_stage or not kind.place:
         return "", ""
     if kind.fixed:

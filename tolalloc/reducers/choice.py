@@ -19,7 +19,7 @@ from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.model import EquivalentModel, cached_model
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
 from tolalloc.reducers.equivalent.springs import HARMONICS
-from tolalloc.reducers.family import RV
+from tolalloc.reducers.families.known import SOURCES
 from tolalloc.reducers.reducer.design import Modification, Reducer, at_torque
 from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from tolalloc.reducers.model import ReducerModel
 
 
-NEGLECTED = RV.sources.neglected
+NEGLECTED = SOURCES.neglected
 """Sources that a tolerance table need not list; they are then taken as exact, and the report says so."""
 
 _NOMINAL = "*.clearance"
@@ -113,7 +113,7 @@ def _require_each(errors: ErrorModel, own: Mapping[str, Sequence[str]], reducer:
     """
     wrong: dict[int, list[str]] = {}
     for source in errors.sources:
-        kind = RV.sources.of(source.name)
+        kind = SOURCES.of(source.name)
         if own[source.name] and kind and source.each != kind.count(reducer):
             wrong.setdefault(source.each, []).append(source.name)
     if not wrong:
@@ -134,7 +134,7 @@ def _other_sizes(errors: ErrorModel, reducer: Reducer) -> tuple[str, ...]:
     """Return which nominal sizes of a table are not those of the reducer, in sentences; a size of 0 is not stated."""
     sentences = []
     for source in errors.sources:
-        kind = RV.sources.of(source.name)
+        kind = SOURCES.of(source.name)
         if kind is None or kind.nominal is None or not source.nominal:
             continue
         what, size = kind.nominal.said, kind.nominal.of(reducer)
@@ -215,7 +215,7 @@ class ReducerChoice:
         stated
             Source → what the table states of it.
         """
-        return RV.sources.shared_lines(stated)
+        return SOURCES.shared_lines(stated)
 
     def bound(self, errors: ErrorModel, place: str) -> ReducerModel:
         """Return the model at the sources of a drawing; nothing is solved.

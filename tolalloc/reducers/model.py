@@ -157,9 +157,11 @@ class ReducerModel(Model):
             if name not in self.outputs and name not in waves:
                 raise UnknownNameError.among(self.name, "output", name, self.outputs)
         orders = tuple(dict.fromkeys(waves[name] for name in outputs if name in waves))
-        readings = with_orders(readings_of(outputs), orders) if orders else readings_of(outputs)
+        readings = (
+            with_orders(readings_of(self.reducer, outputs), orders) if orders else readings_of(self.reducer, outputs)
+        )
         for warmer, names in self._at_temperatures.items():
-            own = readings_of(tuple(names[name] for name in outputs if name in names))
+            own = readings_of(self.reducer, tuple(names[name] for name in outputs if name in names))
             readings = (*readings, *(reading.at(warmer) for reading in own))
         response = OutputsResponse(kernel=self.kernel, readings=readings)
         return response if response.outputs == outputs else replace(response, chosen=outputs)

@@ -26,9 +26,10 @@ from tolalloc.reducers.equivalent.condensation import (
 )
 from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel, Status
 from tolalloc.reducers.equivalent.outputs import Forces, forces
-from tolalloc.reducers.equivalent.springs import Positions, SpringGroup
-from tolalloc.reducers.family import RV, Place
-from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.equivalent.springs import Coordinates, Positions, SpringGroup
+from tolalloc.reducers.families.family import Place
+from tolalloc.reducers.families.known import SOURCES, family_of
+from tolalloc.reducers.reducer.design import FirstStage, Reducer
 
 
 def place_of(source: str) -> str:
@@ -44,16 +45,16 @@ def place_of(source: str) -> str:
     >>> place_of("disc2.each_tooth.pitch"), place_of("crank1.journal2.phase"), place_of("carrier.tilt")
     ('disc2.teeth', 'crank1.journal2', 'carrier')
     """
-    kind = RV.sources.of(source)
+    kind = SOURCES.of(source)
     if kind is None or not kind.place:
-        names = [own.name for own in RV.sources.kinds if own.place]
+        names = [own.name for own in SOURCES.kinds if own.place]
         raise UnknownNameError.among("places of a reducer", "source", source, names)
     return kind.place_of(source)
 
 
 def is_placed(source: str) -> bool:
     """Return whether the picture has a place for a source."""
-    kind = RV.sources.of(source)
+    kind = SOURCES.of(source)
     return kind is not None and bool(kind.place)
 
 
@@ -65,7 +66,7 @@ def places_of(reducer: Reducer, sources: Iterable[str] = ()) -> tuple[Place, ...
     UnknownNameError
         A source that sits at no part of the reducer.
     """
-    found = {place.id: place for place in RV.places(reducer)}
+    found = {place.id: place for place in family_of(reducer).places(reducer)}
     for source in sources:
         own = place_of(source)
         if own not in found:
@@ -339,7 +340,7 @@ def scene_of(
     reducer = _as_modified(model.reducer, own)
     turn = _turn_of(model.at_torque(torque), per_crank_turn * reducer.cycloid_stage.disc_teeth)
     forward, backward = (_solved_states(turn, errors, sign * abs(torque)) for sign in (-1.0, 1.0))
-    outline, assumptions = RV.outlines(reducer)
+    outline, assumptions = family_of(reducer).outlines(reducer)
     turns, start = _motion(reducer)
     return Scene(
         reducer=reducer.name,
@@ -349,8 +350,7 @@ def scene_of(
         turns=turns,
         start=start,
         coordinates=_coordinates(reducer),
-        output_turns=reducer.first_stage.sun_teeth
-        // gcd(reducer.first_stage.sun_teeth, reducer.first_stage.planet_teeth * reducer.cycloid_stage.pin_count),
+        output_turns=_output_turns(reducer),
         carrier_angle=turn.carrier_angle,
         forward=forward,
         backward=backward,
@@ -359,6 +359,14 @@ def scene_of(
         magnification=_magnification(reducer, forward, backward),
         assumptions=assumptions,
     )
+
+
+def _output_turns(reducer: Reducer) -> int:
+    """Return after how many turns of the output everything is where it was [-]."""
+    if reducer.first_stage is None:
+        return 1
+    gears = reducer.first_stage
+    return gears.sun_teeth // gcd(gears.sun_teeth, gears.planet_teeth * reducer.cycloid_stage.pin_count)
 
 
 def _as_modified(reducer: Reducer, own: Mapping[str, float]) -> Reducer:
@@ -374,22 +382,17 @@ def _motion(reducer: Reducer) -> tuple[dict[str, float], dict[str, list[float]]]
     """
     still, turned = (Positions(reducer, np.array([angle])) for angle in (0.0, 2 * pi))
     cranks, discs = range(reducer.crank_count), range(reducer.disc_count)
-    stage, first = reducer.cycloid_stage, reducer.first_stage
+    stage = reducer.cycloid_stage
 
     def turns(at: Any) -> float:
         return float((at(turned)[0] - at(still)[0]) / (2 * pi))
 
-    position = [float(still.crank_position(crank)[0]) for crank in cranks]
-    in_mesh = [direction * first.sun_teeth / (2 * pi) % 1.0 for direction in position]
     start = {
-        "carrier": position,
+        "carrier": [float(still.crank_position(crank)[0]) for crank in cranks] or [0.0],
         "crank": [float(still.disc_direction(disc)[0]) for disc in discs],
         "disc": [float(-still.disc_direction(disc)[0] / stage.disc_teeth) for disc in discs],
         "pin": [float(direction) for direction in still.pin_direction],
-        "planet": [
-            direction + pi + (ahead - 0.5) * 2 * pi / first.planet_teeth
-            for direction, ahead in zip(position, in_mesh, strict=True)
-        ],
+        "planet": [_first_tooth(reducer.gears, float(still.crank_position(crank)[0])) for crank in cranks],
         "sun": [float(still.sun_angle[0])],
     }
     rates = {
@@ -403,11 +406,17 @@ def _motion(reducer: Reducer) -> tuple[dict[str, float], dict[str, list[float]]]
     return rates, start
 
 
+def _first_tooth(gears: FirstStage, direction: float) -> float:
+    """Return where a planet's first tooth stands that meshes with the sun from a direction [rad]."""
+    ahead = direction * gears.sun_teeth / (2 * pi) % 1.0
+    return direction + pi + (ahead - 0.5) * 2 * pi / gears.planet_teeth
+
+
 def _coordinates(reducer: Reducer) -> dict[str, list[int]]:
     """Return the first coordinate of every part [-]."""
-    own = RV.coordinates(reducer.crank_count, reducer.disc_count)
+    own = Coordinates.of(reducer)
     return {
-        "sun": [own.sun],
+        "sun": [own.input],
         "planet": [own.planet(crank) for crank in range(reducer.crank_count)],
         "disc": [own.disc(disc) for disc in range(reducer.disc_count)],
         "carrier": [own.carrier],
@@ -417,6 +426,13 @@ def _coordinates(reducer: Reducer) -> dict[str, list[int]]:
 def _offsets(reducer: Reducer, own: Mapping[str, float]) -> dict[str, list[float]]:
     """Return how far the axes of features are off their places, in the frames of their parts [mm]."""
     cranks, discs = range(1, reducer.crank_count + 1), range(1, reducer.disc_count + 1)
+    if reducer.first_stage is None:
+        columns = {f"shaft.journal{disc}": f"shaft.journal{disc}.eccentricity" for disc in discs}
+        pins = range(1, reducer.holes.count + 1)
+        columns |= {f"output.pin{pin}": f"output.pin.position.{pin}" for pin in pins}
+        for disc in discs:
+            columns |= {f"disc{disc}.hole{pin}": f"disc{disc}.hole.position.{pin}" for pin in pins}
+        return {place: [own[f"{name}.{axis}"] / MILLIMETRE for axis in "xy"] for place, name in columns.items()}
     columns = {"sun": "sun.eccentricity"}
     columns |= {f"planet{crank}": f"planet{crank}.eccentricity" for crank in cranks}
     columns |= {f"carrier.bore{crank}": f"carrier.bore{crank}.position" for crank in cranks}

@@ -23,7 +23,7 @@ from tolalloc.drawings.table_file import TextTable, plain_number, read_text_tabl
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.files import Record, no_formula, read_toml, shipped_or_path, validated, write_new
 from tolalloc.reading.units import MICROMETRE, MICRORADIAN
-from tolalloc.reducers.family import RV
+from tolalloc.reducers.families.known import SOURCES
 from tolalloc.reducers.reducer.files import PRESETS
 
 _HARMONIC = re.compile(r"(.*)\.(?:cos|sin)(\d+)")
@@ -90,7 +90,7 @@ class BuiltUnit:
             match = _HARMONIC.fullmatch(column)
             if match and match[1] in harmonic:  # an order that a stated source does not list is not there
                 deviations.setdefault(column, 0.0)
-        left_out = neglected_columns(self.neglected, names) | RV.sources.silent(names)
+        left_out = neglected_columns(self.neglected, names) | SOURCES.silent(names)
         for column in names:
             if column not in deviations and column not in left_out:
                 raise InputError(

@@ -10,7 +10,7 @@ from math import ceil, floor
 from tolalloc.drawings.sources import INCHES, LENGTHS, Source
 from tolalloc.drawings.zones import PHASE, ROTATION, TILT, Feature
 from tolalloc.reading.units import INCH, MICROMETRE
-from tolalloc.reducers.family import RV
+from tolalloc.reducers.families.known import SOURCES
 
 SYMBOLS = {
     "position": "⌖",
@@ -129,7 +129,7 @@ class Frames(tuple[FeatureFrame, ...]):
 
 def _found(source: Source) -> tuple[str, str]:
     """Return the characteristic of a source, and what of it is assumed."""
-    kind = RV.sources.of(source.name)
+    kind = SOURCES.of(source.name)
     if kind is not None and kind.each == "tooth":
         return "single tooth", ""
     if kind is not None and kind.shape == "waves" and source.feature in (Feature.PITCH, Feature.RUNOUT):

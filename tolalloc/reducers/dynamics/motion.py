@@ -243,7 +243,7 @@ def inertia_of(reducer: Reducer, density: float = 7850.0, output_inertia: float 
     """
     if not 0.0 <= output_inertia < np.inf:
         raise InputError.at("inertia", "output_inertia", output_inertia, "0 or a positive number")
-    stage, gears = reducer.cycloid_stage, reducer.first_stage
+    stage, gears = reducer.cycloid_stage, reducer.gears
 
     def cylinder(radius: float, width: float) -> tuple[float, float]:
         mass = density * pi * radius**2 * width

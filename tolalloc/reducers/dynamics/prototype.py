@@ -243,7 +243,7 @@ class System:
         Z2·(β − θc) = −Z1·(θs − θc), whether or not the planet stands in its place on the carrier. Without the
         derivative of the offset the engine would let the output stop.
         """
-        gears = reducer.first_stage.sun_teeth / reducer.first_stage.planet_teeth
+        gears = reducer.gears.sun_teeth / reducer.gears.planet_teeth
         return self.content.AddObject(
             self.engine.itemInterface.ObjectConnectorCoordinate(
                 markerNumbers=[crank, carrier],
@@ -493,7 +493,7 @@ def _answer(
     )
     weight = np.array([(mass, mass, moment) for mass, moment in bodies])
     input_angle = np.array([sun_speed.integral(at) for at in time])
-    gears = reducer.first_stage.sun_teeth / reducer.first_stage.planet_teeth
+    gears = reducer.gears.sun_teeth / reducer.gears.planet_teeth
     on_cranks = sum(stored(gear)[:, 1] for gear in prototype.gears)
     return PrototypeAnswer(
         time=time,

@@ -21,7 +21,6 @@ from tolalloc.reducers.equivalent.condensation import (
 )
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.springs import Coordinates, Positions
-from tolalloc.reducers.family import RV
 from tolalloc.reducers.reducer.design import Reducer
 
 _STEPS_AT_ONCE = 512
@@ -75,7 +74,7 @@ class Steps:
     @property
     def coordinates(self) -> Coordinates:
         """The layout of q."""
-        return RV.coordinates(self.reducer.crank_count, self.reducer.disc_count)
+        return Coordinates.of(self.reducer)
 
     @cached_property
     def scale(self) -> Float[np.ndarray, " coordinate"]:
@@ -100,7 +99,7 @@ class Steps:
     @property
     def sun_base_radius(self) -> float:
         """Base radius of the sun gear [m]."""
-        gears = self.reducer.first_stage
+        gears = self.reducer.gears
         return self.reducer.planet_base_radius * gears.sun_teeth / gears.planet_teeth
 
     def parts(self) -> Iterator[tuple[int, CondensedAngles, StepTables]]:

@@ -7,7 +7,7 @@ so that an angle needs two products per contact instead of one per column.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -50,7 +50,7 @@ class ColumnMap(NamedTuple):
     value: Int[np.ndarray, " entry"]
     column: Int[np.ndarray, " entry"]
     factor: Float[np.ndarray, " entry"]
-    nominal: Float[np.ndarray, " value"]  # Values of the perfect unit: nominal clearances [m]
+    nominal: Float[np.ndarray, " value"]  # Values of the perfect unit: nominal distances and clearances [m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,11 +76,13 @@ class Columns:
 
 def columns_of(reducer: Reducer, groups: Sequence[SpringGroup], orders: tuple[int, ...]) -> Columns:
     """Return the columns that the spring rows and the pin contact of a reducer declare."""
-    names: dict[str, int] = {name: at for at, name in enumerate(name for group in groups for name in group.columns)}
-    entries = [(at, at, 1.0) for at in names.values()]
+    values = [name for group in groups for name in group.columns]
+    constants = {name: value for group in groups for name, value in group.constants.items()}
+    names: dict[str, int] = {name: at for at, name in enumerate(own for own in values if own not in constants)}
+    entries = [(at, names[name], 1.0) for at, name in enumerate(values) if name in names]
     played = [group for group in groups if group.contact == "play"]
     discs, pins, teeth = reducer.disc_count, reducer.cycloid_stage.pin_count, reducer.cycloid_stage.disc_teeth
-    waves, torque = 4 * len(orders), len(names)
+    waves, torque = 4 * len(orders), len(values)
     clearance = torque + 1
     flank = clearance + sum(len(group.clearance_columns) for group in played)
     pin = flank + 1
@@ -89,7 +91,7 @@ def columns_of(reducer: Reducer, groups: Sequence[SpringGroup], orders: tuple[in
     tilt = tooth + discs * 2 * teeth
     layout = Layout(torque, clearance, flank, pin, wave, tooth, tilt, tilt + discs * 2, pins, waves, teeth)
 
-    def add(first: int, terms: Terms) -> None:
+    def add(first: int, terms: Mapping[str, Sequence[tuple[int, float]]]) -> None:
         for name, moved in terms.items():
             column = names.setdefault(name, len(names))
             entries.extend((first + entry, column, factor) for entry, factor in moved)
@@ -102,8 +104,10 @@ def columns_of(reducer: Reducer, groups: Sequence[SpringGroup], orders: tuple[in
         if LAWS[reducer.stiffness.pin_contact_law] == LINEAR:
             add(tilt + disc * 2, tilt_terms(disc))
     nominal, element = np.zeros(layout.end), clearance
+    nominal[:torque] = [constants.get(name, 0.0) for name in values]
     for group in played:
         add(element, {name: [(at, 1.0)] for at, name in enumerate(group.clearance_columns)})
+        add(element, group.clearance_terms)
         nominal[element : element + len(group.clearance_columns)] = group.clearance
         element += len(group.clearance_columns)
     value, column, factor = zip(*entries, strict=True)

@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 from tolalloc.reducers.equivalent.columns import Columns, columns_of
 from tolalloc.reducers.equivalent.interfaces import PinContact, dense_rows, pin_contact
 from tolalloc.reducers.equivalent.springs import HARMONICS, Coordinates, Positions, SpringGroup, harmonic_waves
-from tolalloc.reducers.family import RV
+from tolalloc.reducers.families.known import family_of
 from tolalloc.reducers.reducer.design import Reducer
 
 _ANGLES_AT_ONCE = 64
@@ -53,7 +53,7 @@ class CondensedAngles(NamedTuple):
 
 def bilateral_groups(at: Positions) -> list[SpringGroup]:
     """Return all spring groups but the pin contact."""
-    return RV.groups(at)
+    return family_of(at.reducer).groups(at)
 
 
 def spring_groups(
@@ -82,13 +82,13 @@ def error_columns(reducer: Reducer, orders: tuple[int, ...]) -> Columns:
 def rotation_scale(reducer: Reducer, coordinates: Coordinates) -> Float[np.ndarray, " coordinate"]:
     """Return the lever by which each coordinate is divided so that all are lengths [m or 1].
 
-    Own derivation: x = ℓ·θ with ℓ = r_b2, r_d or a_sp; any lever gives the same equilibrium.
+    Own derivation: x = ℓ·θ with ℓ = r_b2, r_d, and a_sp or a; any lever gives the same equilibrium.
 
     Examples
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> design = load_reducer("rv20e_liu2020")
-    >>> scale = rotation_scale(design, Coordinates(design.crank_count, design.disc_count))
+    >>> scale = rotation_scale(design, Coordinates.of(design))
     >>> round(1e3 / float(scale[-1]), 3)  # crank circle radius a_sp [mm]
     27.0
     """
@@ -97,7 +97,7 @@ def rotation_scale(reducer: Reducer, coordinates: Coordinates) -> Float[np.ndarr
         scale[coordinates.planet(crank) + 2] = 1 / reducer.planet_base_radius
     for disc in range(reducer.disc_count):
         scale[coordinates.disc(disc) + 2] = 1 / reducer.cycloid_stage.disc_pitch_radius
-    scale[coordinates.carrier + 2] = 1 / reducer.crank_circle_radius
+    scale[coordinates.carrier + 2] = 1 / reducer.carrier_radius
     return scale
 
 

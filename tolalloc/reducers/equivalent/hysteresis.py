@@ -170,15 +170,16 @@ def friction_torques(solved: Solved) -> dict[str, Float[np.ndarray, "sample angl
     {'pins': 8.7, 'crank_disc_bearing': 4.0, 'crank_carrier_bearing': 3.0, 'carrier_bearing': 0.0, 'gear_mesh': 2.7}
     """
     reducer, found = solved.equilibria.reducer, solved.forces
-    dimensions, first = reducer.friction_dimensions, reducer.first_stage
+    dimensions = reducer.friction_dimensions
     torques = {
         PINS: reducer.friction.pins
         * np.einsum("sadp,adp->sa", found.pins, sliding_ways(reducer, solved.equilibria.carrier_angle))
     }
     for name in (*CRANK_BEARINGS, "carrier_bearing"):
-        if name not in dimensions.unknown:
+        if getattr(dimensions, name) is not None:
             torques[name] = _bearing(reducer, dimensions, found, name)
     if MESH not in dimensions.unknown and dimensions.contact_ratio is not None:
+        first = reducer.gears
         sun_base = reducer.planet_base_radius * first.sun_teeth / first.planet_teeth
         loss = loss_factor(first.sun_teeth, first.planet_teeth, dimensions.contact_ratio)
         # Seen from the carrier the sun turns by ratio − 1 per radian of the output.

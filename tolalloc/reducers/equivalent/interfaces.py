@@ -68,7 +68,7 @@ def sun_support(at: Positions) -> SpringGroup:
     """
     angles = at.carrier_angle.size
     displacement = np.zeros((angles, 2, at.coordinates.count))
-    displacement[:, [0, 1], [at.coordinates.sun, at.coordinates.sun + 1]] = 1.0
+    displacement[:, [0, 1], [at.coordinates.input, at.coordinates.input + 1]] = 1.0
     return SpringGroup(
         name="sun support",
         stiffness_name="sun_support",
@@ -98,7 +98,7 @@ def _along_line_of_action(
     line of action. The teeth in mesh stand at P_i seen from the sun's centre and opposite to it seen from the planet's;
     there a planet's tooth that is ahead moves against the line of action, which compresses as the sun's does.
     """
-    alpha, position = at.reducer.first_stage.pressure_angle, at.crank_position(crank)
+    alpha, position = at.reducer.gears.pressure_angle, at.crank_position(crank)
     line_of_action = position + np.pi / 2 - alpha
     normal = np.stack([np.cos(line_of_action), np.sin(line_of_action)], axis=-1)
     columns: dict[str, Float[np.ndarray, " angle"]] = {}
@@ -140,7 +140,7 @@ def gear_mesh(at: Positions) -> SpringGroup:
     for crank in range(cranks):
         columns, normal = _along_line_of_action(at, crank)
         planet = coordinates.planet(crank)
-        displacement[:, crank, coordinates.sun : coordinates.sun + 2] = normal
+        displacement[:, crank, coordinates.input : coordinates.input + 2] = normal
         displacement[:, crank, planet : planet + 2] = -normal
         displacement[:, crank, planet + 2] = reducer.planet_base_radius
         meshes.append(columns)
@@ -179,7 +179,7 @@ GEAR_MESH = Interface(
 )
 
 
-def _lever(radius: float, direction: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle 2"]:
+def lever(radius: float, direction: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle 2"]:
     """Return the movement, per radian of its part, of a point at a radius and direction [m/rad]."""
     return radius * np.stack([-np.sin(direction), np.cos(direction)], axis=-1)
 
@@ -224,8 +224,8 @@ def crank_disc(at: Positions) -> SpringGroup:
         rows, plane = slice(2 * number, 2 * number + 2), at.plane(disc)
         planet, plate = coordinates.planet(crank), coordinates.disc(disc)
         journal, bore = f"crank{crank + 1}.journal{disc + 1}", f"disc{disc + 1}.bore{crank + 1}"
-        crank_turn = _lever(eccentricity, at.disc_direction(disc))
-        disc_turn = _lever(reducer.crank_circle_radius, at.crank_position(crank))
+        crank_turn = lever(eccentricity, at.disc_direction(disc))
+        disc_turn = lever(reducer.crank_circle_radius, at.crank_position(crank))
         displacement[:, rows, planet : planet + 2] = np.eye(2)
         displacement[:, rows, planet + 2] = crank_turn
         displacement[:, rows, plate : plate + 2] = -np.eye(2)
@@ -329,7 +329,7 @@ def crank_carrier(at: Positions) -> SpringGroup:
         planet, carrier = coordinates.planet(crank), coordinates.carrier
         displacement[:, rows, planet : planet + 2] = np.eye(2)
         displacement[:, rows, carrier : carrier + 2] = -np.eye(2)
-        displacement[:, rows, carrier + 2] = -_lever(reducer.crank_circle_radius, at.crank_position(crank))
+        displacement[:, rows, carrier + 2] = -lever(reducer.crank_circle_radius, at.crank_position(crank))
         error[:, rows, rows] = -turned(at.carrier_angle)
         columns += vector_columns(f"carrier.bore{crank + 1}.position")
     group = SpringGroup(

@@ -109,6 +109,7 @@ class Derivatives:
     # By every error column, modification included; by the torque [rad/m, rad/rad; rad/(N·m)]
     by_error: Float[np.ndarray, "item column"]
     by_torque: Float[np.ndarray, " item"]
+    by_nominal: Float[np.ndarray, " item"]  # By the relative change of all nominal distances and clearances [rad]
     # By the relative change of each stiffness of `tolalloc.reducers.reducer.stiffness.Stiffness` [rad]
     by_stiffness: dict[str, Float[np.ndarray, " item"]]
     status: UInt8[np.ndarray, " item"]  # Worst status of the equilibria behind them [-]
@@ -393,9 +394,11 @@ class EquivalentModel:
             name: columns.stiffness[name] * derivative.by_row[:, rows].sum(axis=1)
             for name, rows in columns.rows_of_stiffness.items()
         }
+        present, nothing = np.flatnonzero(columns.map.nominal), np.zeros(len(derivative.by_value))
         return Derivatives(
             by_error=np.asarray((columns.matrix.T @ derivative.by_value.T).T),
             by_torque=derivative.by_value[:, columns.layout.torque],
+            by_nominal=sum((columns.map.nominal[at] * derivative.by_value[:, at] for at in present), nothing),
             by_stiffness={**by_stiffness, "pin_contact": derivative.by_pin},
             status=derivative.status,
         )

@@ -22,6 +22,7 @@ from tolalloc.reducers.equivalent.interfaces import PinContact, pin_contact
 from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel
 from tolalloc.reducers.equivalent.solvers.records import design_of
 from tolalloc.reducers.equivalent.springs import Positions, harmonic_waves
+from tolalloc.reducers.reducer.design import Reducer
 
 SINGLE = ("gear_mesh",)
 """Interfaces that carry along one direction; the others carry x and y."""
@@ -197,18 +198,31 @@ def _largest_share(solved: Solved) -> Float[np.ndarray, " sample"]:
     return np.asarray(load_share(solved.forces.pins).max(axis=1))
 
 
-OUTPUTS: dict[str, tuple[str, Callable[[Solved], Float[np.ndarray, " sample"]]]] = {
-    "mean transmission error": ("arcsec", _mean),
-    "pins in contact, least": ("-", _fewest),
-    "pins in contact, most": ("-", _most),
-    "largest pin force": ("N", _pin_force),
-    "largest mesh force": ("N", _interface_force("gear_mesh")),
-    "largest crank–disc bearing force": ("N", _interface_force("crank_disc_bearing")),
-    "largest crank–carrier bearing force": ("N", _interface_force("crank_carrier_bearing")),
-    "largest carrier bearing force": ("N", _interface_force("carrier_bearing")),
-    "share of the pin force on the most loaded disc": ("-", _largest_share),
+Quantity = tuple[str, Callable[[Solved], Float[np.ndarray, " sample"]]]
+"""Unit of an output of one solve, and what gives it, a number per sample."""
+
+_LARGEST = {
+    "mesh": "gear_mesh",
+    "crank–disc bearing": "crank_disc_bearing",
+    "crank–carrier bearing": "crank_carrier_bearing",
+    "eccentric bearing": "eccentric_bearing",
+    "output pin": "output_pin",
+    "carrier bearing": "carrier_bearing",
 }
-"""Every output of one solve with its unit, a number per sample; a new one is one function and one line here."""
+"""Interface in words → as in `Stiffness`."""
+
+
+def outputs_of(reducer: Reducer) -> dict[str, Quantity]:
+    """Return every output of one solve, largest forces of those interfaces that the reducer has."""
+    forces_of = {own: name for own, name in _LARGEST.items() if getattr(reducer.stiffness, name)}
+    return {
+        "mean transmission error": ("arcsec", _mean),
+        "pins in contact, least": ("-", _fewest),
+        "pins in contact, most": ("-", _most),
+        "largest pin force": ("N", _pin_force),
+        **{f"largest {own} force": ("N", _interface_force(name)) for own, name in forces_of.items()},
+        "share of the pin force on the most loaded disc": ("-", _largest_share),
+    }
 
 
 def radial_clearance(
@@ -561,11 +575,11 @@ def attribute(model: EquivalentModel, errors: Float[np.ndarray, "1 column"], tor
     """
     curve, derivatives = model.rotation_derivatives(errors, torque)
     parts: dict[str, Float[np.ndarray, " angle"]] = {}
-    clearance = model.error_columns.matrix.T @ model.error_columns.map.nominal
-    for source, values in ((source_name, errors[0]), (lambda _: CLEARANCE, clearance)):
-        for at in np.flatnonzero(values):
-            name = source(model.columns[at])
-            parts[name] = parts.get(name, 0.0) + values[at] * derivatives.by_error[:, at]
+    for at in np.flatnonzero(errors[0]):
+        name = source_name(model.columns[at])
+        parts[name] = parts.get(name, 0.0) + errors[0, at] * derivatives.by_error[:, at]
+    if model.error_columns.map.nominal.any():
+        parts[CLEARANCE] = derivatives.by_nominal
     parts[TORQUE] = torque * derivatives.by_torque
     if LAWS[model.reducer.stiffness.pin_contact_law] != LINEAR:
         parts[CURVATURE] = curve[0] - np.sum(list(parts.values()), axis=0)

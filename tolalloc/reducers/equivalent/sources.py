@@ -41,7 +41,7 @@ class ErrorSource:
     shape
         What one deviation is: a number, a vector in the plane, or waves along a ring.
     each
-        Whether every ``pin`` or every ``tooth`` has a deviation of its own.
+        Whether every ``pin``, every ``tooth`` or every ``output pin`` (or its hole) has a deviation of its own.
     place
         Where the picture shows it, as `tolalloc.reducers.scene.Place.id` says; nowhere if empty.
     mirror
@@ -68,7 +68,7 @@ class ErrorSource:
 
     name: str
     shape: Literal["number", "vector", "waves"] = "number"
-    each: Literal["", "pin", "tooth"] = ""
+    each: Literal["", "pin", "tooth", "output pin"] = ""
     place: str = ""
     mirror: Literal["reversed", "kept"] = "reversed"
     teeth: bool = False
@@ -98,6 +98,8 @@ class ErrorSource:
     def count(self, reducer: Reducer) -> int:
         """Return how many like features each have a deviation of their own [-]."""
         stage = reducer.cycloid_stage
+        if self.each == "output pin":
+            return reducer.holes.count
         return {"": 1, "pin": stage.pin_count, "tooth": stage.disc_teeth}[self.each]
 
     @cached_property
@@ -166,7 +168,7 @@ class ErrorSources:
         --------
         The bores of disc 1 are finer than those of disc 2, and both discs have one pitch:
 
-        >>> from tolalloc.reducers.family import RV
+        >>> from tolalloc.reducers.families.rv import RV
         >>> bores = {"disc1.bore1.position": 4, "disc1.bore2.position": 4, "disc2.bore1.position": 6}
         >>> lines = RV.sources.shared_lines({**bores, "disc1.pitch": 8, "disc2.pitch": 8})
         >>> [*dict.fromkeys(lines.values())]

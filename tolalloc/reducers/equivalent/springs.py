@@ -5,7 +5,8 @@ Where every part stands at a carrier angle, and which coordinate of the model is
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -20,10 +21,15 @@ HARMONICS = (1, 2, 4)
 
 @dataclass(frozen=True)
 class Coordinates:
-    """Index of every displacement in the vector q: 2 + 3·cranks + 3·discs + 3 of them."""
+    """Index of every displacement in the vector q: 2 + 3·cranks + 3·discs + 3 of them; a single stage has no crank."""
 
     crank_count: int
     disc_count: int
+
+    @classmethod
+    def of(cls, reducer: Reducer) -> Coordinates:
+        """Return the layout of a reducer's displacements."""
+        return cls(reducer.crank_count, reducer.disc_count)
 
     @property
     def count(self) -> int:
@@ -31,8 +37,8 @@ class Coordinates:
         return 5 + 3 * self.crank_count + 3 * self.disc_count
 
     @property
-    def sun(self) -> int:
-        """First of the sun's two, Xs and Ys [m]."""
+    def input(self) -> int:
+        """First of the two of the sun gear, Xs and Ys, or of a single stage's input shaft [m]."""
         return 0
 
     def planet(self, crank: int) -> int:
@@ -64,7 +70,7 @@ class Positions:
     @cached_property
     def coordinates(self) -> Coordinates:
         """The layout of q."""
-        return Coordinates(self.reducer.crank_count, self.reducer.disc_count)
+        return Coordinates.of(self.reducer)
 
     @cached_property
     def crank_angle(self) -> Float[np.ndarray, " angle"]:
@@ -116,6 +122,10 @@ class SpringGroup:
     # Names of the deviations of each element's clearance; an element is as many successive rows as make the group even:
     # one row of a mesh, two of a bearing
     clearance_columns: tuple[str, ...] = ()
+    # Further columns that change clearances → the elements that each changes, and by how much [m/m]
+    clearance_terms: Mapping[str, Sequence[tuple[int, float]]] = field(default_factory=dict)
+    # Those of ``columns`` that are no errors but nominal distances, which never change → their values [m]
+    constants: Mapping[str, float] = field(default_factory=dict)
 
 
 def with_play(group: SpringGroup, clearance: float, elements: tuple[str, ...]) -> SpringGroup:

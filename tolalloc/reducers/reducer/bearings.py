@@ -349,6 +349,26 @@ class FrictionDimensions:
         known = self.contact_ratio is not None and self.contact_ratio <= LARGEST_CONTACT_RATIO
         return bearings if known else (*bearings, "gear_mesh")
 
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """Kinds of contact that have a coefficient of friction."""
+        return tuple(CONTACTS)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SingleStageFriction(FrictionDimensions):
+    """Those of a single stage, whose file states no bearing by its dimensions: pins and teeth alone are known."""
+
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        """Kinds of contact whose friction does not follow from what the file states."""
+        return ("eccentric_bearing", "output_pin", "carrier_bearing")
+
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """Kinds of contact that have a coefficient of friction."""
+        return ("pins",)
+
 
 def loss_factor(first_teeth: int, second_teeth: int, contact_ratio: float) -> float:
     """Return H_v, friction work over transmitted work and coefficient of a spur gear pair, theory page (71) [-].
@@ -366,8 +386,8 @@ def loss_factor(first_teeth: int, second_teeth: int, contact_ratio: float) -> fl
 
 def friction_assumptions(friction: Friction, dimensions: FrictionDimensions) -> tuple[str, ...]:
     """Return what the numbers on friction take for granted, and what they leave out."""
-    coefficients = ", ".join(f"{CONTACTS[name]} {value:g}" for name, value in friction.coefficients.items())
-    unknown = ", ".join(CONTACTS[name] for name in dimensions.unknown)
+    coefficients = ", ".join(f"{CONTACTS[name]} {friction.coefficients[name]:g}" for name in dimensions.contacts)
+    unknown = ", ".join(CONTACTS.get(name, name.replace("_", " ")) for name in dimensions.unknown)
     return (
         f"coefficients of friction: {coefficients}; the same at every speed and temperature",
         "friction: Coulomb's, at the forces without friction; no churning of gears and discs, no flanges of rollers",

@@ -35,6 +35,21 @@ class FirstStage:
 
 
 @dataclass(frozen=True, kw_only=True)
+class OutputPins:
+    """Pins or rollers of the output in holes of the discs; table ``[output_pins]`` of a reducer file."""
+
+    count: Annotated[int, Field(ge=3, le=40)]  # Number n [-]
+    # Radius a of the circle that they stand on, r_o of a pin with its roller, R_h of a hole [m]
+    circle_radius: Annotated[float, Field(alias="circle_radius_mm", ge=2, le=900), times(MILLIMETRE)]
+    pin_radius: Annotated[float, Field(alias="pin_radius_mm", ge=0.1, le=100), times(MILLIMETRE)]
+    hole_radius: Annotated[float, Field(alias="hole_radius_mm", ge=0.1, le=200), times(MILLIMETRE)]
+
+    def gap(self, eccentricity: float) -> float:
+        """Return the nominal gap that a pin has towards the wall that it drives, R_h − r_o − e [m]."""
+        return self.hole_radius - self.pin_radius - eccentricity
+
+
+@dataclass(frozen=True, kw_only=True)
 class CycloidStage:
     """Cycloid discs against the ring of pins; table ``[cycloid_stage]``."""
 
@@ -187,6 +202,7 @@ class Clearances:
         float, Field(alias="crank_carrier_bearing_um", ge=0, le=200), times(MICROMETRE)
     ] = 0.0
     carrier_bearing: Annotated[float, Field(alias="carrier_bearing_um", ge=0, le=200), times(MICROMETRE)] = 0.0
+    eccentric_bearing: Annotated[float, Field(alias="eccentric_bearing_um", ge=0, le=200), times(MICROMETRE)] = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -219,7 +235,6 @@ class Reducer:
     source: str
     crank_count: int
     disc_count: int
-    first_stage: FirstStage
     cycloid_stage: CycloidStage
     disc_material: Material
     pin_material: Material
@@ -232,17 +247,58 @@ class Reducer:
     friction: Friction = field(default_factory=Friction)
     friction_dimensions: FrictionDimensions = field(default_factory=FrictionDimensions)
     catalogue: Catalogue | None = None
+    # Sun and planets of an RV reducer, pins of the output of a single stage: a reducer has the one or the other
+    first_stage: FirstStage | None = None
+    output_pins: OutputPins | None = None
     assumptions: tuple[str, ...] = field(default=())
+
+    @property
+    def family(self) -> str:
+        """Name of the family, `tolalloc.reducers.families`."""
+        return "RV" if self.output_pins is None else "single stage"
+
+    @property
+    def gears(self) -> FirstStage:
+        """Sun and planets.
+
+        Raises
+        ------
+        InputError
+            A reducer without them.
+        """
+        if self.first_stage is None:
+            raise InputError(
+                f"reducer {self.name}: a single stage has neither sun nor planets; this needs an RV reducer."
+            )
+        return self.first_stage
+
+    @property
+    def holes(self) -> OutputPins:
+        """Output pins and the holes of the discs that they stand in.
+
+        Raises
+        ------
+        InputError
+            A reducer without them.
+        """
+        if self.output_pins is None:
+            raise InputError(f"reducer {self.name}: an RV reducer has no output pins; this needs a single stage.")
+        return self.output_pins
+
+    @property
+    def carrier_radius(self) -> float:
+        """Radius at which the carrier is driven, by cranks or by output pins [m]."""
+        return self.output_pins.circle_radius if self.output_pins else self.crank_circle_radius
 
     @property
     def crank_circle_radius(self) -> float:
         """Radius a_sp of the circle of crank axes, m(Z1+Z2)/2 [m]."""
-        return self.first_stage.module * (self.first_stage.sun_teeth + self.first_stage.planet_teeth) / 2
+        return self.gears.module * (self.gears.sun_teeth + self.gears.planet_teeth) / 2
 
     @property
     def planet_base_radius(self) -> float:
         """Base radius r_b2 of the planet gear, m·Z2·cos(α)/2 [m]."""
-        return self.first_stage.module * self.first_stage.planet_teeth * cos(self.first_stage.pressure_angle) / 2
+        return self.gears.module * self.gears.planet_teeth * cos(self.gears.pressure_angle) / 2
 
     @property
     def contact_modulus(self) -> float:
@@ -279,7 +335,12 @@ class Reducer:
 
     @property
     def ratio(self) -> float:
-        """Sun turns per carrier turn, 1 + (Z2/Z1)·zp, with the pin housing fixed [-]."""
+        """Turns of the input per turn of the carrier, the pin housing fixed [-].
+
+        1 + (Z2/Z1)·zp of an RV reducer's sun; −zc of a single stage's shaft, which turns against its output.
+        """
+        if self.first_stage is None:
+            return -float(self.cycloid_stage.disc_teeth)
         return 1.0 + self.first_stage.planet_teeth / self.first_stage.sun_teeth * self.cycloid_stage.pin_count
 
 
@@ -311,7 +372,7 @@ def interface_forces(reducer: Reducer, torque: float) -> dict[str, float]:
     crank = size / (reducer.crank_count * reducer.crank_circle_radius)
     tangential = crank / reducer.disc_count
     pins = size / (reducer.disc_count * reducer.crank_count * stage.eccentricity * stage.pin_count)
-    first = reducer.first_stage
+    first = reducer.gears
     sun_base = reducer.planet_base_radius * first.sun_teeth / first.planet_teeth
     return {
         "crank_carrier_bearing": crank,

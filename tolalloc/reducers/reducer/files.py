@@ -9,7 +9,7 @@ import re
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from math import inf, pi
+from math import inf, pi, sin
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -27,6 +27,7 @@ from tolalloc.reducers.reducer.bearings import (
     Part,
     RollerBearing,
     RollingBearing,
+    SingleStageFriction,
 )
 from tolalloc.reducers.reducer.design import (
     Catalogue,
@@ -35,6 +36,7 @@ from tolalloc.reducers.reducer.design import (
     FirstStage,
     Load,
     Modification,
+    OutputPins,
     Reducer,
     at_torque,
 )
@@ -204,9 +206,7 @@ class StiffnessRecord(Record):
             **bearings,
             pin_contact=self.pin_contact or line_contact(stage.face_width, contact_modulus(disc, pin)),
             pin_contact_law=self.pin_contact_law,
-            pin_bending=inf
-            if self.pin_span_mm is None
-            else pin_bending(2 * stage.pin_radius, self.pin_span_mm * MILLIMETRE, pin.elastic_modulus),
+            pin_bending=_pin_bending(self.pin_span_mm, stage, pin),
         )
 
     @property
@@ -258,6 +258,38 @@ class StiffnessRecord(Record):
         return tuple(found)
 
 
+class SingleStageStiffnessRecord(Record):
+    """Table ``[stiffness]`` of a single stage: N/m; without ``pin_contact`` it is πbE*/2, and so is ``output_pin``."""
+
+    shaft_support: NewtonPerMetre
+    eccentric_bearing: NewtonPerMetre
+    carrier_bearing: NewtonPerMetre
+    output_pin: NewtonPerMetre | None = None
+    pin_contact: NewtonPerMetre | None = None
+    pin_contact_law: Literal["constant", "table2", "logarithmic"] = "constant"
+    pin_span_mm: Annotated[float, Field(ge=1, le=500)] | None = None
+
+    def stiffness(self, disc: Material, pin: Material, stage: CycloidStage) -> Stiffness:
+        """Return all stiffnesses, given or by formula [N/m]."""
+        contact = line_contact(stage.face_width, contact_modulus(disc, pin))
+        return Stiffness(
+            shaft_support=self.shaft_support,
+            eccentric_bearing=self.eccentric_bearing,
+            carrier_bearing=self.carrier_bearing,
+            output_pin=self.output_pin or contact,
+            pin_contact=self.pin_contact or contact,
+            pin_contact_law=self.pin_contact_law,
+            pin_bending=_pin_bending(self.pin_span_mm, stage, pin),
+        )
+
+
+def _pin_bending(span_mm: float | None, stage: CycloidStage, pin: Material) -> float:
+    """Return the stiffness of the pins between their supports, infinite without a span [N/m]."""
+    if span_mm is None:
+        return inf
+    return pin_bending(2 * stage.pin_radius, span_mm * MILLIMETRE, pin.elastic_modulus)
+
+
 class IdentifiedValue(Record):
     """One stiffness and its standard uncertainty."""
 
@@ -286,7 +318,7 @@ class IdentifiedStiffnessRecord(Record):
 
 IDENTIFIABLE = tuple(
     field
-    for field in StiffnessRecord.model_fields
+    for field in dict.fromkeys((*StiffnessRecord.model_fields, *SingleStageStiffnessRecord.model_fields))
     if field not in ("pin_contact_law", "pin_span_mm", "crankshaft", "pillars")
 )
 """Fields of `tolalloc.reducers.reducer.stiffness.Stiffness` that a file of identified stiffnesses may hold."""
@@ -329,18 +361,15 @@ class ModificationRecord(Record):
     convention: Literal["plus", "minus"] = "plus"
 
 
-class ReducerRecord(Record):
-    """A whole reducer file."""
+class _AnyReducerRecord(Record):
+    """What the files of all families state."""
 
     name: str
     source: str
-    crank_count: Annotated[int, Field(ge=2, le=6)]
     disc_count: Annotated[int, Field(ge=1, le=3)]
-    first_stage: FirstStage
     cycloid_stage: Annotated[CycloidStage, BeforeValidator(_with_spacing), AfterValidator(_is_a_cycloid)]
     material: Material
     pin_material: Material | None = None
-    stiffness: StiffnessRecord
     modification: ModificationRecord
     load: Load
     clearances: Clearances = Clearances()
@@ -348,8 +377,89 @@ class ReducerRecord(Record):
     catalogue: Catalogue | None = None
     assumptions: tuple[str, ...] = ()
 
+    def _stated(self) -> dict[str, Any]:
+        """Return the fields of the reducer that all families have."""
+        grinding = self.modification
+        return {
+            "name": self.name,
+            "source": self.source,
+            "disc_count": self.disc_count,
+            "cycloid_stage": self.cycloid_stage,
+            "disc_material": self.material,
+            "pin_material": self.pin_material or self.material,
+            "modification": Modification.from_convention(
+                grinding.convention,
+                equidistant=grinding.equidistant_um,
+                shift=grinding.shift_um,
+                rotation=grinding.rotation_urad,
+            ),
+            "load": self.load,
+            "clearances": self.clearances,
+            "friction": self.friction,
+            "catalogue": self.catalogue,
+            "assumptions": self.assumptions,
+        }
+
+    def _require_clearances(self, *foreign: str) -> None:
+        """Raise where a clearance is stated of an interface that the family does not have."""
+        for name in foreign:
+            if getattr(self.clearances, name):
+                own = ", ".join(f"{other}_um" for other in vars(self.clearances) if other not in foreign)
+                raise ValueError(f"clearances.{name}_um is stated; allowed is one of {own}")
+
+
+class SingleStageRecord(_AnyReducerRecord):
+    """A whole file of a single-stage drive, which has a table ``[output_pins]``."""
+
+    output_pins: OutputPins
+    stiffness: SingleStageStiffnessRecord
+
+    @model_validator(mode="after")
+    def _holds_together(self) -> SingleStageRecord:
+        self._require_clearances("gear_mesh", "crank_disc_bearing", "crank_carrier_bearing")
+        pins, eccentricity = self.output_pins, self.cycloid_stage.eccentricity
+        smallest = pins.pin_radius + eccentricity
+        if not smallest <= pins.hole_radius <= smallest + _LARGEST_GAP:
+            raise ValueError(
+                f"output_pins.hole_radius_mm is {pins.hole_radius / MILLIMETRE:g}; allowed is pin_radius_mm plus "
+                f"eccentricity_mm, {smallest / MILLIMETRE:.6g}, to {_LARGEST_GAP / MILLIMETRE:g} mm more"
+            )
+        root = self.cycloid_stage.pin_circle_radius - eccentricity - self.cycloid_stage.pin_radius
+        room = min(root - pins.circle_radius, pins.circle_radius * sin(pi / pins.count))
+        if pins.hole_radius >= room:
+            raise ValueError(
+                f"output_pins.hole_radius_mm is {pins.hole_radius / MILLIMETRE:g}; allowed is below "
+                f"{room / MILLIMETRE:.4g}, where holes meet each other or the teeth"
+            )
+        return self
+
+    def reducer(self) -> Reducer:
+        """Return the reducer in SI units."""
+        stated = self._stated()
+        stiffness = self.stiffness.stiffness(stated["disc_material"], stated["pin_material"], self.cycloid_stage)
+        return Reducer(
+            crank_count=0,
+            output_pins=self.output_pins,
+            stiffness=stiffness,
+            friction_dimensions=SingleStageFriction(),
+            **stated,
+        )
+
+
+_LARGEST_GAP = 0.5 * MILLIMETRE
+"""Gap between an output pin and its hole that is believed; more is another pin or hole [m]."""
+
+
+class ReducerRecord(_AnyReducerRecord):
+    """A whole file of an RV reducer."""
+
+    crank_count: Annotated[int, Field(ge=2, le=6)]
+    first_stage: FirstStage
+    stiffness: StiffnessRecord
+
     @model_validator(mode="after")
     def _holds_together(self) -> ReducerRecord:
+        self._require_clearances("eccentric_bearing")
         self.reducer()
         if self.catalogue:
             rated, stated = self.load.rated_torque, self.catalogue.torsional_rigidity * ARCMINUTE
@@ -373,30 +483,13 @@ class ReducerRecord(Record):
 
     def reducer(self) -> Reducer:
         """Return the reducer in SI units."""
-        disc, grinding = self.material, self.modification
-        pin = self.pin_material or disc
+        disc, stage = self.material, self.cycloid_stage
         reducer = Reducer(
-            name=self.name,
-            source=self.source,
             crank_count=self.crank_count,
-            disc_count=self.disc_count,
             first_stage=self.first_stage,
-            cycloid_stage=self.cycloid_stage,
-            disc_material=disc,
-            pin_material=pin,
-            stiffness=self.stiffness.stiffness(disc, pin, self.first_stage, self.cycloid_stage),
-            modification=Modification.from_convention(
-                grinding.convention,
-                equidistant=grinding.equidistant_um,
-                shift=grinding.shift_um,
-                rotation=grinding.rotation_urad,
-            ),
-            load=self.load,
-            clearances=self.clearances,
-            friction=self.friction,
+            stiffness=self.stiffness.stiffness(disc, self.pin_material or disc, self.first_stage, stage),
             friction_dimensions=self.stiffness.friction_dimensions,
-            catalogue=self.catalogue,
-            assumptions=self.assumptions,
+            **self._stated(),
         )
         reducer = replace(reducer, parts=self.stiffness.parts(reducer), clearances=self._clearances())
         return at_torque(reducer, reducer.load.rated_torque)
@@ -405,7 +498,7 @@ class ReducerRecord(Record):
         """Return the clearances, those of bearings that are given by their dimensions included."""
         own: dict[str, float] = {}
         for name in vars(self.clearances):
-            bearing = getattr(self.stiffness, name)
+            bearing = getattr(self.stiffness, name, None)
             if isinstance(bearing, RollingBearing) and bearing.play:
                 if getattr(self.clearances, name):
                     raise ValueError(f"clearances.{name}_um is given twice: the bearing in [stiffness] has one too")
@@ -422,7 +515,13 @@ def load_reducer(name: str | Path) -> Reducer:
         The file, field and value that are not allowed.
     """
     path = shipped_or_path(name, PRESETS, ".reducer.toml", "reducer")
-    return validated(ReducerRecord, read_toml(path), path).reducer()
+    content = read_toml(path)
+    return validated(_record_of(content), content, path).reducer()
+
+
+def _record_of(content: Mapping[str, Any]) -> type[SingleStageRecord] | type[ReducerRecord]:
+    """Return what a file must hold: that of a single stage where it has output pins."""
+    return SingleStageRecord if "output_pins" in content else ReducerRecord
 
 
 _MODIFICATION = re.compile(r"^\[modification\].*?(?=^\[|\Z)", re.MULTILINE | re.DOTALL)
@@ -448,7 +547,8 @@ def write_modified(name: str | Path, modification: Modification, path: Path) -> 
     text, found = _MODIFICATION.subn(table, read_text(source, "a text file in TOML"))
     if found != 1:
         raise InputError(f"{source}: no table [modification] of its own; without it nothing can be put in its place.")
-    validated(ReducerRecord, tomllib.loads(text), path)
+    content = tomllib.loads(text)
+    validated(_record_of(content), content, path)
     write_new(path, text)
 
 

@@ -35,12 +35,17 @@ ROUNDING = 1e-9
 class Stiffness:
     """Stiffness of the interfaces [N/m]."""
 
-    sun_support: float  # K_s, support of the sun gear shaft [N/m]
-    gear_mesh: float  # K_sp, one sun–planet mesh along its line of action [N/m]
-    crank_disc_bearing: float  # K_pd, one crank journal in a disc bore [N/m]
-    crank_carrier_bearing: float  # K_b, one crankshaft in the carrier [N/m]
     carrier_bearing: float  # K_ca, the carrier in the housing [N/m]
     pin_contact: float  # C, one pin against one disc tooth [N/m]
+    # Of an RV reducer, 0 in a single stage
+    sun_support: float = 0.0  # K_s, support of the sun gear shaft [N/m]
+    gear_mesh: float = 0.0  # K_sp, one sun–planet mesh along its line of action [N/m]
+    crank_disc_bearing: float = 0.0  # K_pd, one crank journal in a disc bore [N/m]
+    crank_carrier_bearing: float = 0.0  # K_b, one crankshaft in the carrier [N/m]
+    # Of a single stage, 0 in an RV reducer
+    shaft_support: float = 0.0  # The input shaft in its bearings [N/m]
+    eccentric_bearing: float = 0.0  # One eccentric of the shaft in the bore of its disc [N/m]
+    output_pin: float = 0.0  # One output pin, with what it bends, against the wall of its hole [N/m]
     # ``constant``: C at every pin; ``table2``: liu2020's K_djk on the concave part, C on the convex part;
     # ``logarithmic``: Hertzian line contact, softer under small forces, C of the flat flank as its scale
     pin_contact_law: str = "constant"

@@ -30,8 +30,8 @@ from tolalloc.reducers.equivalent import hysteresis
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, friction_loop, hysteresis_loop
 from tolalloc.reducers.equivalent.model import EquivalentModel, Status
 from tolalloc.reducers.equivalent.outputs import (
-    OUTPUTS,
     Solved,
+    outputs_of,
     peak_line_load,
     radial_clearance,
     radial_clearance_derivatives,
@@ -92,7 +92,8 @@ def _found(columns: list[Float[np.ndarray, " chunk"]]) -> Answer:
 def _rated_load(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
     rated = float(np.copysign(model.reducer.load.rated_torque, torque))
     solved = Solved.of(model.at_torque(rated).equilibria(errors, rated, TURN_ANGLES))
-    own = [OUTPUTS[name][1](solved) for name in _FORCES]
+    every = outputs_of(model.reducer)
+    own = [every[name][1](solved) for name in _FORCES[model.reducer.family]]
     values = np.stack([*own, *_pin_stress(solved)], axis=1)
     return values, np.asarray(solved.equilibria.status.max(axis=1))
 
@@ -122,7 +123,12 @@ def _radial_clearance(
     return clearance, status.astype(np.uint8)
 
 
-_FORCES = ("largest pin force", "largest crank–disc bearing force", "share of the pin force on the most loaded disc")
+_SHARE = "share of the pin force on the most loaded disc"
+_FORCES = {
+    "RV": ("largest pin force", "largest crank–disc bearing force", _SHARE),
+    "single stage": ("largest pin force", "largest eccentric bearing force", "largest output pin force", _SHARE),
+}
+"""Family → outputs of one solve that a requirement may limit under the rated torque."""
 
 _PEAK_TO_PEAK = Reading(outputs=(PEAK_TO_PEAK,), read=_peak_to_peak)
 _LOOP = Reading(outputs=(LOST_MOTION, BACKLASH, TORSIONAL_STIFFNESS), read=_loop)
@@ -130,33 +136,43 @@ WITH_FRICTION = (EFFICIENCY, LOST_MOTION_WITH_FRICTION, HYSTERESIS_LOSS)
 """Outputs of the loop with friction."""
 _FRICTION_LOOP = Reading(outputs=(*_LOOP.outputs, *WITH_FRICTION), read=_friction_loop)
 
-REQUIREMENTS = (
-    _PEAK_TO_PEAK,
-    _LOOP,
-    Reading(
-        outputs=(
-            *(f"{name}, rated torque [{OUTPUTS[name][0]}]" for name in _FORCES),
-            "largest line load, rated torque [N/mm]",
-            "peak pressure, rated torque [MPa]",
+_REQUIREMENTS = {
+    family: (
+        _PEAK_TO_PEAK,
+        _LOOP,
+        Reading(
+            outputs=(
+                *(f"{name}, rated torque [{'-' if name == _SHARE else 'N'}]" for name in names),
+                "largest line load, rated torque [N/mm]",
+                "peak pressure, rated torque [MPa]",
+            ),
+            read=_rated_load,
         ),
-        read=_rated_load,
-    ),
-    Reading(outputs=(PRELOAD, FRICTION_TORQUE), read=_preload),
-    Reading(outputs=(RADIAL_CLEARANCE,), read=_radial_clearance),
-)
-"""What a requirement may limit: transmission error, torque against twist, rated load, preload, gap at tip and root."""
+        Reading(outputs=(PRELOAD, FRICTION_TORQUE), read=_preload),
+        Reading(outputs=(RADIAL_CLEARANCE,), read=_radial_clearance),
+    )
+    for family, names in _FORCES.items()
+}
+
+
+def requirements_of(reducer: Reducer) -> tuple[Reading, ...]:
+    """Return what a requirement may limit without friction.
+
+    Transmission error, torque against twist, rated load, preload, gap at tip and root.
+    """
+    return _REQUIREMENTS[reducer.family]
 
 
 def limited_outputs(reducer: Reducer) -> tuple[str, ...]:
     """Return what a requirement may limit; what friction decides only where the reducer's file says enough for it."""
-    own = tuple(name for reading in REQUIREMENTS for name in reading.outputs)
+    own = tuple(name for reading in requirements_of(reducer) for name in reading.outputs)
     return own if reducer.friction_dimensions.unknown else (*own, *WITH_FRICTION)
 
 
-def readings_of(outputs: tuple[str, ...]) -> tuple[Reading, ...]:
+def readings_of(reducer: Reducer, outputs: tuple[str, ...]) -> tuple[Reading, ...]:
     """Return the readings that give the outputs; one with friction gives the loop without it too."""
     loop = _LOOP if {*WITH_FRICTION}.isdisjoint(outputs) else _FRICTION_LOOP
-    every = (loop if own is _LOOP else own for own in REQUIREMENTS)
+    every = (loop if own is _LOOP else own for own in requirements_of(reducer))
     return tuple(own for own in every if not {*own.outputs}.isdisjoint(outputs))
 
 
@@ -219,7 +235,7 @@ class OutputsResponse:
     """All outputs of several readings, one row per sample."""
 
     kernel: KernelResponse  # Model, torque, columns, and who observes
-    readings: tuple[Reading, ...] = REQUIREMENTS  # What is read
+    readings: tuple[Reading, ...]  # What is read
     chosen: tuple[str, ...] = ()  # Outputs of the readings that are answered, all of them if empty
 
     @property

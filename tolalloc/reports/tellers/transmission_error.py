@@ -12,7 +12,7 @@ from jaxtyping import Float
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE
 from tolalloc.reducers.equivalent.hysteresis import LOOP_ASSUMPTION, FrictionLoop, HysteresisLoop
 from tolalloc.reducers.equivalent.model import Equilibria
-from tolalloc.reducers.equivalent.outputs import OUTPUTS, Attribution, forces
+from tolalloc.reducers.equivalent.outputs import Attribution, forces, outputs_of
 from tolalloc.reducers.equivalent.perfect import PRELOAD_ASSUMPTION
 from tolalloc.reducers.reducer.bearings import CONTACTS, friction_assumptions
 from tolalloc.reducers.reducer.design import Reducer
@@ -152,7 +152,7 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
             ],
             "outputs": [
                 {"name": name, "unit": unit, "value": float(value(result.solved)[0])}
-                for name, (unit, value) in OUTPUTS.items()
+                for name, (unit, value) in outputs_of(result.reducer).items()
             ],
             "pin_force_without_torque_n": float(result.preload.pin_force[0]),
             "largest_friction_torque_of_pins_without_load_nm": float(result.preload.friction_torque[0]),

@@ -1,14 +1,8 @@
-"""What one family of reducers is: coordinates, spring groups, sources, its picture, and what a new folder starts from.
-
-The model is the same for every family; what says "disc", "crank" or "planet" by a number or a name stands here, or in
-the spring groups that the family names.
-"""
+"""The RV reducer: sun and planets, then cranks, discs and pins."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Iterator
 from math import pi, sin
 from typing import Any
 
@@ -20,74 +14,10 @@ from tolalloc.reducers.equivalent.interfaces import (
     GEAR_MESH,
     PIN_SOURCES,
     SUN_SUPPORT,
-    Interface,
 )
-from tolalloc.reducers.equivalent.sources import ErrorSource, ErrorSources
-from tolalloc.reducers.equivalent.springs import Coordinates, Positions, SpringGroup
+from tolalloc.reducers.families.family import NewRows, Place, ReducerFamily
 from tolalloc.reducers.reducer.bearings import RollingBearing
 from tolalloc.reducers.reducer.design import Reducer
-
-
-@dataclass(frozen=True, kw_only=True)
-class Place:
-    """A feature of a part that the picture shows and that sources of the drawing limit."""
-
-    id: str  # Name of the feature, the beginning of its sources' names where they share one
-    label: str  # What a reader calls it
-    part: str  # Part that carries it
-    sources: tuple[str, ...] = ()  # Names of the drawing's sources that sit there
-
-
-@dataclass(frozen=True, kw_only=True)
-class NewRows:
-    """What a new folder starts from: presets, allowed counts, and the table whose zones are scaled."""
-
-    presets: tuple[str, ...]  # Presets whose dimensions follow one rule, smallest first
-    cranks: tuple[int, ...]  # Counts that a folder can be made for [-]
-    discs: tuple[int, ...]
-    table: str  # Tolerance table that is scaled, and that states the clearances of its modification
-    diameter: float  # Of the pin circle to which the table belongs [mm]
-
-
-@dataclass(frozen=True, kw_only=True)
-class ReducerFamily:
-    """One family of reducers.
-
-    Parameters
-    ----------
-    name
-        What it is called.
-    coordinates
-        Layout of the displacements for a number of cranks and of discs [-].
-    interfaces
-        All spring groups but the contact of pins and teeth.
-    contact_sources
-        What the contact of pins and teeth declares.
-    places
-        What the picture shows of a reducer, from the inside of the housing to the input.
-    outlines
-        Radii and counts for the picture [mm, -], and what of them is an assumption of the drawing.
-    new
-        What a new folder starts from.
-    """
-
-    name: str
-    coordinates: Callable[[int, int], Coordinates]
-    interfaces: tuple[Interface, ...]
-    contact_sources: tuple[ErrorSource, ...]
-    places: Callable[[Reducer], Iterable[Place]]
-    outlines: Callable[[Reducer], tuple[dict[str, Any], tuple[str, ...]]]
-    new: NewRows
-
-    @cached_property
-    def sources(self) -> ErrorSources:
-        """All kinds of sources: of the interfaces, then of pins and teeth."""
-        declared = (kind for interface in self.interfaces for kind in interface.sources)
-        return ErrorSources((*declared, *self.contact_sources))
-
-    def groups(self, at: Positions) -> list[SpringGroup]:
-        """Return all spring groups but the contact of pins and teeth."""
-        return [interface.rows(at) for interface in self.interfaces]
 
 
 def _places(reducer: Reducer) -> Iterator[Place]:
@@ -125,7 +55,7 @@ _HOUSING, _LAND = 1.17, 0.05
 
 def _outlines(reducer: Reducer) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Return radii and counts [mm, -] with names for the picture, and what of them is an assumption of the drawing."""
-    stage, first, dimensions = reducer.cycloid_stage, reducer.first_stage, reducer.friction_dimensions
+    stage, first, dimensions = reducer.cycloid_stage, reducer.gears, reducer.friction_dimensions
     circle, crank_circle = stage.pin_circle_radius, reducer.crank_circle_radius
     root = stage.pin_circle_radius - stage.eccentricity - stage.pin_radius
     land = _LAND * circle
@@ -172,7 +102,6 @@ def _rings(bearing: RollingBearing | None, room: float, circle: float) -> tuple[
 
 RV = ReducerFamily(
     name="RV",
-    coordinates=Coordinates,
     interfaces=(SUN_SUPPORT, GEAR_MESH, CRANK_DISC, CRANK_CARRIER, CARRIER_SUPPORT),
     contact_sources=PIN_SOURCES,
     places=_places,

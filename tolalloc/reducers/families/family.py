@@ -1,0 +1,72 @@
+"""What one family of reducers is: spring groups, sources, its picture, and what a new folder starts from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from tolalloc.reducers.equivalent.interfaces import Interface
+from tolalloc.reducers.equivalent.sources import ErrorSource, ErrorSources
+from tolalloc.reducers.equivalent.springs import Positions, SpringGroup
+from tolalloc.reducers.reducer.design import Reducer
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """A feature of a part that the picture shows and that sources of the drawing limit."""
+
+    id: str  # Name of the feature, the beginning of its sources' names where they share one
+    label: str  # What a reader calls it
+    part: str  # Part that carries it
+    sources: tuple[str, ...] = ()  # Names of the drawing's sources that sit there
+
+
+@dataclass(frozen=True, kw_only=True)
+class NewRows:
+    """What a new folder starts from: presets, allowed counts, and the table whose zones are scaled."""
+
+    presets: tuple[str, ...]  # Presets whose dimensions follow one rule, smallest first
+    cranks: tuple[int, ...]  # Counts that a folder can be made for [-]
+    discs: tuple[int, ...]
+    table: str  # Tolerance table that is scaled, and that states the clearances of its modification
+    diameter: float  # Of the pin circle to which the table belongs [mm]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReducerFamily:
+    """One family of reducers.
+
+    Parameters
+    ----------
+    name
+        What it is called.
+    interfaces
+        All spring groups but the contact of pins and teeth.
+    contact_sources
+        What the contact of pins and teeth declares.
+    places
+        What the picture shows of a reducer, from the inside of the housing to the input.
+    outlines
+        Radii and counts for the picture [mm, -], and what of them is an assumption of the drawing.
+    new
+        What a new folder starts from.
+    """
+
+    name: str
+    interfaces: tuple[Interface, ...]
+    contact_sources: tuple[ErrorSource, ...]
+    places: Callable[[Reducer], Iterable[Place]]
+    outlines: Callable[[Reducer], tuple[dict[str, Any], tuple[str, ...]]]
+    new: NewRows
+
+    @cached_property
+    def sources(self) -> ErrorSources:
+        """All kinds of sources: of the interfaces, then of pins and teeth."""
+        declared = (kind for interface in self.interfaces for kind in interface.sources)
+        return ErrorSources((*declared, *self.contact_sources))
+
+    def groups(self, at: Positions) -> list[SpringGroup]:
+        """Return all spring groups but the contact of pins and teeth."""
+        return [interface.rows(at) for interface in self.interfaces]

@@ -1,0 +1,20 @@
+"""The families that are known, and all kinds of error sources that they declare."""
+
+from __future__ import annotations
+
+from tolalloc.reducers.equivalent.sources import ErrorSources
+from tolalloc.reducers.families.family import ReducerFamily
+from tolalloc.reducers.families.rv import RV
+from tolalloc.reducers.families.single_stage import SINGLE_STAGE
+from tolalloc.reducers.reducer.design import Reducer
+
+FAMILIES = {own.name: own for own in (RV, SINGLE_STAGE)}
+"""Name → family."""
+
+SOURCES = ErrorSources(dict.fromkeys(kind for own in FAMILIES.values() for kind in own.sources.kinds))
+"""Kinds of sources of all families, to be asked by a name alone: one name is one kind in all of them."""
+
+
+def family_of(reducer: Reducer) -> ReducerFamily:
+    """Return the family of a reducer."""
+    return FAMILIES[reducer.family]

@@ -1,0 +1,267 @@
+"""The single-stage cycloid drive: an eccentric input shaft, discs against a ring of pins, output pins in their holes.
+
+The disc turns as an RV reducer's does; in place of crankshafts n pins of the output stand in n holes of every disc,
+whose walls push them: one-sided contacts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from tolalloc.drawings.zones import Characteristic
+from tolalloc.reading.units import MILLIMETRE
+from tolalloc.reducers.equivalent.interfaces import CARRIER_SUPPORT, PIN_SOURCES, Interface, lever
+from tolalloc.reducers.equivalent.sources import ErrorSource, Nominal
+from tolalloc.reducers.equivalent.springs import Positions, SpringGroup, turned, vector_columns, with_play
+from tolalloc.reducers.families.family import NewRows, Place, ReducerFamily
+from tolalloc.reducers.reducer.design import Reducer
+
+_STANDS_OFF = Characteristic("coaxiality", "how far the shaft stands off is drawn as coaxiality")
+
+
+def shaft_support(at: Positions) -> SpringGroup:
+    """Return the two springs of the input shaft's bearings, theory page equation (83).
+
+    ``shaft.assembly`` is (a_x, a_y), fixed in the housing [m].
+
+    δ = X − a_x, Y − a_y [m].
+
+    References
+    ----------
+    Own derivation, as liu2020's of the sun.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> shaft_support(Positions(load_reducer("cd29"), np.zeros(1))).columns
+    ('shaft.assembly.x', 'shaft.assembly.y')
+    """
+    angles, shaft = at.carrier_angle.size, at.coordinates.input
+    displacement = np.zeros((angles, 2, at.coordinates.count))
+    displacement[:, [0, 1], [shaft, shaft + 1]] = 1.0
+    return SpringGroup(
+        name="shaft bearing",
+        stiffness_name="shaft_support",
+        displacement=displacement,
+        error=np.broadcast_to(-np.eye(2), (angles, 2, 2)),
+        columns=vector_columns("shaft.assembly"),
+        stiffness=np.full((angles, 2), at.reducer.stiffness.shaft_support),
+    )
+
+
+SHAFT_SUPPORT = Interface(
+    rows=shaft_support,
+    sources=(
+        ErrorSource(name="shaft.assembly", fixed=True, characteristic=_STANDS_OFF, shape="vector", place="shaft"),
+    ),
+)
+
+
+def eccentric_bearing(at: Positions) -> SpringGroup:
+    """Return two springs per eccentric of the shaft in the bore of its disc, theory page equation (84).
+
+    ``shaft.journal{j}.eccentricity`` turns with the shaft, ``disc{j}.bore.position`` with the disc [m]. The shaft's
+    rotation is given, so it moves no eccentric.
+
+    δ = X − x_d + ε_journal − ε_bore, Y likewise [m].
+
+    References
+    ----------
+    Own derivation.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> eccentric_bearing(Positions(load_reducer("cd29"), np.zeros(1))).stiffness.shape  # angle, 2 discs times x, y
+    (1, 4)
+    """
+    reducer, coordinates, angles = at.reducer, at.coordinates, at.carrier_angle.size
+    discs, shaft = reducer.disc_count, coordinates.input
+    displacement = np.zeros((angles, 2 * discs, coordinates.count))
+    error = np.zeros((angles, 2 * discs, 4 * discs))
+    columns: list[str] = []
+    for disc in range(discs):
+        rows, plate = slice(2 * disc, 2 * disc + 2), coordinates.disc(disc)
+        displacement[:, rows, shaft : shaft + 2] = np.eye(2)
+        displacement[:, rows, plate : plate + 2] = -np.eye(2)
+        error[:, rows, 4 * disc : 4 * disc + 2] = turned(at.crank_angle)
+        error[:, rows, 4 * disc + 2 : 4 * disc + 4] = -turned(at.carrier_angle)
+        columns += vector_columns(f"shaft.journal{disc + 1}.eccentricity")
+        columns += vector_columns(f"disc{disc + 1}.bore.position")
+    group = SpringGroup(
+        name="eccentric bearing",
+        stiffness_name="eccentric_bearing",
+        displacement=displacement,
+        error=error,
+        columns=tuple(columns),
+        stiffness=np.full((angles, 2 * discs), reducer.stiffness.eccentric_bearing),
+    )
+    journals = tuple(f"shaft.journal{disc + 1}" for disc in range(discs))
+    return with_play(group, reducer.clearances.eccentric_bearing, journals)
+
+
+ECCENTRIC_BEARING = Interface(
+    rows=eccentric_bearing,
+    sources=(
+        ErrorSource(name="shaft.journal{j}.eccentricity", shape="vector", place="shaft.journal{j}"),
+        ErrorSource(name="disc{j}.bore.position", shape="vector", place="disc{j}.bore"),
+        ErrorSource(name="shaft.journal{j}.clearance", place="shaft.journal{j}", neglected="*.clearance", fine=True),
+    ),
+)
+
+
+def output_pins(at: Positions) -> SpringGroup:
+    """Return the contact of every output pin with the wall of its hole in every disc, theory page equation (85).
+
+    A pin in a hole is a bearing of clearance R_h − r_o whose pin stands off by the eccentricity, against the direction
+    of the disc's centre: it touches where it lies further off than the clearance, on one side. ``output.pin.position``
+    turns with the carrier, ``disc{j}.hole.position`` with the disc; ``disc{j}.hole.radius`` widens the hole,
+    ``output.pin.radius`` narrows the gap [m].
+
+    δ = x_carrier − x_disc + a·(θca − θd)·(−sin P, cos P) − e·(cos β_j, sin β_j) + errors [m]; walls exactly round.
+
+    References
+    ----------
+    Own derivation; the gap of one pin is the hole's radius less the pin's and the eccentricity.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> design = load_reducer("cd29")
+    >>> group = output_pins(Positions(design, np.zeros(1)))
+    >>> round(1e6 * (group.clearance - group.constants["output.offset"]), 6)  # gap towards the wall [µm]
+    5.0
+    """
+    reducer, coordinates, angles = at.reducer, at.coordinates, at.carrier_angle.size
+    pins, discs, carrier = reducer.holes, reducer.disc_count, coordinates.carrier
+    offset, count = "output.offset", reducer.holes.count
+    shared = [name for pin in range(count) for name in vector_columns(f"output.pin.position.{pin + 1}")]
+    own = [
+        name
+        for disc in range(discs)
+        for pin in range(count)
+        for name in vector_columns(f"disc{disc + 1}.hole.position.{pin + 1}")
+    ]
+    displacement = np.zeros((angles, 2 * discs * count, coordinates.count))
+    error = np.zeros((angles, 2 * discs * count, 1 + len(shared) + len(own)))
+    with_carrier = turned(at.carrier_angle)
+    for element, (disc, pin) in enumerate((disc, pin) for disc in range(discs) for pin in range(count)):
+        rows, plate = slice(2 * element, 2 * element + 2), coordinates.disc(disc)
+        moved = lever(pins.circle_radius, at.carrier_angle + 2 * np.pi * pin / count)
+        displacement[:, rows, carrier : carrier + 2] = np.eye(2)
+        displacement[:, rows, carrier + 2] = moved
+        displacement[:, rows, plate : plate + 2] = -np.eye(2)
+        displacement[:, rows, plate + 2] = -moved
+        direction = at.disc_direction(disc)
+        error[:, rows, 0] = -np.stack([np.cos(direction), np.sin(direction)], axis=-1)
+        error[:, rows, 1 + 2 * pin : 3 + 2 * pin] = with_carrier
+        first = 1 + len(shared) + 2 * element
+        error[:, rows, first : first + 2] = -with_carrier
+    return SpringGroup(
+        name="output pin",
+        stiffness_name="output_pin",
+        displacement=displacement,
+        error=error,
+        columns=(offset, *shared, *own),
+        stiffness=np.full((angles, 2 * discs * count), reducer.stiffness.output_pin),
+        contact="play",
+        clearance=pins.hole_radius - pins.pin_radius,
+        clearance_columns=tuple(
+            f"disc{disc + 1}.hole.radius.{pin + 1}" for disc in range(discs) for pin in range(count)
+        ),
+        clearance_terms={
+            f"output.pin.radius.{pin + 1}": [(disc * count + pin, -1.0) for disc in range(discs)]
+            for pin in range(count)
+        },
+        constants={offset: reducer.cycloid_stage.eccentricity},
+    )
+
+
+def _hole_radius(reducer: Reducer) -> float:
+    return reducer.holes.hole_radius
+
+
+def _output_pin_radius(reducer: Reducer) -> float:
+    return reducer.holes.pin_radius
+
+
+OUTPUT_PINS = Interface(
+    rows=output_pins,
+    sources=(
+        ErrorSource(name="output.pin.position", shape="vector", each="output pin", place="output.pins"),
+        ErrorSource(name="disc{j}.hole.position", shape="vector", each="output pin", place="disc{j}.holes"),
+        ErrorSource(
+            name="disc{j}.hole.radius",
+            each="output pin",
+            place="disc{j}.holes",
+            nominal=Nominal(said="its hole radius", of=_hole_radius),
+        ),
+        ErrorSource(
+            name="output.pin.radius",
+            each="output pin",
+            place="output.pins",
+            nominal=Nominal(said="its output pin radius", of=_output_pin_radius),
+        ),
+    ),
+)
+
+
+def _places(reducer: Reducer) -> Iterator[Place]:
+    discs = range(1, reducer.disc_count + 1)
+    yield Place(id="housing.pins", label="places of the pins in the housing", part="housing")
+    yield Place(id="housing.grooves", label="grooves of the pins", part="housing")
+    yield Place(id="pins", label="pins", part="pins")
+    for disc in discs:
+        yield Place(id=f"disc{disc}", label=f"disc {disc}", part=f"disc{disc}")
+        yield Place(id=f"disc{disc}.teeth", label=f"teeth of disc {disc}", part=f"disc{disc}")
+        yield Place(id=f"disc{disc}.holes", label=f"holes of disc {disc}", part=f"disc{disc}")
+        yield Place(id=f"disc{disc}.bore", label=f"bore of disc {disc}", part=f"disc{disc}")
+    yield Place(id="shaft", label="input shaft", part="shaft")
+    for disc in discs:
+        yield Place(id=f"shaft.journal{disc}", label=f"eccentric {disc} of the shaft", part="shaft")
+    yield Place(id="carrier", label="output with its pins", part="carrier")
+    yield Place(id="output.pins", label="output pins", part="carrier")
+
+
+def _outlines(reducer: Reducer) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return radii and counts [mm, -] with names for the picture, and what of them is an assumption of the drawing."""
+    stage, pins = reducer.cycloid_stage, reducer.holes
+    circle, root = stage.pin_circle_radius, stage.pin_circle_radius - stage.eccentricity - stage.pin_radius
+    bore = 0.8 * (pins.circle_radius - pins.hole_radius)
+    lengths = {
+        "pin_circle_radius": circle,
+        "pin_radius": stage.pin_radius,
+        "eccentricity": stage.eccentricity,
+        "output_circle_radius": pins.circle_radius,
+        "output_pin_radius": pins.pin_radius,
+        "hole_radius": pins.hole_radius,
+        "bore_radius": bore,
+        "shaft_radius": 0.5 * bore,
+        "carrier_radius": min(pins.circle_radius + 1.5 * pins.pin_radius, root - stage.eccentricity),
+        "housing_radius": 1.17 * circle + stage.pin_radius,
+    }
+    counts = {
+        "output_pin_count": pins.count,
+        "crank_count": 0,
+        "disc_count": reducer.disc_count,
+        "pin_count": stage.pin_count,
+        "disc_teeth": stage.disc_teeth,
+    }
+    assumed = (
+        "drawn by a rule, as the reducer file does not state them: outlines of housing, carrier, shaft and its bore"
+    )
+    return {name: float(length / MILLIMETRE) for name, length in lengths.items()} | counts, (assumed,)
+
+
+SINGLE_STAGE = ReducerFamily(
+    name="single stage",
+    interfaces=(SHAFT_SUPPORT, ECCENTRIC_BEARING, OUTPUT_PINS, CARRIER_SUPPORT),
+    contact_sources=PIN_SOURCES,
+    places=_places,
+    outlines=_outlines,
+    new=NewRows(presets=("cd29",), cranks=(), discs=(1, 2, 3), table="cd29_drawing", diameter=80.0),
+)
+"""One stage: shaft, discs, pins of the housing and of the output."""
