@@ -388,7 +388,7 @@ def _motion(reducer: Reducer) -> tuple[dict[str, float], dict[str, list[float]]]
         return float((at(turned)[0] - at(still)[0]) / (2 * pi))
 
     start = {
-        "carrier": [float(still.crank_position(crank)[0]) for crank in cranks] or [0.0],
+        "carrier": [float(still.crank_position(place)[0]) for place in range(reducer.drive_count)],
         "crank": [float(still.disc_direction(disc)[0]) for disc in discs],
         "disc": [float(-still.disc_direction(disc)[0] / stage.disc_teeth) for disc in discs],
         "pin": [float(direction) for direction in still.pin_direction],
@@ -425,21 +425,8 @@ def _coordinates(reducer: Reducer) -> dict[str, list[int]]:
 
 def _offsets(reducer: Reducer, own: Mapping[str, float]) -> dict[str, list[float]]:
     """Return how far the axes of features are off their places, in the frames of their parts [mm]."""
-    cranks, discs = range(1, reducer.crank_count + 1), range(1, reducer.disc_count + 1)
-    if reducer.first_stage is None:
-        columns = {f"shaft.journal{disc}": f"shaft.journal{disc}.eccentricity" for disc in discs}
-        pins = range(1, reducer.holes.count + 1)
-        columns |= {f"output.pin{pin}": f"output.pin.position.{pin}" for pin in pins}
-        for disc in discs:
-            columns |= {f"disc{disc}.hole{pin}": f"disc{disc}.hole.position.{pin}" for pin in pins}
-        return {place: [own[f"{name}.{axis}"] / MILLIMETRE for axis in "xy"] for place, name in columns.items()}
-    columns = {"sun": "sun.eccentricity"}
-    columns |= {f"planet{crank}": f"planet{crank}.eccentricity" for crank in cranks}
-    columns |= {f"carrier.bore{crank}": f"carrier.bore{crank}.position" for crank in cranks}
-    for disc in discs:
-        columns |= {f"disc{disc}.bore{crank}": f"disc{disc}.bore{crank}.position" for crank in cranks}
-        columns |= {f"crank{crank}.journal{disc}": f"crank{crank}.journal{disc}.eccentricity" for crank in cranks}
-    return {place: [own[f"{name}.{axis}"] / MILLIMETRE for axis in "xy"] for place, name in columns.items()}
+    axes = family_of(reducer).axes(reducer)
+    return {place: [own[f"{name}.{axis}"] / MILLIMETRE for axis in "xy"] for place, name in axes.items()}
 
 
 def _magnification(reducer: Reducer, *states: States) -> float:

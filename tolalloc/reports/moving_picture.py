@@ -103,7 +103,10 @@ def _draw_disc(pen: _Pen, pose: Pose, disc: int, largest: float) -> None:
     pen.polygon(teeth, pen.colour(f"disc{number}", _DISC), edge_colour, wide)
     pen.circle(complex(pose.discs[disc]), outline["disc_hole_radius"], "", _PAPER)
     centre = complex(pose.discs[disc] + pose.shift("disc", disc))
-    pen.ring(centre, outline["crank_circle_radius"], f"disc{number}.bores", 0.8, linestyle="--")
+    if "output_pin_count" in outline:
+        _draw_holes(pen, pose, disc)
+    else:
+        pen.ring(centre, outline["crank_circle_radius"], f"disc{number}.bores", 0.8, linestyle="--")
     for crank in range(outline["crank_count"]):
         bore, journal, axis = pose.bore(crank, disc), pose.journal(crank, disc), pose.crank(crank)
         pen.circle(bore, outline["bore_radius"], "", _PAPER, edgecolor="none")
@@ -115,6 +118,33 @@ def _draw_disc(pen: _Pen, pose: Pose, disc: int, largest: float) -> None:
         pen.circle(axis, 0.45 * outline["journal_radius"], f"crank{crank + 1}", _STEEL)
         pen.lines(np.array([[axis, journal]]), _INK, 1.4)
     _draw_forces(pen, pose, disc, largest)
+    pen.output(pose)
+
+
+def _draw_holes(pen: _Pen, pose: Pose, disc: int) -> None:
+    """Draw the holes of a disc with the output pins in them, and the eccentric shaft in its bore."""
+    outline, number = pose.outline, disc + 1
+    for pin in range(outline["output_pin_count"]):
+        pen.circle(pose.bore(pin, disc), outline["bore_radius"], "", _PAPER, edgecolor="none")
+        pen.ring(pose.bore(pin, disc), outline["bore_radius"], f"disc{number}.holes")
+        pen.circle(pose.carrier_bore(pin), outline["carrier_bore_radius"], "output.pins", _STEEL)
+    shaft, eccentric = pose.shift("sun"), pose.eccentric(disc)
+    pen.ring(complex(pose.discs[disc] + pose.shift("disc", disc)), outline["disc_hole_radius"], f"disc{number}.bore")
+    pen.circle(eccentric, outline["journal_radius"], f"shaft.journal{number}", "#d5d7d9")
+    pen.circle(shaft, outline["shaft_radius"], "shaft", _STEEL)
+    pen.lines(np.array([[shaft, eccentric]]), _INK, 1.4)
+
+
+def _draw_output(pen: _Pen, pose: Pose) -> None:
+    """Draw the carrier with the output pins, and the input shaft."""
+    outline = pose.outline
+    pen.circle(0j, outline["housing_radius"], "", _PAPER, fill=False, alpha=0.5)
+    pen.circle(pose.shift("carrier"), outline["carrier_radius"], "carrier", _HOUSING)
+    for pin in range(outline["output_pin_count"]):
+        pen.circle(pose.carrier_bore(pin), outline["carrier_bore_radius"], "output.pins", _STEEL)
+    shaft, turned = pose.shift("sun"), np.exp(1j * float(pose.at("sun")[0]))
+    pen.circle(shaft, outline["shaft_radius"], "shaft", _STEEL)
+    pen.lines(np.array([[shaft + share * outline["shaft_radius"] * turned for share in (0.3, 0.9)]]), _INK, 1.4)
     pen.output(pose)
 
 
@@ -204,8 +234,13 @@ def draw_still(
     for disc, axes in zip(shown, views, strict=False):
         _draw_disc(_Pen(axes, shares, turned), pose, disc, largest)
         axes.set_title(f"disc {disc + 1} on the pins", fontsize=10, color=_INK)
-    _draw_first_stage(_Pen(views[-1], shares, turned), pose)
-    views[-1].set_title("carrier, planets and sun", fontsize=10, color=_INK)
+    draw, what = (
+        (_draw_output, "output and input shaft")
+        if "output_pin_count" in record["outline"]
+        else (_draw_first_stage, "carrier, planets and sun")
+    )
+    draw(_Pen(views[-1], shares, turned), pose)
+    views[-1].set_title(what, fontsize=10, color=_INK)
     stated = f"errors and gaps {record['magnification']:g} times larger, longest arrow {largest:,.0f} N"
     canvas.suptitle(f"{title}: {stated}" if title else stated, fontsize=10, color=_INK)
     return canvas

@@ -124,7 +124,7 @@ class Pose:
 
     @cached_property
     def cranks(self) -> Complex[np.ndarray, " crank"]:
-        """Nominal axes of the crankshafts."""
+        """Nominal axes of the crankshafts, or of the output pins."""
         return np.asarray(self.outline["crank_circle_radius"] * np.exp(1j * self.at("carrier")))
 
     @cached_property
@@ -142,14 +142,19 @@ class Pose:
         own = self.offset(f"crank{crank + 1}.journal{disc + 1}", float(self.at("crank")[0]))
         return complex(self.crank(crank) + self.discs[disc] + turned + own)
 
+    def eccentric(self, disc: int) -> complex:
+        """Return the axis of an eccentric of a single stage's shaft."""
+        own = self.offset(f"shaft.journal{disc + 1}", float(self.at("crank")[0]))
+        return complex(self.discs[disc] + self.shift("sun") + own)
+
     def bore(self, crank: int, disc: int) -> complex:
-        """Return the axis of a disc's bore."""
+        """Return the axis of a disc's bore, or of its hole for an output pin."""
         turned = 1j * self.rotation("disc", disc) * self.cranks[crank]
         own = self.offset(f"disc{disc + 1}.bore{crank + 1}", self.carrier_angle)
         return complex(self.discs[disc] + self.cranks[crank] + self.shift("disc", disc) + turned + own)
 
     def carrier_bore(self, crank: int) -> complex:
-        """Return the axis of a carrier's bore."""
+        """Return the axis of a carrier's bore, or of an output pin."""
         turned = 1j * self.rotation("carrier") * self.cranks[crank]
         return complex(
             self.cranks[crank]

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.reducers.cycloid.solvers import LAWS, LINEAR
-from tolalloc.reducers.equivalent.interfaces import Terms, flank_terms, pin_terms, tilt_terms, tooth_terms, wave_terms
+from tolalloc.reducers.equivalent.interfaces import flank_terms, pin_terms, tilt_terms, tooth_terms, wave_terms
 from tolalloc.reducers.equivalent.springs import SpringGroup
 from tolalloc.reducers.reducer.design import Reducer
 

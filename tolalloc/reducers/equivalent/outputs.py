@@ -201,26 +201,32 @@ def _largest_share(solved: Solved) -> Float[np.ndarray, " sample"]:
 Quantity = tuple[str, Callable[[Solved], Float[np.ndarray, " sample"]]]
 """Unit of an output of one solve, and what gives it, a number per sample."""
 
-_LARGEST = {
-    "mesh": "gear_mesh",
+_BEARINGS = {
     "crank–disc bearing": "crank_disc_bearing",
     "crank–carrier bearing": "crank_carrier_bearing",
     "eccentric bearing": "eccentric_bearing",
     "output pin": "output_pin",
     "carrier bearing": "carrier_bearing",
 }
-"""Interface in words → as in `Stiffness`."""
+"""Bearing, or contact that carries as one, in words → the interface as in `Stiffness`."""
+
+
+def bearings_of(reducer: Reducer) -> dict[str, str]:
+    """Return what bearings a reducer has besides pins and teeth, in words, and the interface as in `Stiffness`."""
+    return {own: name for own, name in _BEARINGS.items() if getattr(reducer.stiffness, name)}
 
 
 def outputs_of(reducer: Reducer) -> dict[str, Quantity]:
     """Return every output of one solve, largest forces of those interfaces that the reducer has."""
-    forces_of = {own: name for own, name in _LARGEST.items() if getattr(reducer.stiffness, name)}
+    mesh = {"mesh": "gear_mesh"} if reducer.stiffness.gear_mesh else {}
     return {
         "mean transmission error": ("arcsec", _mean),
         "pins in contact, least": ("-", _fewest),
         "pins in contact, most": ("-", _most),
         "largest pin force": ("N", _pin_force),
-        **{f"largest {own} force": ("N", _interface_force(name)) for own, name in forces_of.items()},
+        **{
+            f"largest {own} force": ("N", _interface_force(name)) for own, name in (mesh | bearings_of(reducer)).items()
+        },
         "share of the pin force on the most loaded disc": ("-", _largest_share),
     }
 

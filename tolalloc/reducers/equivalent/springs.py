@@ -82,8 +82,8 @@ class Positions:
         return self.crank_angle + 2 * np.pi * disc / self.reducer.disc_count
 
     def crank_position(self, crank: int) -> Float[np.ndarray, " angle"]:
-        """P_i = θc + φ_i, the direction of a crank axis on the carrier [rad]."""
-        return self.carrier_angle + 2 * np.pi * crank / self.reducer.crank_count
+        """P_i = θc + φ_i, the direction of a crank axis, or of an output pin, on the carrier [rad]."""
+        return self.carrier_angle + 2 * np.pi * crank / self.reducer.drive_count
 
     def plane(self, disc: int) -> float:
         """z_j − z_0, height of a disc's middle plane above the middle of all discs [m]."""

@@ -48,6 +48,8 @@ class ReducerFamily:
         What the contact of pins and teeth declares.
     places
         What the picture shows of a reducer, from the inside of the housing to the input.
+    axes
+        Place of an axis, as the picture names it, and the source whose vector moves it there.
     outlines
         Radii and counts for the picture [mm, -], and what of them is an assumption of the drawing.
     new
@@ -58,6 +60,7 @@ class ReducerFamily:
     interfaces: tuple[Interface, ...]
     contact_sources: tuple[ErrorSource, ...]
     places: Callable[[Reducer], Iterable[Place]]
+    axes: Callable[[Reducer], dict[str, str]]
     outlines: Callable[[Reducer], tuple[dict[str, Any], tuple[str, ...]]]
     new: NewRows
 

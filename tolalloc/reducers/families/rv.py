@@ -47,6 +47,17 @@ def _places(reducer: Reducer) -> Iterator[Place]:
         yield Place(id=f"mesh{crank}", label=f"mesh of sun and planet {crank}", part=f"planet{crank}")
 
 
+def _axes(reducer: Reducer) -> dict[str, str]:
+    cranks, discs = range(1, reducer.crank_count + 1), range(1, reducer.disc_count + 1)
+    found = {"sun": "sun.eccentricity"}
+    found |= {f"planet{crank}": f"planet{crank}.eccentricity" for crank in cranks}
+    found |= {f"carrier.bore{crank}": f"carrier.bore{crank}.position" for crank in cranks}
+    for disc in discs:
+        found |= {f"disc{disc}.bore{crank}": f"disc{disc}.bore{crank}.position" for crank in cranks}
+        found |= {f"crank{crank}.journal{disc}": f"crank{crank}.journal{disc}.eccentricity" for crank in cranks}
+    return found
+
+
 _BORE, _JOURNAL = 0.155, 0.103
 """Radii of a disc's bore and of a journal over that of the pin circle, where no bearing is stated; an assumption."""
 _HOUSING, _LAND = 1.17, 0.05
@@ -105,6 +116,7 @@ RV = ReducerFamily(
     interfaces=(SUN_SUPPORT, GEAR_MESH, CRANK_DISC, CRANK_CARRIER, CARRIER_SUPPORT),
     contact_sources=PIN_SOURCES,
     places=_places,
+    axes=_axes,
     outlines=_outlines,
     new=NewRows(
         presets=("rv20e", "rv40e", "rv80e", "rv110e", "rv160e"),

@@ -150,7 +150,7 @@ def output_pins(at: Positions) -> SpringGroup:
     with_carrier = turned(at.carrier_angle)
     for element, (disc, pin) in enumerate((disc, pin) for disc in range(discs) for pin in range(count)):
         rows, plate = slice(2 * element, 2 * element + 2), coordinates.disc(disc)
-        moved = lever(pins.circle_radius, at.carrier_angle + 2 * np.pi * pin / count)
+        moved = lever(pins.circle_radius, at.crank_position(pin))
         displacement[:, rows, carrier : carrier + 2] = np.eye(2)
         displacement[:, rows, carrier + 2] = moved
         displacement[:, rows, plate : plate + 2] = -np.eye(2)
@@ -226,6 +226,16 @@ def _places(reducer: Reducer) -> Iterator[Place]:
     yield Place(id="output.pins", label="output pins", part="carrier")
 
 
+def _axes(reducer: Reducer) -> dict[str, str]:
+    """Return the axes as the picture names them: holes are the discs' bores, output pins stand in the carrier's."""
+    pins, discs = range(1, reducer.holes.count + 1), range(1, reducer.disc_count + 1)
+    found = {f"carrier.bore{pin}": f"output.pin.position.{pin}" for pin in pins}
+    for disc in discs:
+        found[f"shaft.journal{disc}"] = f"shaft.journal{disc}.eccentricity"
+        found |= {f"disc{disc}.bore{pin}": f"disc{disc}.hole.position.{pin}" for pin in pins}
+    return found
+
+
 def _outlines(reducer: Reducer) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Return radii and counts [mm, -] with names for the picture, and what of them is an assumption of the drawing."""
     stage, pins = reducer.cycloid_stage, reducer.holes
@@ -235,11 +245,12 @@ def _outlines(reducer: Reducer) -> tuple[dict[str, Any], tuple[str, ...]]:
         "pin_circle_radius": circle,
         "pin_radius": stage.pin_radius,
         "eccentricity": stage.eccentricity,
-        "output_circle_radius": pins.circle_radius,
-        "output_pin_radius": pins.pin_radius,
-        "hole_radius": pins.hole_radius,
-        "bore_radius": bore,
-        "shaft_radius": 0.5 * bore,
+        "crank_circle_radius": pins.circle_radius,
+        "carrier_bore_radius": pins.pin_radius,
+        "bore_radius": pins.hole_radius,
+        "disc_hole_radius": bore,
+        "journal_radius": 0.8 * bore,
+        "shaft_radius": 0.4 * bore,
         "carrier_radius": min(pins.circle_radius + 1.5 * pins.pin_radius, root - stage.eccentricity),
         "housing_radius": 1.17 * circle + stage.pin_radius,
     }
@@ -261,6 +272,7 @@ SINGLE_STAGE = ReducerFamily(
     interfaces=(SHAFT_SUPPORT, ECCENTRIC_BEARING, OUTPUT_PINS, CARRIER_SUPPORT),
     contact_sources=PIN_SOURCES,
     places=_places,
+    axes=_axes,
     outlines=_outlines,
     new=NewRows(presets=("cd29",), cranks=(), discs=(1, 2, 3), table="cd29_drawing", diameter=80.0),
 )

@@ -286,6 +286,11 @@ class Reducer:
         return self.output_pins
 
     @property
+    def drive_count(self) -> int:
+        """Number of cranks, or of output pins, that drive the carrier [-]."""
+        return self.output_pins.count if self.output_pins else self.crank_count
+
+    @property
     def carrier_radius(self) -> float:
         """Radius at which the carrier is driven, by cranks or by output pins [m]."""
         return self.output_pins.circle_radius if self.output_pins else self.crank_circle_radius
@@ -400,6 +405,8 @@ def compliances(reducer: Reducer, torque: float) -> dict[str, dict[str, float]]:
     >>> {part: f"{value:.1e}" for part, value in found.items() if "bear" in part}  # [m/N]
     {'crank–carrier bearings': '1.5e-09'}
     """
+    if not reducer.parts:
+        return {}
     least = _SMALLEST * reducer.load.rated_torque
     forces = interface_forces(reducer, max(abs(torque), least))
     unloaded = forces["crank_carrier_bearing"] * _SMALLEST

@@ -302,7 +302,8 @@ export class Mechanism {
     for (let disc = 0; disc < scene.outline.disc_count; disc += 1) {
       this.buildView(views, `Disc ${disc + 1} on the pins`, (view) => this.buildDisc(view, disc));
     }
-    this.buildView(views, "Carrier, planets and sun", (view) => this.buildFirstStage(view));
+    if (scene.outline.output_pin_count) this.buildView(views, "Output and input shaft", (view) => this.buildOutput(view));
+    else this.buildView(views, "Carrier, planets and sun", (view) => this.buildFirstStage(view));
     this.buildLegend();
     this.shade(this.shares);
     this.light([...this.lit]);
@@ -386,7 +387,9 @@ export class Mechanism {
     const body = this.place(`disc${number}`, "path", { class: "disc", "fill-rule": "evenodd" }, view);
     this.place("pins", "path", { class: "pin", d: at.map((place) => ring(place, pin)).join("") }, view);
     const teeth = this.place(`disc${number}.teeth`, "path", { class: "edge" }, view);
-    const pattern = this.place(`disc${number}.bores`, "circle", { class: "pattern", r: outline.crank_circle_radius }, view);
+    if (outline.output_pin_count) this.buildHoles(view, disc);
+    const pattern = outline.crank_count
+      ? this.place(`disc${number}.bores`, "circle", { class: "pattern", r: outline.crank_circle_radius }, view) : null;
     const bores = [], cranks = [];
     for (let crank = 0; crank < outline.crank_count; crank += 1) {
       bores.push(this.place(`disc${number}.bore${crank + 1}`, "circle", { class: "bore", r: outline.bore_radius }, view));
@@ -410,7 +413,7 @@ export class Mechanism {
       // Holes stand in the housing's frame: turned back into the disc's own.
       body.setAttribute("d", shape + this.holes(holes ? pose.bores[disc] : [], centre, angle));
       body.setAttribute("transform", moved(centre, angle));
-      pattern.setAttribute("transform", moved(pose.discCentres[disc]));
+      pattern?.setAttribute("transform", moved(pose.discCentres[disc]));
       bores.forEach((bore, crank) => bore.setAttribute("transform", moved(pose.bores[disc][crank])));
       cranks.forEach(({ other, journal, shaft, lever }, crank) => {
         for (const [own, circleOf] of other) circleOf.setAttribute("transform", moved(pose.journals[crank][own]));
@@ -421,6 +424,26 @@ export class Mechanism {
       });
       arrows.setAttribute("d", this.arrows(pose.contacts[disc]));
       output.setAttribute("transform", moved([0, 0], pose.output));
+    });
+  }
+
+  /** Holes of a disc with the output pins in them, and the eccentric shaft in its bore. */
+  buildHoles(view, disc) {
+    const { outline } = this.scene, number = disc + 1;
+    const holes = this.place(`disc${number}.holes`, "path", { class: "bore" }, view);
+    const pins = this.place("output.pins", "path", { class: "crank" }, view);
+    const bore = this.place(`disc${number}.bore`, "circle", { class: "bore", r: outline.disc_hole_radius }, view);
+    const journal = this.place(`shaft.journal${number}`, "circle", { class: "journal", r: outline.journal_radius }, view);
+    const shaft = this.place("shaft", "circle", { class: "crank", r: outline.shaft_radius }, view);
+    const lever = made("path", { class: "lever" }, view);
+    this.painters.push((pose) => {
+      const [axis, eccentric] = [pose.sun, pose.eccentrics[disc]];
+      holes.setAttribute("d", pose.bores[disc].map((own) => ring(own, outline.bore_radius)).join(""));
+      pins.setAttribute("d", pose.carrierBores.map((own) => ring(own, outline.carrier_bore_radius)).join(""));
+      bore.setAttribute("transform", moved(pose.discCentres[disc]));
+      journal.setAttribute("transform", moved(eccentric));
+      shaft.setAttribute("transform", moved(axis));
+      lever.setAttribute("d", `M${axis[0]} ${axis[1]}L${eccentric[0]} ${eccentric[1]}`);
     });
   }
 
@@ -442,6 +465,24 @@ export class Mechanism {
         `L${write(...tip)}L${write(neck[0] + 0.5 * head * ny, neck[1] - 0.5 * head * nx)}`);
     }
     return parts.join("");
+  }
+
+  buildOutput(view) {
+    const { outline } = this.scene, { pin_circle_radius: circle, pin_radius: pin, housing_radius: end } = outline;
+    const inner = circle + 1.6 * pin;
+    made("circle", { class: "outline", r: outline.housing_radius }, view);
+    const carrier = this.place("carrier", "path", { class: "carrier" }, view);
+    carrier.setAttribute("d", ring([0, 0], outline.carrier_radius));
+    const pins = this.place("output.pins", "path", { class: "crank" }, view), turning = made("g", {}, view);
+    this.place("shaft", "circle", { class: "crank", r: outline.shaft_radius }, turning);
+    made("path", { class: "mark", d: `M${0.3 * outline.shaft_radius} 0L${0.9 * outline.shaft_radius} 0` }, turning);
+    const output = made("path", { class: "output", d: `M${0.995 * end} 0L${inner} ${0.035 * end}L${inner} ${-0.035 * end}Z` }, view);
+    this.painters.push((pose) => {
+      carrier.setAttribute("transform", moved(pose.carrierCentre));
+      pins.setAttribute("d", pose.carrierBores.map((own) => ring(own, outline.carrier_bore_radius)).join(""));
+      turning.setAttribute("transform", moved(pose.sun, pose.at.sun[0]));
+      output.setAttribute("transform", moved([0, 0], pose.output));
+    });
   }
 
   buildFirstStage(view) {
@@ -515,12 +556,14 @@ export class Mechanism {
     const sum = (place, ...ways) => ways.reduce(([x, y], [dx, dy, by = 1]) => [x + large * by * dx, y + large * by * dy], place);
     const carrierAngle = at.carrier[0];
     const planetOf = (crank) => coordinates.planet[crank], discOf = (disc) => coordinates.disc[disc];
-    const cranks = at.cranks.map((own, crank) => sum(own, shift(planetOf(crank))));
+    const onCranks = (rows) => rows.slice(0, outline.crank_count); // a single stage has output pins in their place
+    const cranks = onCranks(at.cranks).map((own, crank) => sum(own, shift(planetOf(crank))));
     return {
       at, state, magnification: large, cranks, output: carrierAngle + large * state.error,
-      journals: at.journals.map((row, crank) => row.map((own, disc) => sum(own, shift(planetOf(crank)),
+      journals: onCranks(at.journals).map((row, crank) => row.map((own, disc) => sum(own, shift(planetOf(crank)),
         [...across(outline.eccentricity, at.crank[disc]), q[planetOf(crank) + 2]],
         turned(`crank${crank + 1}.journal${disc + 1}`, crankAngle)))),
+      eccentrics: at.discs.map((own, disc) => sum(own, shift(coordinates.sun[0]), turned(`shaft.journal${disc + 1}`, crankAngle))),
       discCentres: at.discs.map((own, disc) => sum(own, shift(discOf(disc)))),
       bores: at.discs.map(([x, y], disc) => at.cranks.map(([cx, cy], crank) => sum([x + cx, y + cy], shift(discOf(disc)),
         [...across(outline.crank_circle_radius, at.carrier[crank]), q[discOf(disc) + 2]],
@@ -529,7 +572,7 @@ export class Mechanism {
       carrierBores: at.cranks.map((own, crank) => sum(own, shift(coordinates.carrier[0]),
         [...across(outline.crank_circle_radius, at.carrier[crank]), q[coordinates.carrier[0] + 2]],
         turned(`carrier.bore${crank + 1}`, carrierAngle))),
-      planets: at.cranks.map((own, crank) => sum(own, shift(planetOf(crank)), turned(`planet${crank + 1}`, crankAngle))),
+      planets: onCranks(at.cranks).map((own, crank) => sum(own, shift(planetOf(crank)), turned(`planet${crank + 1}`, crankAngle))),
       sun: sum([0, 0], shift(coordinates.sun[0]), turned("sun", at.sun[0] - scene.start.sun[0])),
       contacts: at.discs.map((centre, disc) => this.contacts(at, centre, disc, state)),
     };
@@ -563,8 +606,9 @@ export class Mechanism {
     this.stated.textContent =
       `Errors, gaps and displacements are drawn ${short(pose.magnification)} times larger. Carrier at ${turn.toFixed(2)}°, ` +
       `torque ${short(pose.state.torque)} N·m, transmission error ${seconds.toFixed(1).replace("-", "−")}″, ${touching} pins carry; ` +
-      `the longest arrow of the turn is ${short(this.largest)} N. In one output turn the sun turns ${short(Math.abs(this.scene.turns.sun))} ` +
-      `times the same way, the cranks ${short(Math.abs(this.scene.turns.crank))} times the other way.`;
+      `the longest arrow of the turn is ${short(this.largest)} N. In one output turn ` +
+      (this.scene.outline.output_pin_count ? "the input shaft turns " : `the sun turns ${short(Math.abs(this.scene.turns.sun))} times the same way, the cranks `) +
+      `${short(Math.abs(this.scene.turns.crank))} times the other way.`;
     if (!this.withControls) return;
     if (document.activeElement !== this.angleInput) this.angleInput.value = String(this.phase);
     this.angleInput.setAttribute("aria-valuetext", `${turn.toFixed(1)} degrees`);

@@ -12,7 +12,7 @@ from jaxtyping import Float
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE
 from tolalloc.reducers.equivalent.hysteresis import LOOP_ASSUMPTION, FrictionLoop, HysteresisLoop
 from tolalloc.reducers.equivalent.model import Equilibria
-from tolalloc.reducers.equivalent.outputs import Attribution, forces, outputs_of
+from tolalloc.reducers.equivalent.outputs import Attribution, bearings_of, forces, outputs_of
 from tolalloc.reducers.equivalent.perfect import PRELOAD_ASSUMPTION
 from tolalloc.reducers.reducer.bearings import CONTACTS, friction_assumptions
 from tolalloc.reducers.reducer.design import Reducer
@@ -37,12 +37,6 @@ _DRAWN = 120
 _UNIT = 0
 """Sample of a loop that is the unit [-]."""
 _ANGLE, _ERROR = "carrier angle [°]", "transmission error [arcsec]"
-_BEARINGS = {
-    "crank–disc bearing": "crank_disc_bearing",
-    "crank–carrier bearing": "crank_carrier_bearing",
-    "carrier bearing": "carrier_bearing",
-}
-"""What a line is called → the interface as in `Stiffness`."""
 _LOOP = {
     "lost_motion_arcmin": "lost motion at ±3 % of rated torque{} [arcmin]",
     "backlash_arcmin": "backlash{} [arcmin]",
@@ -284,7 +278,7 @@ def force_figure(equilibria: Equilibria) -> Figure:
     """Draw the force of the most loaded pin and of the most loaded bearing of every kind over the turn [N]."""
     found = forces(equilibria)
     lines = {"pin": found.pins[0].max(axis=(1, 2))}
-    lines |= {name: found.of(interface)[0].max(axis=1) for name, interface in _BEARINGS.items()}
+    lines |= {name: found.of(interface)[0].max(axis=1) for name, interface in bearings_of(equilibria.reducer).items()}
     return Figure(
         name="forces",
         title=_say("force_figure"),

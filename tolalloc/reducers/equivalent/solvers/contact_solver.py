@@ -194,6 +194,8 @@ def assemble(problem, compression, play, q, gradient, tangent):
                     tangent[3 * d + i, 3 * d + j] += weighted * problem.by_disc[d, j, k]
     for e in range(play.shape[0]):
         fx, fy, xx, xy, yy = play_force(problem.play_stiffness[e], problem.clearance[e], play[e, 0], play[e, 1])
+        if fx == 0.0 and fy == 0.0:
+            continue
         largest = max(largest, np.sqrt(fx * fx + fy * fy))
         for i in range(size):
             ax, ay = problem.play_by_retained[e, 0, i], problem.play_by_retained[e, 1, i]
@@ -312,7 +314,8 @@ def _exact_step(problem, work, q):
             curvature += work.step[i] * problem.stiffness[i, j] * work.step[j]
         slope += against * work.step[i]
     curvature = max(curvature, 0.0)
-    settled = 1e-14 if problem.law == LINEAR else _ENOUGH
+    straight = problem.law == LINEAR and work.play.shape[0] == 0
+    settled = 1e-14 if straight else _ENOUGH
     low, high, length = 0.0, np.inf, 1.0
     for _ in range(_SEARCH_STEPS):
         first, second = _slope_at(problem, work, length, slope, curvature)
