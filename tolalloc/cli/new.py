@@ -14,7 +14,10 @@ from tolalloc.exceptions import InputError
 
 def new(
     name: Annotated[Path | None, typer.Argument(help="The new folder, whose name becomes that of the study.")] = None,
-    like: Annotated[str, typer.Option(help="Preset that it is like: rv20e, rv40e, rv80e, rv110e or rv160e.")] = "",
+    family: Annotated[str, typer.Option(help="Family of reducers: rv or single-stage; that of the preset.")] = "",
+    like: Annotated[
+        str, typer.Option(help="Preset that it is like: rv20e, rv40e, rv80e, rv110e, rv160e; single-stage: cd29.")
+    ] = "",
     cranks: Annotated[int | None, typer.Option(help="Cranks, 2 to 4; those of the preset unless given.")] = None,
     discs: Annotated[int | None, typer.Option(help="Discs, 1 to 3; those of the preset unless given.")] = None,
     samples: Annotated[
@@ -22,25 +25,27 @@ def new(
     ] = "",
 ) -> None:
     """Make a folder with a reducer, its tolerance table, a study and samples: the start of your own."""
-    from tolalloc.cli.start import SAMPLES, Likeness, NewFolder
-    from tolalloc.reducers.family import RV
+    from tolalloc.cli.start import Likeness, NewFolder, preset_of
+    from tolalloc.reducers.families.known import FAMILIES
 
     if name is None:
         if not sys.stdin.isatty():
             raise InputError("tolalloc new: NAME is missing; give the folder to make, such as mine.")
         name = Path(typer.prompt("Name of the folder", default="mine"))
-        like = like or typer.prompt(f"Like which preset ({', '.join(RV.new.presets)})", default="rv20e")
+        presets = ", ".join(preset for own in FAMILIES.values() for preset in own.new.presets)
+        like = preset_of(family, like or typer.prompt(f"Like which preset ({presets})", default=preset_of(family, "")))
         preset = Likeness(preset=like).reducer
-        cranks = cranks or typer.prompt("Cranks, 2 to 4", default=preset.crank_count, type=int)
+        if preset.crank_count:
+            cranks = cranks or typer.prompt("Cranks, 2 to 4", default=preset.crank_count, type=int)
         discs = discs or typer.prompt("Discs, 1 to 3", default=preset.disc_count, type=int)
         samples = samples or typer.prompt("Samples for the other commands (all, or none)", default="none")
         samples = "" if samples == "none" else samples
-    chosen = Likeness(preset=like or "rv20e", cranks=cranks, discs=discs)
-    kinds = SAMPLES if samples == "all" else tuple(kind.strip() for kind in samples.split(",") if kind.strip())
-    reducer, sources = NewFolder(place=name, like=chosen, samples=kinds).write()
+    chosen = Likeness(preset=preset_of(family, like), cranks=cranks, discs=discs)
+    reducer, sources = NewFolder(place=name, like=chosen, samples=chosen.kinds(samples)).write()
     varied = sum(own.zone > 0 and not own.locked for own in sources)
+    drives = f"{reducer.crank_count} cranks" if reducer.crank_count else f"{reducer.drive_count} output pins"
     say(
-        f"{name}: {reducer.name} with {reducer.crank_count} cranks and {reducer.disc_count} discs, like "
+        f"{name}: {reducer.name} with {drives} and {reducer.disc_count} discs, like "
         f"{chosen.preset}; {len(sources)} sources, of which {varied} may change."
     )
     say("Every zone and cost is assumed: open zones.xlsx and write your own.")
@@ -48,7 +53,9 @@ def new(
 
 
 def schema(
-    kind: Annotated[str, typer.Argument(help="Kind of TOML file: reducer, unit, stiffness, bench or chain.")],
+    kind: Annotated[
+        str, typer.Argument(help="Kind of TOML file: reducer, single-stage, unit, stiffness, bench or chain.")
+    ],
 ) -> None:
     """Print the JSON schema of a kind of TOML file: its fields, their units and ranges."""
     from tolalloc.cli.start import schema as schema_of

@@ -20,19 +20,15 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.table_file import DATA as TABLES
 from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE
 from tolalloc.reducers.choice import bind
-from tolalloc.reducers.families.known import SOURCES
+from tolalloc.reducers.families.known import SOURCES, family_of
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import with_stiffness
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.reducers.unit_file import BuiltUnit, table_text, units_text
 
-_WAYS = (
-    ("disc?.bore?.position", "jig bored", "bored", "jig ground"),
-    ("crank?.journal?.eccentricity", "ground", "turned", "ground twice"),
-    ("pin.diameter", "ground", "turned", "lapped"),
-)
-"""Pattern of sources, and the processes of today, for wide zones alone, and for narrow ones."""
+_WAYS = (("jig bored", "bored", "jig ground"), ("ground", "turned", "ground twice"), ("ground", "turned", "lapped"))
+"""Of each pattern of sources that is priced, the processes of today, for wide zones alone, and for narrow ones."""
 _HEADER = (
     "# Invented ways to make the features: replace them by your own. A row without a factor is today's process, with\n"
     "# the cost of the tolerance table at its zone. min and max are cut to those of the table.\n"
@@ -41,10 +37,10 @@ _HEADER = (
 )
 
 
-def process_files(sources: Sequence[Source]) -> dict[str, str]:
-    """Return a process capability library and a process cost table, by file name."""
+def process_files(sources: Sequence[Source], priced: Sequence[str]) -> dict[str, str]:
+    """Return a process capability library and a process cost table, by file name, that prices patterns of sources."""
     rows = [_HEADER]
-    for pattern, today, wide, narrow in _WAYS:
+    for pattern, (today, wide, narrow) in zip(priced, _WAYS, strict=True):
         like = [own for own in sources if fnmatchcase(own.name, pattern)]
         zone = max(own.zone for own in like) / MICROMETRE
         product = max(own.cost * own.zone for own in like) / MICROMETRE
@@ -59,7 +55,6 @@ def process_files(sources: Sequence[Source]) -> dict[str, str]:
     return {"processes.csv": library, "process_costs.csv": "\n".join(rows) + "\n"}
 
 
-STIFFER = "crank_disc_bearing"
 FACTOR = 1.6
 """True stiffness of these bearings over that of the reducer file [-]."""
 _READINGS = 144
@@ -73,9 +68,10 @@ _SIMULATED = "Simulated by tolalloc new, not measured."
 
 def bench_files(reducer: Reducer, errors: ErrorModel, deviations: Float[np.ndarray, "unit column"]) -> dict[str, str]:
     """Return a measurement file and the tables that it names: the parts, a curve and a loop of every unit."""
-    value = FACTOR * getattr(reducer.stiffness, STIFFER)
+    stiffer = family_of(reducer).new.stiffer
+    value = FACTOR * getattr(reducer.stiffness, stiffer)
     true = with_stiffness(
-        reducer, IdentifiedStiffness(source="simulated", values={STIFFER: value}, standard_uncertainty={STIFFER: 0.0})
+        reducer, IdentifiedStiffness(source="simulated", values={stiffer: value}, standard_uncertainty={stiffer: 0.0})
     )
     rated, generator = float(reducer.load.rated_torque), SeedTree(1).child("bench").generator()
     kernel = bind(true, errors, -rated, "new folder")[0]
@@ -115,7 +111,7 @@ def _parts(errors: ErrorModel, deviations: Float[np.ndarray, "unit column"]) -> 
 def _main(reducer: Reducer, units: int, rated: float) -> str:
     """Return the measurement file."""
     lines = [
-        f"# {_SIMULATED} The truth: {STIFFER} is {FACTOR:g} times what the reducer file says.",
+        f"# {_SIMULATED} The truth: {family_of(reducer).new.stiffer} is {FACTOR:g} times what the reducer file says.",
         f'name = "{units} simulated units of {reducer.name}"',
         'source = "simulated on the equivalent model"',
         'units = "bench_units.csv"',
@@ -194,7 +190,7 @@ class Samples:
         """Kind of sample → what makes its files, by name."""
         return {
             "costs": lambda: {"shop.csv": self.shop},
-            "processes": lambda: process_files(self.sources),
+            "processes": lambda: process_files(self.sources, family_of(self.reducer).new.priced),
             "cmm": lambda: {"pin_diameters.csv": self.measured_pins},
             "bench": lambda: bench_files(self.reducer, self._errors, self._units(_UNITS)),
             "curve": lambda: {"unit7.csv": self.curve},

@@ -29,9 +29,11 @@ from tolalloc.reading.units import ARCSECOND, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.sources import ErrorSource
-from tolalloc.reducers.family import RV
+from tolalloc.reducers.families.family import NewRows
+from tolalloc.reducers.families.known import FAMILIES, SOURCES, family_of
+from tolalloc.reducers.families.rv import RV
 from tolalloc.reducers.reducer.design import Modification, Reducer
-from tolalloc.reducers.reducer.files import IdentifiedStiffnessRecord, ReducerRecord, load_reducer
+from tolalloc.reducers.reducer.files import IdentifiedStiffnessRecord, ReducerRecord, SingleStageRecord, load_reducer
 from tolalloc.reducers.unit_file import UnitRecord
 
 
@@ -54,6 +56,7 @@ def _bench() -> type[BaseModel]:
 
 KINDS: dict[str, Callable[[], type[BaseModel]]] = {
     "reducer": lambda: ReducerRecord,
+    "single-stage": lambda: SingleStageRecord,
     "unit": lambda: UnitRecord,
     "stiffness": lambda: IdentifiedStiffnessRecord,
     "bench": _bench,
@@ -101,16 +104,34 @@ class Likeness:
     discs: int | None = None
 
     def __post_init__(self) -> None:
-        if self.preset not in RV.new.presets:
-            raise UnknownNameError.among("new reducer", "preset", self.preset, RV.new.presets)
-        for name, count, allowed in (("cranks", self.cranks, RV.new.cranks), ("discs", self.discs, RV.new.discs)):
+        presets = [preset for own in FAMILIES.values() for preset in own.new.presets]
+        if self.preset not in presets:
+            raise UnknownNameError.among("new reducer", "preset", self.preset, presets)
+        for name, count, allowed in (("cranks", self.cranks, self.new.cranks), ("discs", self.discs, self.new.discs)):
             if count is not None and count not in allowed:
-                raise InputError.of_argument("new reducer", name, count, f"{allowed[0]} to {allowed[-1]}")
+                said = f"{allowed[0]} to {allowed[-1]}" if allowed else f"nothing: a {self.family} has none"
+                raise InputError.of_argument("new reducer", name, count, said)
+
+    @property
+    def family(self) -> str:
+        """Name of the preset's family."""
+        return next(name for name, own in FAMILIES.items() if self.preset in own.new.presets)
+
+    @property
+    def new(self) -> NewRows:
+        """What a new folder of the family starts from."""
+        return FAMILIES[self.family].new
 
     @property
     def reducer(self) -> Reducer:
         """The preset itself."""
         return load_reducer(self.preset)
+
+    def kinds(self, samples: str) -> tuple[str, ...]:
+        """Return the kinds of samples that are named, separated by commas, or all that the family has."""
+        if samples == "all":
+            return self.new.samples
+        return tuple(kind.strip() for kind in samples.split(",") if kind.strip())
 
     def text(self, name: str) -> str:
         """Return the reducer file; new counts and the modification of the drawing are marked as assumptions."""
@@ -118,8 +139,10 @@ class Likeness:
         text = re.sub(r'^name = ".*"$', f'name = "{name}"', text, count=1, flags=re.MULTILINE)
         text, changed = self._with_modification(text), []
         for field, count in (("crank_count", self.cranks), ("disc_count", self.discs)):
+            if count is None:
+                continue
             before = int(re.search(rf"^{field} = (\d+)", text, re.MULTILINE)[1])  # type: ignore[index]
-            if count not in (None, before):
+            if count != before:
                 text = re.sub(rf"^{field} = \d+", f"{field} = {count}", text, count=1, flags=re.MULTILINE)
                 changed.append(f"{field} {count} instead of {before}")
         if changed:
@@ -136,9 +159,25 @@ class Likeness:
         flank, radial = clearances_of(self.reducer).values()
         note = (
             f"modification not that of {self.preset}: leaves {flank:g} µm on the flank and {radial:g} µm at tip and "
-            "root, as rv20e_drawing does in the proportion of its zones"
+            f"root, as {self.new.table} does in the proportion of its zones"
         )
         return text.replace("assumptions = [\n", f'assumptions = [\n  "{note}",\n', 1)
+
+
+def preset_of(family: str, like: str) -> str:
+    """Return the preset of a new reducer: the one that is named, or the first of the family.
+
+    Raises
+    ------
+    UnknownNameError
+        No such family, or one that does not have the preset.
+    """
+    names = {name.lower().replace(" ", "-"): own.new.presets for name, own in FAMILIES.items()}
+    if family and family not in names:
+        raise UnknownNameError.among("new reducer", "family", family, names)
+    if family and like and like not in names[family]:
+        raise UnknownNameError.among("new reducer", f"preset of the family {family}", like, names[family])
+    return like or names[family or "rv"][0]
 
 
 _NUMBERED = re.compile(r"(disc|crank|bore|journal|planet|mesh)\d+")
@@ -147,8 +186,9 @@ _NUMBERED = re.compile(r"(disc|crank|bore|journal|planet|mesh)\d+")
 def sources_of(reducer: Reducer, complete: bool = False) -> tuple[Source, ...]:
     """Return all sources of a reducer with assumed zones.
 
-    Zones and their ranges are those of ``rv20e_drawing``, scaled by the tolerance unit i = 0.45·D^(1/3) + 0.001·D of
-    ISO 286-1 with D the diameter of the pin circle in mm. The shipped drawings of larger sizes are made by this rule.
+    Zones and their ranges are those of the family's drawing, such as ``rv20e_drawing``, scaled by the tolerance unit
+    i = 0.45·D^(1/3) + 0.001·D of ISO 286-1 with D the diameter of the pin circle in mm. The shipped drawings of larger
+    sizes are made by this rule.
 
     Parameters
     ----------
@@ -158,9 +198,9 @@ def sources_of(reducer: Reducer, complete: bool = False) -> tuple[Source, ...]:
         Whether every source has a zone and may change, as in the shipped drawings; or else the first stage is locked,
         and phases, tilts, single pins and teeth are neglected.
     """
-    known = {source.name: source for source in load_tolerance_table(RV.new.table)}
+    known = {source.name: source for source in load_tolerance_table(family_of(reducer).new.table)}
     scale = _scale_of(reducer)
-    kinds = {name: RV.sources.of(name) for name in map(source_name, EquivalentModel(reducer).columns)}
+    kinds = {name: SOURCES.of(name) for name in map(source_name, EquivalentModel(reducer).columns)}
     found = []
     for name, kind in kinds.items():
         like = known.get(name) or known.get(_NUMBERED.sub(r"\g<1>1", name))
@@ -175,9 +215,9 @@ def sources_of(reducer: Reducer, complete: bool = False) -> tuple[Source, ...]:
 def clearances_of(reducer: Reducer) -> dict[str, float]:
     """Return the clearances of the drawing's modification at this size, by name [µm].
 
-    They are those of ``rv20e_drawing`` in the proportion of the zones, in whole tenths of a micrometre.
+    They are those of the family's drawing in the proportion of the zones, in whole tenths of a micrometre.
     """
-    stated = load_drawing(RV.new.table).settings
+    stated = load_drawing(family_of(reducer).new.table).settings
     return {name: round(_scale_of(reducer) * value, 1) for name, value in stated.items()}
 
 
@@ -189,12 +229,13 @@ def modification_of(reducer: Reducer) -> Modification:
 
 
 def _scale_of(reducer: Reducer) -> float:
-    """Return how much wider zones are than those of the RV-20E [-]."""
-    return size_factor(2 * reducer.cycloid_stage.pin_circle_radius / MILLIMETRE)
+    """Return how much wider zones are than those of the family's drawing [-]."""
+    own = 2 * reducer.cycloid_stage.pin_circle_radius / MILLIMETRE
+    return size_factor(own, family_of(reducer).new.diameter)
 
 
-def size_factor(diameter: float) -> float:
-    """Return how much wider zones are on a pin circle of a diameter [mm] than on that of the RV-20E [-].
+def size_factor(diameter: float, known: float = RV.new.diameter) -> float:
+    """Return how much wider zones are on a pin circle of a diameter [mm] than on a known one, that of the RV-20E [-].
 
     >>> size_factor(104.0), round(size_factor(155.0), 3)
     (1.0, 1.159)
@@ -203,7 +244,7 @@ def size_factor(diameter: float) -> float:
     def unit(size: float) -> float:
         return float(0.45 * size ** (1 / 3) + 0.001 * size)
 
-    return unit(diameter) / unit(RV.new.diameter)
+    return unit(diameter) / unit(known)
 
 
 def _scaled(source: Source, kind: ErrorSource, reducer: Reducer, scale: float) -> Source:
@@ -213,8 +254,9 @@ def _scaled(source: Source, kind: ErrorSource, reducer: Reducer, scale: float) -
     """
     nominal = kind.nominal.of(reducer) if kind.nominal and not kind.nominal.chosen else 0.0
     zone, least, most = (_rounded(scale * own) for own in (source.zone, source.minimum, source.maximum))
-    longer = 2 * reducer.cycloid_stage.pin_circle_radius / MILLIMETRE / RV.new.diameter
-    note = "zone, range and cost assumed: those of rv20e_drawing, scaled by ISO 286's tolerance unit"
+    new = family_of(reducer).new
+    longer = 2 * reducer.cycloid_stage.pin_circle_radius / MILLIMETRE / new.diameter
+    note = f"zone, range and cost assumed: those of {new.table}, scaled by ISO 286's tolerance unit"
     return replace(
         source,
         zone=zone,
@@ -281,8 +323,6 @@ def table_workbook(sources: Sequence[Source]) -> bytes:
     return book.content()
 
 
-SAMPLES = ("costs", "processes", "cmm", "bench", "curve", "lot", "parts", "assembly")
-"""Kinds of samples that a folder may have."""
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,59}")
 _USUAL = 60.0
 """Limit of the peak-to-peak where no catalogue value is stated [arcsec]."""
@@ -296,7 +336,7 @@ study = ta.Study(
     ta.drawing("zones.xlsx"),
     limits={{
         ta.PEAK_TO_PEAK: ta.Limit(upper={limit:g}, show=ta.AtYield(target=0.9973)),
-        ta.LOST_MOTION: ta.Limit(upper=1.0),
+        ta.LOST_MOTION: ta.Limit(upper={lost_motion:g}),
     }},
     questions=[ta.Ranking(), ta.Allocation()],
     name="{name}",
@@ -360,14 +400,15 @@ _ASKED = {
     "assembly": "tolalloc assemble chain.toml --measured angles.csv",
 }
 """Kind of sample → the command that reads it."""
-_SCHEMAS = {"reducer.toml": "reducer", "bench.toml": "bench", "chain.toml": "chain"}
-"""File → kind of its schema."""
 
 
-def _write_schemas(folder: Path) -> None:
-    """Write the schemas of a folder's TOML files and name them in their first lines, where editors look."""
+def _write_schemas(folder: Path, reducer: str) -> None:
+    """Write the schemas of a folder's TOML files and name them in their first lines, where editors look.
+
+    That of the reducer is of its family's kind.
+    """
     (folder / "schemas").mkdir()
-    for file, kind in _SCHEMAS.items():
+    for file, kind in {"reducer.toml": reducer, "bench.toml": "bench", "chain.toml": "chain"}.items():
         if (path := folder / file).exists():
             text = json.dumps(schema(kind), ensure_ascii=False, indent=2)
             (folder / "schemas" / f"{kind}.json").write_text(text + "\n", encoding="utf-8")
@@ -386,7 +427,7 @@ class NewFolder:
     like
         What the reducer is like.
     samples
-        Kinds of samples, of `SAMPLES`.
+        Kinds of samples, of those that the family has.
     """
 
     place: Path
@@ -397,8 +438,8 @@ class NewFolder:
         if not _NAME.fullmatch(self.place.name):
             raise InputError.at("new folder", "name", self.place.name, "60 letters, digits, - and _, a letter first")
         for kind in self.samples:
-            if kind not in SAMPLES:
-                raise UnknownNameError.among("new folder", "sample", kind, (*SAMPLES, "all"))
+            if kind not in self.like.new.samples:
+                raise UnknownNameError.among("new folder", "sample", kind, (*self.like.new.samples, "all"))
 
     def write(self) -> tuple[Reducer, tuple[Source, ...]]:
         """Write the folder, whole or not at all, and return its reducer and its sources.
@@ -433,7 +474,9 @@ class NewFolder:
         (folder / "zones.csv").write_text(table_text(sources, folder), encoding="utf-8")
         (folder / "zones.xlsx").write_bytes(table_workbook(sources))
         limit = reducer.catalogue.transmission_error / ARCSECOND if reducer.catalogue else _USUAL
-        (folder / "study.py").write_text(_STUDY.format(name=name, limit=round(limit, 6)), encoding="utf-8")
+        (folder / "study.py").write_text(
+            _STUDY.format(name=name, limit=round(limit, 6), lost_motion=self.like.new.lost_motion), encoding="utf-8"
+        )
         (folder / "README.md").write_text(self._read_me(), encoding="utf-8")
         if "processes" in self.samples:
             study = (folder / "study.py").read_text(encoding="utf-8")
@@ -444,7 +487,7 @@ class NewFolder:
         for kind in self.samples:
             for file, text in makers[kind]().items():
                 (folder / file).write_text(text, encoding="utf-8")
-        _write_schemas(folder)
+        _write_schemas(folder, self.like.new.schema)
         return reducer, sources
 
     def _read_me(self) -> str:
@@ -476,7 +519,6 @@ def new(
     InputError, UnknownNameError
         Something is there already, or a name or number that is not allowed.
     """
-    kinds = SAMPLES if samples == "all" else tuple(kind.strip() for kind in samples.split(",") if kind.strip())
-    place = Path(folder)
-    NewFolder(place=place, like=Likeness(preset=like, cranks=cranks, discs=discs), samples=kinds).write()
+    place, chosen = Path(folder), Likeness(preset=like, cranks=cranks, discs=discs)
+    NewFolder(place=place, like=chosen, samples=chosen.kinds(samples)).write()
     return place

@@ -28,10 +28,15 @@ class NewRows:
     """What a new folder starts from: presets, allowed counts, and the table whose zones are scaled."""
 
     presets: tuple[str, ...]  # Presets whose dimensions follow one rule, smallest first
-    cranks: tuple[int, ...]  # Counts that a folder can be made for [-]
+    cranks: tuple[int, ...]  # Counts that a folder can be made for, none where the family has no cranks [-]
     discs: tuple[int, ...]
     table: str  # Tolerance table that is scaled, and that states the clearances of its modification
     diameter: float  # Of the pin circle to which the table belongs [mm]
+    lost_motion: float  # Limit that its first study asks for [arcmin]
+    samples: tuple[str, ...]  # Kinds of samples that a folder may have
+    priced: tuple[str, str, str]  # Patterns of sources that the sample of process costs prices
+    schema: str  # Kind of its reducer files
+    stiffer: str  # Stiffness whose true value the simulated bench differs in, a field of `Stiffness`
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -124,6 +124,11 @@ RV = ReducerFamily(
         discs=(1, 2, 3),
         table="rv20e_drawing",
         diameter=104.0,
+        lost_motion=1.0,
+        samples=("costs", "processes", "cmm", "bench", "curve", "lot", "parts", "assembly"),
+        priced=("disc?.bore?.position", "crank?.journal?.eccentricity", "pin.diameter"),
+        schema="reducer",
+        stiffer="crank_disc_bearing",
     ),
 )
 """Two stages: sun and planets, then cranks, discs and pins; a further spring group is its function, record and name."""

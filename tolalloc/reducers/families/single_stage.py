@@ -274,6 +274,17 @@ SINGLE_STAGE = ReducerFamily(
     places=_places,
     axes=_axes,
     outlines=_outlines,
-    new=NewRows(presets=("cd29",), cranks=(), discs=(1, 2, 3), table="cd29_drawing", diameter=80.0),
+    new=NewRows(
+        presets=("cd29",),
+        cranks=(),
+        discs=(1, 2, 3),
+        table="cd29_drawing",
+        diameter=80.0,
+        lost_motion=3.0,
+        samples=("costs", "processes", "cmm", "bench", "curve", "lot"),
+        priced=("disc?.hole.position", "shaft.journal?.eccentricity", "pin.diameter"),
+        schema="single-stage",
+        stiffer="eccentric_bearing",
+    ),
 )
 """One stage: shaft, discs, pins of the housing and of the output."""
