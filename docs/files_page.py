@@ -9,6 +9,10 @@ from tolalloc.cli.start import KINDS, schema
 
 TITLES = {
     "reducer": ("Reducer", "`NAME.reducer.toml`: sizes, stiffness, modification and load; `tolalloc new` writes one."),
+    "single-stage": (
+        "Single-stage drive",
+        "`NAME.reducer.toml` with a table `[output_pins]`; `tolalloc new --family single-stage` writes one.",
+    ),
     "unit": ("One unit", "`NAME.unit.toml`: the part errors of one reducer, for `te` and `simulate`."),
     "stiffness": ("Identified stiffness", "`NAME.stiffness.toml`: `tolalloc identify --write` writes it."),
     "bench": ("Measurements", "`measurement.toml`: what a test bench has read, for `tolalloc identify`."),

@@ -1,4 +1,4 @@
-"""The RV reducer: one model of this package, and its own tools."""
+"""The RV reducer and the single-stage drive: one model of this package, and its own tools."""
 
 PEAK_TO_PEAK = "peak-to-peak transmission error [arcsec]"
 """Output side, one output turn, at the torque of the study."""

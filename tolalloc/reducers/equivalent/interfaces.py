@@ -180,7 +180,15 @@ GEAR_MESH = Interface(
 
 
 def lever(radius: float, direction: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle 2"]:
-    """Return the movement, per radian of its part, of a point at a radius and direction [m/rad]."""
+    """Return the movement, per radian of its part, of a point at a radius and direction [m/rad].
+
+    r·(−sin, cos) of the direction, own derivation: the derivative of the point's place.
+
+    Examples
+    --------
+    >>> lever(0.027, np.zeros(1)).tolist()  # a point to the right goes up
+    [[-0.0, 0.027]]
+    """
     return radius * np.stack([-np.sin(direction), np.cos(direction)], axis=-1)
 
 
