@@ -211,8 +211,8 @@ class ReducerModel(Model):
 
     @property
     def stated_rate(self) -> float:
-        """Of the limited outputs of a reducer whose bearings yield, on two cores [1/s]."""
-        return 500.0
+        """Of the limited outputs of a reducer whose bearings yield, on two cores, or of one with output pins [1/s]."""
+        return 100.0 if self.reducer.output_pins else 500.0
 
     @property
     def differentiable(self) -> tuple[str, ...]:

@@ -36,7 +36,7 @@ class CondensedAngles(NamedTuple):
     row_stiffness: Float[np.ndarray, "angle row"]  # Stiffness of the bilateral rows [N/m]
     # Compression x, y of every element with play, as for the rows [m/m]
     play_by_retained: Float[np.ndarray, "angle element 2 retained"]
-    play_by_load: Float[np.ndarray, "angle element 2 load"]
+    play_by_load: Float[np.ndarray, "angle load element 2"]
     play_stiffness: Float[np.ndarray, "angle element"]  # Stiffness of the elements with play [N/m]
     contact_by_disc: Float[np.ndarray, "angle disc 3 pin"]  # Pin compression per displacement of its disc [m/m]
     # Displacement x, y of a disc's pole, through which all contact normals pass, per its rotation coordinate [m/m]
@@ -189,7 +189,7 @@ def _condense_some(at: Positions) -> CondensedAngles:
         row_by_load=row @ by_load + error,
         row_stiffness=row_stiffness,
         play_by_retained=moved @ by_retained[:, np.newaxis],
-        play_by_load=moved @ by_load[:, np.newaxis] + disturbed,
+        play_by_load=np.ascontiguousarray(np.moveaxis(moved @ by_load[:, np.newaxis] + disturbed, -1, 1)),
         play_stiffness=play_stiffness,
         contact_by_disc=contact.by_disc * lever,
         pole_by_rotation=np.stack([-np.sin(direction), np.cos(direction)], axis=2),

@@ -112,8 +112,8 @@ def _add_rows(at, weight, carrier, tables, layout, values, q, adjoint, play_pull
         for i in range(q.size):
             value += tables.load[at, m, i] * adjoint[i]
         for e in range(elements):
-            value += play_pull[e, 0] * tables.play_by_load[at, e, 0, m]
-            value += play_pull[e, 1] * tables.play_by_load[at, e, 1, m]
+            value += play_pull[e, 0] * tables.play_by_load[at, m, e, 0]
+            value += play_pull[e, 1] * tables.play_by_load[at, m, e, 1]
         out[m] += weight * value
     for r in range(rows):
         # A row's adjoint compression: through the retained coordinates and, at the torque's place, through the others.

@@ -538,8 +538,8 @@ def fill_loads(at, tables, layout, values, force, undisturbed, play_offset):
             for i in range(force.size):
                 force[i] += tables.load[at, m, i] * values[m]
             for e in range(play_offset.shape[0]):
-                play_offset[e, 0] += tables.play_by_load[at, e, 0, m] * values[m]
-                play_offset[e, 1] += tables.play_by_load[at, e, 1, m] * values[m]
+                play_offset[e, 0] += tables.play_by_load[at, m, e, 0] * values[m]
+                play_offset[e, 1] += tables.play_by_load[at, m, e, 1] * values[m]
     _undisturbed(at, tables, layout, values, undisturbed)
     return rotation
 

@@ -56,16 +56,17 @@ def _give_up(turn, s):
 
 @jit
 def _one_by_one(first, stride, tables, layout, mapped, design, errors, torque, turn):
-    """Solve some samples at every ``stride``-th node, one after another."""
+    """Solve some samples at every ``stride``-th node, one after another; the tables of a node stay in the cache."""
     values = np.empty((errors.shape[0], layout.end))
     finite, memory = values_of(errors, torque, layout, mapped, values), make_memory(design.law, tables)
+    start = np.zeros((values.shape[0], turn.retained.shape[2]))
     for s in range(values.shape[0]):
         if not finite[s]:
             _give_up(turn, s)
-            continue
-        start = np.zeros(turn.retained.shape[2])
-        for angle in range(turn.rotation.shape[1]):
-            _alone(s, angle, first + angle * stride, tables, layout, design, values, start, memory, turn)
+    for angle in range(turn.rotation.shape[1]):
+        for s in range(values.shape[0]):
+            if finite[s]:
+                _alone(s, angle, first + angle * stride, tables, layout, design, values, start[s], memory, turn)
 
 
 @jit
