@@ -336,7 +336,7 @@ study = ta.Study(
     ta.drawing("zones.xlsx"),
     limits={{
         ta.PEAK_TO_PEAK: ta.Limit(upper={limit:g}, show=ta.AtYield(target=0.9973)),
-        ta.LOST_MOTION: ta.Limit(upper={lost_motion:g}),
+        ta.LOST_MOTION: ta.Limit(upper={lost_motion}),
     }},
     questions=[ta.Ranking(), ta.Allocation()],
     name="{name}",

@@ -94,7 +94,7 @@ class Steps:
     @property
     def played_meshes(self) -> int:
         """Number of meshes with play; they are the first elements of all that can have play [-]."""
-        return self.reducer.crank_count if self.reducer.clearances.gear_mesh else 0
+        return self.reducer.crank_count if self.reducer.clearance_of("gear_mesh") else 0
 
     @property
     def sun_base_radius(self) -> float:

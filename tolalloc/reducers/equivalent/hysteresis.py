@@ -526,7 +526,7 @@ def _mesh_force(solved: Solved) -> Float[np.ndarray, "sample angle mesh"]:
 def _mesh_way(solved: Solved) -> Float[np.ndarray, "sample angle mesh"]:
     """Return how far every mesh yields, its nominal clearance included [m]."""
     reducer, force = solved.equilibria.reducer, _mesh_force(solved)
-    return np.asarray(force / reducer.stiffness.gear_mesh + np.sign(force) * reducer.clearances.gear_mesh)
+    return np.asarray(force / reducer.stiffness.gear_mesh + np.sign(force) * reducer.clearance_of("gear_mesh"))
 
 
 _PLACES = {

@@ -155,7 +155,7 @@ def gear_mesh(at: Positions) -> SpringGroup:
         columns=names,
         stiffness=np.full((angles, cranks), reducer.stiffness.gear_mesh),
     )
-    return with_play(group, reducer.clearances.gear_mesh, tuple(f"mesh{crank + 1}" for crank in range(cranks)))
+    return with_play(group, reducer.clearance_of("gear_mesh"), tuple(f"mesh{crank + 1}" for crank in range(cranks)))
 
 
 GEAR_MESH = Interface(
@@ -254,7 +254,7 @@ def crank_disc(at: Positions) -> SpringGroup:
         stiffness=np.full((angles, 2 * len(pairs)), reducer.stiffness.crank_disc_bearing),
     )
     journals = tuple(f"crank{crank + 1}.journal{disc + 1}" for crank, disc in pairs)
-    return with_play(group, reducer.clearances.crank_disc_bearing, journals)
+    return with_play(group, reducer.clearance_of("crank_disc_bearing"), journals)
 
 
 CRANK_DISC = Interface(
@@ -349,7 +349,7 @@ def crank_carrier(at: Positions) -> SpringGroup:
         stiffness=np.full((angles, 2 * cranks), reducer.stiffness.crank_carrier_bearing),
     )
     bores = tuple(f"carrier.bore{crank + 1}" for crank in range(cranks))
-    return with_play(group, reducer.clearances.crank_carrier_bearing, bores)
+    return with_play(group, reducer.clearance_of("crank_carrier_bearing"), bores)
 
 
 CRANK_CARRIER = Interface(
@@ -390,7 +390,7 @@ def carrier_support(at: Positions) -> SpringGroup:
         columns=vector_columns("carrier.assembly"),
         stiffness=np.full((angles, 2), at.reducer.stiffness.carrier_bearing),
     )
-    return with_play(group, at.reducer.clearances.carrier_bearing, ("carrier",))
+    return with_play(group, at.reducer.clearance_of("carrier_bearing"), ("carrier",))
 
 
 CARRIER_SUPPORT = Interface(

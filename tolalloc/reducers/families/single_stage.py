@@ -100,7 +100,7 @@ def eccentric_bearing(at: Positions) -> SpringGroup:
         stiffness=np.full((angles, 2 * discs), reducer.stiffness.eccentric_bearing),
     )
     journals = tuple(f"shaft.journal{disc + 1}" for disc in range(discs))
-    return with_play(group, reducer.clearances.eccentric_bearing, journals)
+    return with_play(group, reducer.clearance_of("eccentric_bearing"), journals)
 
 
 ECCENTRIC_BEARING = Interface(

@@ -202,7 +202,14 @@ class Clearances:
         float, Field(alias="crank_carrier_bearing_um", ge=0, le=200), times(MICROMETRE)
     ] = 0.0
     carrier_bearing: Annotated[float, Field(alias="carrier_bearing_um", ge=0, le=200), times(MICROMETRE)] = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class SingleStageClearances:
+    """Nominal radial clearances of the bearings of a single stage, half the diametral ones; table ``[clearances]``."""
+
     eccentric_bearing: Annotated[float, Field(alias="eccentric_bearing_um", ge=0, le=200), times(MICROMETRE)] = 0.0
+    carrier_bearing: Annotated[float, Field(alias="carrier_bearing_um", ge=0, le=200), times(MICROMETRE)] = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -241,7 +248,7 @@ class Reducer:
     stiffness: Stiffness
     modification: Modification
     load: Load
-    clearances: Clearances = field(default_factory=Clearances)
+    clearances: Clearances | SingleStageClearances = field(default_factory=Clearances)
     # Parts that yield in series, of the interfaces whose stiffness follows from dimensions
     parts: tuple[Part, ...] = ()
     friction: Friction = field(default_factory=Friction)
@@ -284,6 +291,10 @@ class Reducer:
         if self.output_pins is None:
             raise InputError(f"reducer {self.name}: an RV reducer has no output pins; this needs a single stage.")
         return self.output_pins
+
+    def clearance_of(self, interface: str) -> float:
+        """Return the nominal clearance of an interface, named as in `Stiffness`, 0 where there is none [m]."""
+        return float(getattr(self.clearances, interface, 0.0))
 
     @property
     def drive_count(self) -> int:

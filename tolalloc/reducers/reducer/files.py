@@ -38,6 +38,7 @@ from tolalloc.reducers.reducer.design import (
     Modification,
     OutputPins,
     Reducer,
+    SingleStageClearances,
     at_torque,
 )
 from tolalloc.reducers.reducer.idle_torque import IdleTorque
@@ -372,7 +373,6 @@ class _AnyReducerRecord(Record):
     pin_material: Material | None = None
     modification: ModificationRecord
     load: Load
-    clearances: Clearances = Clearances()
     friction: Friction = Friction()
     catalogue: Catalogue | None = None
     assumptions: tuple[str, ...] = ()
@@ -394,18 +394,29 @@ class _AnyReducerRecord(Record):
                 rotation=grinding.rotation_urad,
             ),
             "load": self.load,
-            "clearances": self.clearances,
             "friction": self.friction,
             "catalogue": self.catalogue,
             "assumptions": self.assumptions,
         }
 
-    def _require_clearances(self, *foreign: str) -> None:
-        """Raise where a clearance is stated of an interface that the family does not have."""
-        for name in foreign:
-            if getattr(self.clearances, name):
-                own = ", ".join(f"{other}_um" for other in vars(self.clearances) if other not in foreign)
-                raise ValueError(f"clearances.{name}_um is stated; allowed is one of {own}")
+    def _require_catalogue(self, reducer: Reducer) -> None:
+        """Raise where a catalogue states a rigidity that no reducer has, or no room for seals and grease."""
+        if self.catalogue is None:
+            return
+        rated, stated = self.load.rated_torque, self.catalogue.torsional_rigidity * ARCMINUTE
+        least, most = rated / _LARGEST_TWIST, rated / _SMALLEST_TWIST
+        if not least <= stated <= most:
+            raise ValueError(
+                f"catalogue.torsional_rigidity_nm_per_arcmin is {stated:g}; allowed is {least:.3g} to {most:.3g}, "
+                f"a twist of {_SMALLEST_TWIST:g} to {_LARGEST_TWIST:g} arcmin under the rated {rated:g} N·m"
+            )
+        # Seals, grease and preload alone must leave something of what turns the reducer without load.
+        taken, allowed = IdleTorque.of(reducer).together, self.catalogue.no_load_torque
+        if allowed is not None and allowed <= taken:
+            raise ValueError(
+                f"catalogue.no_load_torque_nm is {allowed:g}; allowed is more than {taken:.3g}, which seals, grease and "
+                "preloaded rollers take; friction.seals_nm and friction.grease_nm state what they are known to take"
+            )
 
 
 class SingleStageRecord(_AnyReducerRecord):
@@ -413,10 +424,10 @@ class SingleStageRecord(_AnyReducerRecord):
 
     output_pins: OutputPins
     stiffness: SingleStageStiffnessRecord
+    clearances: SingleStageClearances = SingleStageClearances()
 
     @model_validator(mode="after")
     def _holds_together(self) -> SingleStageRecord:
-        self._require_clearances("gear_mesh", "crank_disc_bearing", "crank_carrier_bearing")
         pins, eccentricity = self.output_pins, self.cycloid_stage.eccentricity
         smallest = pins.pin_radius + eccentricity
         if not smallest <= pins.hole_radius <= smallest + _LARGEST_GAP:
@@ -431,6 +442,7 @@ class SingleStageRecord(_AnyReducerRecord):
                 f"output_pins.hole_radius_mm is {pins.hole_radius / MILLIMETRE:g}; allowed is below "
                 f"{room / MILLIMETRE:.4g}, where holes meet each other or the teeth"
             )
+        self._require_catalogue(self.reducer())
         return self
 
     def reducer(self) -> Reducer:
@@ -442,6 +454,7 @@ class SingleStageRecord(_AnyReducerRecord):
             output_pins=self.output_pins,
             stiffness=stiffness,
             friction_dimensions=SingleStageFriction(),
+            clearances=self.clearances,
             **stated,
         )
 
@@ -456,30 +469,12 @@ class ReducerRecord(_AnyReducerRecord):
     crank_count: Annotated[int, Field(ge=2, le=6)]
     first_stage: FirstStage
     stiffness: StiffnessRecord
+    clearances: Clearances = Clearances()
 
     @model_validator(mode="after")
     def _holds_together(self) -> ReducerRecord:
-        self._require_clearances("eccentric_bearing")
-        self.reducer()
-        if self.catalogue:
-            rated, stated = self.load.rated_torque, self.catalogue.torsional_rigidity * ARCMINUTE
-            least, most = rated / _LARGEST_TWIST, rated / _SMALLEST_TWIST
-            if not least <= stated <= most:
-                raise ValueError(
-                    f"catalogue.torsional_rigidity_nm_per_arcmin is {stated:g}; allowed is {least:.3g} to {most:.3g}, "
-                    f"a twist of {_SMALLEST_TWIST:g} to {_LARGEST_TWIST:g} arcmin under the rated {rated:g} N·m"
-                )
-            self._require_room_for_idle(self.catalogue.no_load_torque)
+        self._require_catalogue(self.reducer())
         return self
-
-    def _require_room_for_idle(self, stated: float | None) -> None:
-        """Raise where seals, grease and preload alone take what the catalogue allows without load."""
-        taken = IdleTorque.of(self.reducer()).together
-        if stated is not None and stated <= taken:
-            raise ValueError(
-                f"catalogue.no_load_torque_nm is {stated:g}; allowed is more than {taken:.3g}, which seals, grease and "
-                "preloaded rollers take; friction.seals_nm and friction.grease_nm state what they are known to take"
-            )
 
     def reducer(self) -> Reducer:
         """Return the reducer in SI units."""
@@ -498,7 +493,7 @@ class ReducerRecord(_AnyReducerRecord):
         """Return the clearances, those of bearings that are given by their dimensions included."""
         own: dict[str, float] = {}
         for name in vars(self.clearances):
-            bearing = getattr(self.stiffness, name, None)
+            bearing = getattr(self.stiffness, name)
             if isinstance(bearing, RollingBearing) and bearing.play:
                 if getattr(self.clearances, name):
                     raise ValueError(f"clearances.{name}_um is given twice: the bearing in [stiffness] has one too")
