@@ -66,7 +66,9 @@ def fits(value: object, own: dict, whole: dict) -> bool:
 
 @pytest.mark.parametrize(("kind", "path"), [(kind, path) for kind, own in SHIPPED.items() for path in own])
 def test_every_shipped_file_is_what_the_schema_allows(kind, path):
-    assert fits(tomllib.loads(path.read_text(encoding="utf-8")), schema(kind), schema(kind))
+    content = tomllib.loads(path.read_text(encoding="utf-8"))
+    own = "single-stage" if "output_pins" in content else kind
+    assert fits(content, schema(own), schema(own))
 
 
 def test_a_new_folder_names_schemas_that_its_files_fit(tmp_path):

@@ -414,8 +414,8 @@ class _AnyReducerRecord(Record):
         taken, allowed = IdleTorque.of(reducer).together, self.catalogue.no_load_torque
         if allowed is not None and allowed <= taken:
             raise ValueError(
-                f"catalogue.no_load_torque_nm is {allowed:g}; allowed is more than {taken:.3g}, which seals, grease and "
-                "preloaded rollers take; friction.seals_nm and friction.grease_nm state what they are known to take"
+                f"catalogue.no_load_torque_nm is {allowed:g}; allowed is more than {taken:.3g}, which seals, grease "
+                "and preloaded rollers take; friction.seals_nm and friction.grease_nm state what they are known to take"
             )
 
 
