@@ -16,7 +16,7 @@ from tolalloc.allocation.cost.process_costs import load_process_costs
 from tolalloc.assembly.files import load_errors, load_plan
 from tolalloc.bench.measurements import load_measurements
 from tolalloc.cli.main import EXAMPLES, app
-from tolalloc.cli.samples import FACTOR, STIFFER
+from tolalloc.cli.samples import FACTOR
 from tolalloc.cli.start import modification_of
 from tolalloc.drawings.drawing import load_drawing
 from tolalloc.reading.units import ARCSECOND
@@ -139,7 +139,7 @@ def test_the_simulated_bench_gives_back_what_it_was_simulated_with(tmp_path):
     given = load_reducer(tmp_path / "mine" / "reducer.toml").stiffness.crank_disc_bearing
     identified = json.loads(found.stdout)["parameters"][0]
     least, most = identified["interval"]
-    assert identified["name"] == STIFFER
+    assert identified["name"] == RV.new.stiffer
     assert given < least < FACTOR * given < most
 
 
