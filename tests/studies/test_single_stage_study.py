@@ -1,0 +1,101 @@
+"""A single-stage drive through whole commands: a new folder, its ranking and allocation, report, drawing and page."""
+
+from __future__ import annotations
+
+import openpyxl
+import pytest
+
+import tolalloc as ta
+from tests.studies.command import tolalloc
+from tolalloc.reducers.scene import scene_of
+from tolalloc.reports.moving_picture import draw_still
+from tolalloc.reports.scene_record import scene_record
+
+SMALL = ta.Effort(
+    allocation=ta.AllocationEffort(
+        verification_units=256, confirmation_units=2**11, share_blocks=8, search=ta.SearchEffort(steps=2)
+    ),
+    ranking=ta.RankingEffort(sobol=ta.SobolEffort(start=8, limit=8)),
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    place = tmp_path_factory.mktemp("new") / "mine"
+    said = tolalloc("new", place, "--family", "single-stage", "--discs", "1").stdout
+    assert "8 output pins and 1 discs, like cd29" in said
+    return place
+
+
+@pytest.fixture(scope="module")
+def drive(folder):
+    return ta.reducer(folder / "reducer.toml", flank_clearance=(1.0, 12.0), radial_clearance=(5.0, 30.0))
+
+
+@pytest.mark.slow
+def test_a_study_is_ranked_allocated_and_drawn(folder, drive, tmp_path):
+    study = ta.Study(
+        drive,
+        ta.drawing(folder / "zones.csv"),
+        limits={ta.PEAK_TO_PEAK: ta.Limit(upper=110.0, show=ta.AtYield(0.95))},
+        questions=[ta.Allocation(front=False, what_if=False), ta.Ranking()],
+        name="drive",
+        effort=SMALL,
+    )
+    run = study.run(tmp_path / "run")
+    assert run.answers["allocation"].result.met
+    ranked = run.answers["ranking"].result.sobol.sources
+    assert {"output.pin.position", "disc1.hole.position", "shaft.assembly"} <= set(ranked)
+    page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    for wrong in ("planet", "crankshaft", "sun gear"):
+        assert wrong not in page.split("<script")[0]
+    sheets = openpyxl.load_workbook(tmp_path / "run" / "drawing.xlsx")
+    cells = {str(cell.value) for sheet in sheets for row in sheet.iter_rows() for cell in row}
+    assert any("disc1.hole.position" in cell for cell in cells)
+    again = ta.drawing(tmp_path / "run" / "allocation.csv")
+    assert {own.name for own in again.sources} >= {"output.pin.radius", "disc1.hole.radius"}
+
+
+def test_one_turn_says_its_orders_and_forces(folder, tmp_path):
+    found = tolalloc("te", "--reducer", folder / "reducer.toml", "--attribute", "--out", tmp_path / "te").stdout
+    assert "arcsec" in found
+    answer = ta.te(reducer=folder / "reducer.toml")
+    names = [own["name"] for own in answer.summary["outputs"]]
+    assert "largest output pin force" in names
+    assert "largest mesh force" not in names
+
+
+def test_a_picture_shows_holes_and_output_pins(drive):
+    model = ta.te(reducer="cd29").result.model
+    scene = scene_of(model, ta.te(reducer="cd29").result.errors[0], -20.0)
+    record = scene_record(scene)
+    assert record["outline"]["output_pin_count"] == 8
+    canvas = draw_still(record, {})
+    assert [axes.get_title() for axes in canvas.axes] == [
+        "disc 1 on the pins",
+        "disc 2 on the pins",
+        "output and input shaft",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("--family", "single-stage", "--like", "rv20e"), "preset of the family single-stage 'rv20e' is not known"),
+        (("--family", "harmonic"), "family 'harmonic' is not known; known are rv, single-stage"),
+        (("--like", "cd29", "--cranks", "2"), "cranks is 2; allowed is nothing: a single stage has none"),
+        (("--like", "cd29", "--with", "assembly"), "sample 'assembly' is not known"),
+    ],
+)
+def test_what_no_folder_can_be_made_of_is_refused_in_one_sentence(tmp_path, arguments, says):
+    done = tolalloc("new", tmp_path / "other", *arguments)
+    assert done.returncode == 2
+    assert says in done.stderr
+    assert not (tmp_path / "other").exists()
+
+
+def test_commands_that_only_an_rv_reducer_knows_say_so(folder, tmp_path):
+    for asked in (("simulate", "--reducer", folder / "reducer.toml"), ("mount", "parts.csv", "--reducer", "cd29")):
+        done = tolalloc(*asked)
+        assert done.returncode == 2
+        assert "Traceback" not in done.stderr
