@@ -32,7 +32,7 @@ from tolalloc.reducers.unit_file import BuiltUnit
 class TransmissionErrorResult:
     """One unit under one torque."""
 
-    reducer: Reducer  # Nominal design, as given
+    reducer: Reducer  # Nominal design, as given, with the measured form of the unit's parts
     unit: BuiltUnit  # Its errors
     torque: float  # Torque on the carrier; negative resists the rotation [N·m]
     equilibria: Equilibria  # At equally spaced angles of one output turn
@@ -99,6 +99,7 @@ def transmission_error(
     >>> round(float(found.extremes.peak_to_peak[0]) * 206264.8, 1)  # [arcsec]
     96.6
     """
+    reducer = unit.as_built(reducer)
     model = EquivalentModel(at_torque(reducer, torque), orders=unit.orders or HARMONICS)
     errors = unit.errors(model.columns, reducer.modification.deviations)
     equilibria, extremes = model.equilibria(errors, torque), model.exact_extremes(errors, torque)

@@ -33,11 +33,11 @@ class Layout(NamedTuple):
     clearance: int  # Clearance of every element with play [-]
     flank: int  # δ·r_d, by which the flanks of all discs are turned towards the middles of their teeth [-]
     pin: int  # Radial, tangential and radius deviation of every pin [-]
-    wave: int  # Of each disc: harmonic amplitudes of pitch, then run-out [-]
+    wave: int  # Of each disc: harmonic amplitudes of pitch, then run-out, then how often its form counts [-]
     tooth: int  # Pitch, then run-out of single teeth [-]
     tilt: int  # Tilt x, y [-]
     end: int  # Number of values [-]
-    # Pins, harmonic amplitudes and teeth of one disc [-]
+    # Pins, waves and teeth of one disc [-]
     pins: int
     waves: int
     teeth: int
@@ -80,7 +80,8 @@ def columns_of(reducer: Reducer, groups: Sequence[SpringGroup], orders: tuple[in
     entries = [(at, at, 1.0) for at in names.values()]
     played = [group for group in groups if group.contact == "play"]
     discs, pins, teeth = reducer.disc_count, reducer.cycloid_stage.pin_count, reducer.cycloid_stage.disc_teeth
-    waves, torque = 4 * len(orders), len(names)
+    form = int(reducer.form is not None)
+    waves, torque = 4 * len(orders) + form, len(names)
     clearance = torque + 1
     flank = clearance + sum(len(group.clearance_columns) for group in played)
     pin = flank + 1
@@ -102,6 +103,8 @@ def columns_of(reducer: Reducer, groups: Sequence[SpringGroup], orders: tuple[in
         if LAWS[reducer.stiffness.pin_contact_law] == LINEAR:
             add(tilt + disc * 2, tilt_terms(disc))
     nominal, element = np.zeros(layout.end), clearance
+    if form:
+        nominal[wave + waves - 1 : tooth : waves] = 1.0  # once on every disc, whatever the errors are
     for group in played:
         add(element, {name: [(at, 1.0)] for at, name in enumerate(group.clearance_columns)})
         nominal[element : element + len(group.clearance_columns)] = group.clearance
