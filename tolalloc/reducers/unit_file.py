@@ -12,13 +12,13 @@ from dataclasses import dataclass, field, replace
 from io import StringIO
 from math import cos, isfinite, radians, sin
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import Field
+from pydantic import Field, StrictBool
 
-from tolalloc.drawings.sources import is_angular, neglected_columns
+from tolalloc.drawings.sources import Source, is_angular, neglected_columns
 from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.files import Record, no_formula, read_toml, shipped_or_path, validated, write_new
@@ -44,9 +44,10 @@ class ProfileRecord(Record):
 
     file: str
     datum_deg: Degrees = 0.0
-    aligned: bool = False
-    from_drawing: bool = False
+    aligned: StrictBool = False
+    from_drawing: StrictBool = False
     spans: Annotated[int, Field(ge=0, le=1000)] = 0
+    across: Literal["mean", "highest"] = "mean"
 
 
 class UnitRecord(Record):
@@ -106,6 +107,14 @@ class BuiltUnit:
         rounds = {pins[name]: own for name, own in self.roundness.items()}
         form = replace(form, discs=tuple(sorted(discs.items())), pins=tuple(sorted(rounds.items())))
         return replace(reducer, form=form, assumptions=tuple(assumptions))
+
+    def without_measured(self, sources: Iterable[Source]) -> tuple[Source, ...]:
+        """Return sources of a drawing without a zone where a measured profile holds what they let vary."""
+        held = [_columns_in_profile(disc) for disc in self.profiles]
+        return tuple(
+            replace(source, zone=0.0, systematic=()) if any(own.match(f"{source.name}.") for own in held) else source
+            for source in sources
+        )
 
     def require_no_form(self, place: str) -> None:
         """Raise if the unit states profiles or roundness where units share one model.
@@ -227,6 +236,7 @@ def _profile(folder: Path, record: ProfileRecord) -> MeasuredProfile:
         aligned=record.aligned,
         from_drawing=record.from_drawing,
         spans=record.spans,
+        across=record.across,
     )
 
 

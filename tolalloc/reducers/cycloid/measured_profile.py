@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import pi
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Complex, Float
@@ -16,7 +17,7 @@ from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.clearance import removed
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile, nearest_angles, normals, path_of
 from tolalloc.reducers.reducer.design import CycloidStage
-from tolalloc.reducers.reducer.form import FlankForm, flank_form, read_deviations
+from tolalloc.reducers.reducer.form import FlankForm, flank_form, read_profile
 
 _DENSE = 256  # places of a tooth among which the one nearest to a point is looked for first
 _MOVES = 30  # rigid movements until they no longer change
@@ -59,6 +60,9 @@ class MeasuredProfile:
         Whether deviations are from the profile of the drawing and not from the theoretical one.
     spans
         Spans of a smoothing spline in each space; 0 goes through all points [-].
+    across
+        What a plane model takes of sections along the width, a column ``z [mm]`` of their heights: their ``mean``,
+        which is right where the whole width carries, or the ``highest`` of them at every φ, which carries first.
     """
 
     path: Path
@@ -66,6 +70,7 @@ class MeasuredProfile:
     aligned: bool = False
     from_drawing: bool = False
     spans: int = 0
+    across: Literal["mean", "highest"] = "mean"
 
     @cached_property
     def columns(self) -> tuple[str, ...]:
@@ -98,7 +103,7 @@ class MeasuredProfile:
             The file, column, row and value that are not allowed, or points that do not lie on such a disc.
         """
         stage, moved = drawn.stage, None
-        _, found = read_deviations(self.path, self.columns)
+        found = read_profile(self.path, self.columns, ("z",))
         if "space" in found:
             angle, deviation = _around(stage, self.path, found["space"], found["phi"]), found["deviation"]
         else:
@@ -108,12 +113,33 @@ class MeasuredProfile:
             if self.aligned:
                 place, moved = aligned(stage, place, str(self.path))
             angle, deviation = normal_deviations(stage, place, str(self.path))
-        form = flank_form(angle, deviation, stage.disc_teeth, self.spans, f"{self.path}, profile of disc {number}")
+        height, section = np.unique(found.get("z", np.zeros_like(angle)), return_inverse=True)
+        place_of = f"{self.path}, profile of disc {number}"
+        form = self._plane(
+            height,
+            [
+                flank_form(angle[own], deviation[own], stage.disc_teeth, self.spans, place_of)
+                for own in (section == at for at in range(height.size))
+            ],
+        )
         if self.from_drawing:
             return form, moved
         # On the flank of negative φ the drawing's profile is the mirror image.
         folded = np.abs(np.remainder(np.array(form.angle) + pi, 2 * pi) - pi)
-        return form.minus(-removed(drawn, folded)), moved
+        beyond = np.array(form.deviation) + removed(drawn, folded)
+        return replace(form, deviation=tuple(beyond.tolist())), moved
+
+    def _plane(self, height: Float[np.ndarray, " section"], sections: list[FlankForm]) -> FlankForm:
+        """Return the one form that a plane model takes of sections at heights [m]."""
+        if len(sections) == 1:
+            return sections[0]
+        base = max(sections, key=lambda section: len(section.angle))
+        own = np.stack([section.at(np.array(base.angle)) for section in sections])
+        if self.across == "highest":
+            found = own.max(axis=0)
+        else:
+            found = np.trapezoid(own, height, axis=0) / (height[-1] - height[0])
+        return replace(base, deviation=tuple(found.tolist()))
 
 
 _KINDS = (("direction", "radius"), ("x", "y"), ("space", "phi", "deviation"))

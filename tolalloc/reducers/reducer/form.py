@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
+from tolalloc.drawings.table_file import plain_number, read_text_table, split_header
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
 
@@ -77,11 +77,6 @@ class FlankForm:
         start = 0.0 if self.spans else self.angle[0]
         return np.asarray(self._spline(np.where(inside < start, inside + self.period, inside)))
 
-    def minus(self, others: Float[np.ndarray, " point"]) -> FlankForm:
-        """Return the form whose points stand out by less [m]."""
-        left = np.array(self.deviation) - others
-        return FlankForm(spaces=self.spaces, angle=self.angle, deviation=tuple(left.tolist()), spans=self.spans)
-
 
 def flank_form(
     angle: Float[np.ndarray, " point"], deviation: Float[np.ndarray, " point"], spaces: int, spans: int, place: str
@@ -115,7 +110,7 @@ def flank_form(
     gap = float(np.diff(np.append(inside, inside[0] + period)).max())
     apart = float(f"{gap / DEGREE:.3g}")
     if gap > WIDEST_GAP:
-        allowed = f"up to {WIDEST_GAP / DEGREE:g}"
+        allowed = f"up to {WIDEST_GAP / DEGREE:g} all around"
         raise InputError.at(place, "largest distance in φ of neighbouring points [deg]", apart, allowed)
     if spans and 2 * pi / spans < gap:
         allowed = f"0, or 1 to {int(2 * pi / gap)} where neighbouring points are up to {apart}° of φ apart"
@@ -155,6 +150,11 @@ class Form:
     discs: tuple[tuple[int, FlankForm], ...] = ()
     pins: tuple[tuple[int, PinForm], ...] = ()
 
+    @property
+    def is_measured(self) -> bool:
+        """Whether single discs or pins have a form of their own, so that no two are alike."""
+        return bool(self.discs or self.pins)
+
     def of_flank(self, disc: int, angle: Float[np.ndarray, "*angles"]) -> Float[np.ndarray, "*angles"]:
         """Return how far the flanks of a disc stand out at angles φ that go on around it [m]."""
         found = np.zeros_like(angle)
@@ -171,8 +171,12 @@ class Form:
         return found
 
 
-def read_deviations(path: Path, columns: Sequence[str]) -> tuple[TextTable, Mapping[str, Float[np.ndarray, " point"]]]:
+def read_profile(
+    path: Path, columns: Sequence[str], may: Sequence[str] = ()
+) -> Mapping[str, Float[np.ndarray, " point"]]:
     """Return a table of numbers by its columns: angles in rad, lengths in m, numbers without a unit as they are.
+
+    Other columns may stand there, but need not.
 
     Raises
     ------
@@ -182,8 +186,9 @@ def read_deviations(path: Path, columns: Sequence[str]) -> tuple[TextTable, Mapp
     table = read_text_table(path)
     stated = [split_header(header) for header in table.headers]
     names = [name for name, _ in stated]
-    if sorted(names) != sorted(columns):
-        raise InputError.at(path, "columns", ", ".join(names), ", ".join(columns))
+    if sorted(name for name in names if name not in may) != sorted(columns) or len({*names}) < len(names):
+        asked = ", ".join(columns) + "".join(f", and {name} if there is one" for name in may)
+        raise InputError.at(path, "columns", ", ".join(names), asked)
     factors = []
     for name, unit in stated:
         allowed = _UNITS[name]
@@ -199,7 +204,7 @@ def read_deviations(path: Path, columns: Sequence[str]) -> tuple[TextTable, Mapp
                 values[at, column] = np.nan
             if not np.isfinite(values[at, column]):
                 raise InputError.at(f"{path}, row {row}", name, cells[column], "a number")
-    return table, dict(zip(names, (values * factors).T, strict=True))
+    return dict(zip(names, (values * factors).T, strict=True))
 
 
 _ANGLE: Mapping[str, float] = {"deg": DEGREE, "°": DEGREE}
@@ -212,6 +217,7 @@ _UNITS: Mapping[str, Mapping[str, float]] = {
     "radius": _LENGTH,
     "x": _LENGTH,
     "y": _LENGTH,
+    "z": _LENGTH,
 }
 """Column of a profile file → its units and their factors to SI."""
 
@@ -226,7 +232,7 @@ def load_designed(path: Path) -> FlankForm:
     InputError
         The file, column, row and value that are not allowed.
     """
-    _, found = read_deviations(path, ("phi", "deviation"))
+    found = read_profile(path, ("phi", "deviation"))
     angle, deviation = found["phi"], found["deviation"]
     if angle.min() < 0 or angle.max() > pi + _CLOSE:
         beyond = angle.min() if angle.min() < 0 else angle.max()
