@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from builders import refusal
 
+from tolalloc.bench.sources import has_half_turn
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.cycloid.clearance import clearance_of, linear_clearance
@@ -21,10 +22,13 @@ from tolalloc.reducers.equivalent.interfaces import pin_contact
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import radial_clearance
 from tolalloc.reducers.equivalent.springs import Positions
+from tolalloc.reducers.modification import ModificationRequest, choose
 from tolalloc.reducers.reducer.design import Modification, Reducer
-from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.reducer.files import PRESETS, load_reducer, write_modified
 from tolalloc.reducers.reducer.form import FlankForm, Form, PinForm, flank_form, load_designed
+from tolalloc.reducers.transmission_error import transmission_error
 from tolalloc.reducers.unit_file import BuiltUnit, load_unit
+from tolalloc.study.inquiries.diagnose import Diagnose
 
 AMOUNTS = Modification(equidistant=-8.16e-6, shift=-16.16e-6)
 NONE = Modification(equidistant=0.0, shift=0.0)
@@ -396,3 +400,48 @@ def test_a_reducer_file_names_a_free_profile(reducer, tmp_path):
     assert "row 2: deviation is 'nan'; allowed is a number" in refusal(
         load_designed, write(tmp_path / "nan.csv", rows * np.nan, "deviation [µm],phi [deg]")
     )
+
+
+def test_a_reducer_file_with_a_profile_is_read_written_again_and_not_modified(tmp_path):
+    text = (PRESETS / "rv20e.reducer.toml").read_text()
+    (tmp_path / "own.toml").write_text(text.replace("equidistant_um", 'profile = "flank.csv"\nequidistant_um', 1))
+    rows = np.array([(angle, 2.0 * np.sin(np.radians(angle)) ** 2 - 2.0) for angle in range(0, 181, 5)])
+    write(tmp_path / "flank.csv", rows, "phi [deg],deviation [µm]")
+    design = load_reducer(tmp_path / "own.toml")
+    assert design.form.designed.at(np.array([np.pi / 2])) == pytest.approx([0.0], abs=1e-12)
+    plain = contact_amounts(load_reducer("rv20e"))
+    assert contact_amounts(design) == pytest.approx((plain[0], plain[1] + 2e-6), abs=1e-10)
+    (tmp_path / "elsewhere").mkdir()
+    write_modified(tmp_path / "own.toml", AMOUNTS, tmp_path / "elsewhere" / "new.toml")
+    again = load_reducer(tmp_path / "elsewhere" / "new.toml")
+    assert (again.form, again.modification.shift) == (design.form, pytest.approx(AMOUNTS.shift))
+    with pytest.raises(InputError, match="profile is 'a free form'; allowed is none"):
+        choose(ModificationRequest(), design, -167.0)
+
+
+def contact_amounts(reducer: Reducer) -> tuple[float, float]:
+    """Return the clearances on the flank at 90° and at tip and root [m]."""
+    found = clearance_of(ToothProfile.of(reducer))
+    return float(found.before[360]), found.radial
+
+
+def test_the_perfect_reducer_beside_a_measured_unit_has_no_form(reducer, tmp_path):
+    write(tmp_path / "disc2.csv", disc_points(reducer, reducer.modification))
+    found, exact = (
+        transmission_error(reducer, unit, -1.0) for unit in (built_unit(tmp_path), replace(load_unit("exact")))
+    )
+    assert found.loop.lost_motion[1:] == pytest.approx(exact.loop.lost_motion[1:], rel=1e-12)
+    assert found.rated_pin_force == exact.rated_pin_force
+    assert found.loop.lost_motion[0] != exact.loop.lost_motion[0]
+
+
+def test_a_diagnosis_takes_a_measured_profile_for_known(reducer, tmp_path):
+    write(tmp_path / "disc2.csv", disc_points(reducer, reducer.modification))
+    built_unit(tmp_path)
+    asked = {"curve": tmp_path / "curve.csv", "reducer": "rv20e_liu2020", "tolerances": "rv20e_table4"}
+    plain, known = (Diagnose(**asked, form=form).prepare() for form in ("", str(tmp_path / "unit7.toml")))
+    gone = {*(own.name for own in plain.errors.active)} - {*(own.name for own in known.errors.active)}
+    assert gone == {"disc2.pitch", "disc2.runout"}
+    assert known.reducer.form.discs[0][0] == 1
+    assert has_half_turn(plain.reducer, plain.errors.columns)
+    assert not has_half_turn(known.reducer, plain.errors.columns)

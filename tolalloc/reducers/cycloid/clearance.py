@@ -76,6 +76,8 @@ def linear_clearance(
 def removed(profile: ToothProfile, pin_angle: Angles) -> Float[np.ndarray, "*angles"]:
     """Return the material that a drawing's profile removes, `linear_clearance` less a free form, theory page (83) [m].
 
+    Own derivation, first order in amounts and form.
+
     Examples
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer

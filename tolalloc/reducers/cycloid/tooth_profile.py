@@ -314,7 +314,7 @@ def path_of(
     """Return the path of the grinding pin's centre on the disc and its first two derivatives by φ, x + iy [m].
 
     The normal into the disc is the direction of its derivative, turned by −90°: theory page (34) for many modifications
-    at once, where `ToothProfile` is one.
+    at once, where `ToothProfile` is one; own derivation.
 
     Examples
     --------

@@ -31,6 +31,7 @@ from tolalloc.reducers.equivalent.solvers.records import (
 )
 from tolalloc.reducers.equivalent.springs import HARMONICS
 from tolalloc.reducers.reducer.design import Reducer, at_torque
+from tolalloc.reducers.reducer.form import Form
 
 
 class Status(IntEnum):
@@ -141,6 +142,10 @@ class EquivalentModel:
     def at_torque(self, torque: float) -> EquivalentModel:
         """Return the model with the stiffness that the reducer's parts have under a torque on the carrier [N·m]."""
         return replace(self, reducer=at_torque(self.reducer, torque)) if self.reducer.parts else self
+
+    def with_form(self, form: Form | None) -> EquivalentModel:
+        """Return the model of parts with another form of flanks and pins, of perfect ones if it is none."""
+        return self if form == self.reducer.form else replace(self, reducer=replace(self.reducer, form=form))
 
     @cached_property
     def error_columns(self) -> Columns:

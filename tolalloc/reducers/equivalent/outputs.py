@@ -269,8 +269,8 @@ def radial_clearance_derivatives(
             by_value[rows, layout.pin + kind * layout.pins + pin] = -factor
         waves = own.by_tooth[:, place, np.newaxis] * own.waves[place]
         first, single = layout.wave + at * layout.waves, layout.tooth + at * 2 * layout.teeth
-        amplitudes = -waves.transpose(1, 0, 2).reshape(rows.size, -1)
-        by_value[rows, first : first + amplitudes.shape[1]] = amplitudes
+        last = first + 2 * own.waves.shape[1]
+        by_value[rows, first:last] = -waves.transpose(1, 0, 2).reshape(rows.size, last - first)
         for kind in range(2):
             by_value[rows, single + kind * layout.teeth + own.number[place]] = -own.by_tooth[kind, place]
     return np.asarray((model.error_columns.matrix.T @ by_value.T).T)

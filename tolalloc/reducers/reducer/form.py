@@ -83,8 +83,8 @@ def flank_form(
 ) -> FlankForm:
     """Return the form through points in any order.
 
-    Points of one φ are taken as their mean. Angles φ [rad], deviations outward positive [m]; the place is who asks, for
-    messages.
+    Points of one φ are taken as their mean, own choice. Angles φ [rad], deviations outward positive [m]; the place is
+    who asks, for messages.
 
     Raises
     ------
@@ -154,6 +154,11 @@ class Form:
     def is_measured(self) -> bool:
         """Whether single discs or pins have a form of their own, so that no two are alike."""
         return bool(self.discs or self.pins)
+
+    @property
+    def drawn(self) -> Form | None:
+        """What of it the drawing states, none if nothing."""
+        return Form(designed=self.designed) if self.designed else None
 
     def of_flank(self, disc: int, angle: Float[np.ndarray, "*angles"]) -> Float[np.ndarray, "*angles"]:
         """Return how far the flanks of a disc stand out at angles φ that go on around it [m]."""

@@ -33,7 +33,7 @@ class Diagnose(Inquiry["DiagnosisRequest"]):
     discrepancy: Annotated[float, Word("Standard deviation of what the model leaves out [arcsec].")] = 0.5
     angle_offset: Annotated[float, Word("Added to every angle of the bench [deg].")] = 0.0
     stiffness: StiffnessName = ""
-    measured: Annotated[str, Word("Unit file of measured discs and pins, whose form is then known.")] = ""
+    form: Annotated[str, Word("Unit file of measured discs and pins, whose form is then known.")] = ""
     correlations: Annotated[str, Word("Correlations between sources: CSV or XLSX.")] = ""
     level: Annotated[float, Word("Probability that the named sources hold the dominant one.")] = 0.97
     seed: Annotated[int, Word("Seed of every random number.")] = 1
@@ -53,8 +53,8 @@ class Diagnose(Inquiry["DiagnosisRequest"]):
         if drawing.settings:  # the unit was made with the modification of its drawing
             design = ReducerChoice(reducer=design).set_to(drawing.settings).reducer
         errors = drawing.errors
-        if self.measured:
-            unit = load_unit(self.measured)
+        if self.form:
+            unit = load_unit(self.form)
             design = unit.as_built(design)
             errors = replace(errors, sources=unit.without_measured(errors.sources))
         return DiagnosisRequest(
@@ -74,7 +74,7 @@ class Diagnose(Inquiry["DiagnosisRequest"]):
         from tolalloc.bench.diagnosis import diagnose_unit
         from tolalloc.reducers.equivalent.model import OUTCOMES
 
-        known = (f"the form of the parts is known from {self.measured}",) if self.measured else ()
+        known = (f"the form of the parts is known from {self.form}",) if self.form else ()
         record = RunRecord(progress, OUTCOMES)
         result = diagnose_unit(prepared, record)
         header = Header(
