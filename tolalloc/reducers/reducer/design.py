@@ -234,7 +234,8 @@ class Reducer:
     friction_dimensions: FrictionDimensions = field(default_factory=FrictionDimensions)
     catalogue: Catalogue | None = None
     assumptions: tuple[str, ...] = field(default=())
-    form: Form | None = None  # Free profile of the flanks, form of measured discs and pins; none unless stated
+    # Free profile of the flanks, form of measured discs and pins; none unless stated
+    form: Form | None = field(default=None, repr=False)
 
     @property
     def crank_circle_radius(self) -> float:

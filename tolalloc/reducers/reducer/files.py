@@ -431,7 +431,9 @@ def load_reducer(name: str | Path) -> Reducer:
     reducer = record.reducer()
     if not record.modification.profile:
         return reducer
-    return replace(reducer, form=Form(designed=load_designed(path.parent / record.modification.profile)))
+    profile = path.parent / record.modification.profile
+    said = f"the flanks stand out of the profile of the amounts as {profile.name} states"
+    return replace(reducer, form=Form(designed=load_designed(profile)), assumptions=(*reducer.assumptions, said))
 
 
 _MODIFICATION = re.compile(r"^\[modification\].*?(?=^\[|\Z)", re.MULTILINE | re.DOTALL)

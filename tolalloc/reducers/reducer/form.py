@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import lru_cache
 from math import pi
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,9 @@ from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
 
 LARGEST_DEVIATION = 200 * MICROMETRE
 """Largest deviation of a flank that is believed, as that of an amount of the modification [m]."""
+
+LARGEST_FREE = 50 * MICROMETRE
+"""Largest free form of a drawing, up to which first order holds as it does for the amounts [m]."""
 
 WIDEST_GAP = pi / 4
 """Largest distance in φ of neighbouring points, eight to a tooth, across which a profile is taken for known [rad]."""
@@ -43,24 +46,6 @@ class FlankForm:
         """Length in φ after which the form repeats [rad]."""
         return 2 * pi * self.spaces
 
-    @cached_property
-    def _spline(self) -> Any:
-        """A periodic cubic spline: through every point, or the least squares of equally long spans."""
-        from scipy.interpolate import BSpline, CubicSpline
-        from scipy.sparse import csr_array
-        from scipy.sparse.linalg import spsolve
-
-        angle, deviation = np.array(self.angle), np.array(self.deviation)
-        if not self.spans:
-            closed = np.append(angle, angle[0] + self.period), np.append(deviation, deviation[0])
-            return CubicSpline(*closed, bc_type="periodic")
-        count = self.spans * self.spaces
-        knots = self.period / count * np.arange(-3, count + 4)
-        own = BSpline.design_matrix(angle, knots, 3).tocoo()
-        basis = csr_array((own.data, (own.row, own.col % count)), shape=(angle.size, count))
-        weight = spsolve((basis.T @ basis).tocsc(), basis.T @ deviation)
-        return BSpline(knots, weight[np.arange(count + 3) % count], 3)
-
     def at(self, angle: Float[np.ndarray, "*angles"]) -> Float[np.ndarray, "*angles"]:
         """Return the deviation at angles φ, outward positive [m].
 
@@ -75,7 +60,26 @@ class FlankForm:
         """
         inside = np.remainder(angle, self.period)
         start = 0.0 if self.spans else self.angle[0]
-        return np.asarray(self._spline(np.where(inside < start, inside + self.period, inside)))
+        return np.asarray(_spline(self)(np.where(inside < start, inside + self.period, inside)))
+
+
+@lru_cache(maxsize=16)
+def _spline(form: FlankForm) -> Any:
+    """Return a periodic cubic spline: through every point, or the least squares of equally long spans."""
+    from scipy.interpolate import BSpline, CubicSpline
+    from scipy.sparse import csr_array
+    from scipy.sparse.linalg import spsolve
+
+    angle, deviation = np.array(form.angle), np.array(form.deviation)
+    if not form.spans:
+        closed = np.append(angle, angle[0] + form.period), np.append(deviation, deviation[0])
+        return CubicSpline(*closed, bc_type="periodic")
+    count = form.spans * form.spaces
+    knots = form.period / count * np.arange(-3, count + 4)
+    own = BSpline.design_matrix(angle, knots, 3).tocoo()
+    basis = csr_array((own.data, (own.row, own.col % count)), shape=(angle.size, count))
+    weight = spsolve((basis.T @ basis).tocsc(), basis.T @ deviation)
+    return BSpline(knots, weight[np.arange(count + 3) % count], 3)
 
 
 def flank_form(
@@ -83,8 +87,8 @@ def flank_form(
 ) -> FlankForm:
     """Return the form through points in any order.
 
-    Points of one φ are taken as their mean, own choice. Angles φ [rad], deviations outward positive [m]; the place is
-    who asks, for messages.
+    Points of one φ are taken as their mean, own derivation. Angles φ [rad], deviations outward positive [m]; the place
+    is who asks, for messages.
 
     Raises
     ------
@@ -244,4 +248,6 @@ def load_designed(path: Path) -> FlankForm:
         raise InputError.at(
             path, "phi [deg]", float(f"{beyond / DEGREE:.6g}"), "0° in the middle of a tooth space to 180° at the tip"
         )
+    if (most := float(np.abs(deviation).max())) > LARGEST_FREE:
+        raise InputError.at(path, "largest deviation [µm]", float(f"{most * 1e6:.4g}"), f"up to {LARGEST_FREE * 1e6:g}")
     return flank_form(np.append(angle, -angle), np.tile(deviation, 2), 1, 0, str(path))
