@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import refusal
+from builders import prepared, refusal
 
 from tolalloc.bench.sources import has_half_turn
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers import RADIAL_CLEARANCE
 from tolalloc.reducers.cycloid.clearance import clearance_of, linear_clearance
 from tolalloc.reducers.cycloid.loaded_contact import assess
 from tolalloc.reducers.cycloid.measured_profile import MeasuredProfile, aligned, normal_deviations
@@ -445,3 +446,19 @@ def test_a_diagnosis_takes_a_measured_profile_for_known(reducer, tmp_path):
     assert known.reducer.form.discs[0][0] == 1
     assert has_half_turn(plain.reducer, plain.errors.columns)
     assert not has_half_turn(known.reducer, plain.errors.columns)
+
+
+def test_a_study_is_known_by_its_profile_too(tmp_path):
+    text = (PRESETS / "rv20e_liu2020.reducer.toml").read_text()
+    (tmp_path / "own.toml").write_text(text.replace("equidistant_um", 'profile = "flank.csv"\nequidistant_um', 1))
+    known = []
+    for height in (0.0, -1.0):
+        rows = np.array([(angle, height) for angle in range(0, 181, 5)])
+        write(tmp_path / "flank.csv", rows, "phi [deg],deviation [µm]")
+        study = prepared(reducer={"name": str(tmp_path / "own.toml")})
+        known.append(study.digest)
+        # A study chooses the amounts; the profile comes on top of them.
+        left = study.model.reading((RADIAL_CLEARANCE,))(np.zeros((1, len(study.errors.columns)))).values[0, 0]
+        known.append(round(left, 6))
+    assert known[0] != known[2]
+    assert known[3] == pytest.approx(known[1] + 1.0)
