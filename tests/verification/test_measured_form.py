@@ -193,7 +193,7 @@ def test_a_disc_measured_off_its_centre_has_run_out_and_pitch_of_order_one(reduc
     moved = 6e-6 * np.exp(0.7j)
     path = write(tmp_path / "disc.csv", disc_points(reducer, NONE) + moved)
     plain = replace(reducer, modification=NONE)
-    form, _ = MeasuredProfile(path=path).form(ToothProfile.of(plain), disc)
+    form, _ = MeasuredProfile(path=path, spans=0).form(ToothProfile.of(plain), disc)
     built = EquivalentModel(replace(plain, form=Form(discs=((disc - 1, form),))))
     model, known = EquivalentModel(plain), load_unit("table4").deviations
     teeth = (f"disc{disc}.pitch", f"disc{disc}.runout")
@@ -324,7 +324,6 @@ neglected = ["*"]
 [profiles.disc2]
 file = "disc2.csv"
 aligned = true
-spans = 40
 """
 
 
@@ -351,7 +350,7 @@ def test_a_unit_file_names_profiles_and_roundness(reducer, tmp_path):
     [
         (UNIT.replace("disc2]", "disc3]"), None, "disc with a profile 'disc3' is not known"),
         (UNIT.replace("roundness.7", "roundness.41"), None, "roundness of a pin 'each_pin.roundness.41' is not known"),
-        (UNIT.replace("40", "400"), None, "spans is 400; allowed is 0, or 1 to 1"),
+        (UNIT + "spans = 400\n", None, "spans is 400; allowed is 0, or 1 to 1"),
         (UNIT.replace("true", '"yes"'), None, "aligned"),
         (UNIT + "datum = 3\n", None, "datum"),
         (

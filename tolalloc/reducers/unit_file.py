@@ -46,7 +46,7 @@ class ProfileRecord(Record):
     datum_deg: Degrees = 0.0
     aligned: StrictBool = False
     from_drawing: StrictBool = False
-    spans: Annotated[int, Field(ge=0, le=1000)] = 0
+    spans: Annotated[int, Field(ge=0, le=1000)] | None = None
     across: Literal["mean", "highest"] = "mean"
 
 

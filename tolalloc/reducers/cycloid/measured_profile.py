@@ -59,7 +59,7 @@ class MeasuredProfile:
     from_drawing
         Whether deviations are from the profile of the drawing and not from the theoretical one.
     spans
-        Spans of a smoothing spline in each space; 0 goes through all points [-].
+        Spans of a smoothing spline in each space, as `flank_form` chooses unless given; 0 goes through all points [-].
     across
         What a plane model takes of sections along the width, a column ``z [mm]`` of their heights: their ``mean``,
         which is right where the whole width carries, or the ``highest`` of them at every φ, which carries first.
@@ -69,7 +69,7 @@ class MeasuredProfile:
     datum: float = 0.0
     aligned: bool = False
     from_drawing: bool = False
-    spans: int = 0
+    spans: int | None = None
     across: Literal["mean", "highest"] = "mean"
 
     @cached_property

@@ -25,6 +25,9 @@ LARGEST_FREE = 50 * MICROMETRE
 WIDEST_GAP = pi / 4
 """Largest distance in φ of neighbouring points, eight to a tooth, across which a profile is taken for known [rad]."""
 
+SMOOTHED = 40
+"""Spans of the spline of measured points in a tooth space unless stated: 9° of φ, as fine as extremes are found [-]."""
+
 _CLOSE = 1e-9  # points of the two flanks that are nearer in φ are one [rad]
 
 
@@ -83,12 +86,16 @@ def _spline(form: FlankForm) -> Any:
 
 
 def flank_form(
-    angle: Float[np.ndarray, " point"], deviation: Float[np.ndarray, " point"], spaces: int, spans: int, place: str
+    angle: Float[np.ndarray, " point"],
+    deviation: Float[np.ndarray, " point"],
+    spaces: int,
+    spans: int | None,
+    place: str,
 ) -> FlankForm:
     """Return the form through points in any order.
 
     Points of one φ are taken as their mean, own derivation. Angles φ [rad], deviations outward positive [m]; the place
-    is who asks, for messages.
+    is who asks, for messages. Unless spans are stated there are `SMOOTHED` of them where the points are dense enough.
 
     Raises
     ------
@@ -116,6 +123,8 @@ def flank_form(
     if gap > WIDEST_GAP:
         allowed = f"up to {WIDEST_GAP / DEGREE:g} all around"
         raise InputError.at(place, "largest distance in φ of neighbouring points [deg]", apart, allowed)
+    if spans is None:
+        spans = SMOOTHED if gap <= 2 * pi / SMOOTHED else 0
     if spans and 2 * pi / spans < gap:
         allowed = f"0, or 1 to {int(2 * pi / gap)} where neighbouring points are up to {apart}° of φ apart"
         raise InputError.at(place, "spans", spans, allowed)
