@@ -461,3 +461,19 @@ def test_a_study_is_known_by_its_profile_too(tmp_path):
         known.append(round(left, 6))
     assert known[0] != known[2]
     assert known[3] == pytest.approx(known[1] + 1.0)
+
+
+def test_smoothed_points_let_the_search_find_the_extremes(reducer):
+    generator, teeth = np.random.default_rng(2), reducer.cycloid_stage.disc_teeth
+    around = 2 * np.pi * np.arange(POINTS * teeth) / POINTS
+    forms = tuple(
+        (disc, flank_form(around, 1e-6 * generator.standard_normal(around.size), teeth, None, "noisy"))
+        for disc in range(2)
+    )
+    model = EquivalentModel(replace(reducer, form=Form(discs=forms)))
+    errors = errors_of(model, load_unit("table4").deviations, reducer.modification.deviations)
+    found = model.exact_extremes(errors, -1.0)
+    dense = curve(model, errors, -1.0, 2 * np.pi * np.arange(3744) / 3744)
+    # Equal steps stop short of the kinks at which a pin takes over.
+    assert -0.05 < float(found.peak_to_peak[0]) / ARCSECOND - (dense.max() - dense.min()) < 0.5
+    assert float(found.remaining[0]) / ARCSECOND < 0.05
