@@ -22,6 +22,8 @@ COMPUTES_NOTHING = {
     # reads a file or a table
     "reducers.choice.reducer": "reads",
     "reducers.reducer.files.load_identified_stiffness": "reads",
+    "reducers.reducer.form.load_designed": "reads",
+    "reducers.reducer.form.read_profile": "reads",
     "reducers.reducer.files.load_reducer": "reads",
     "reducers.reducer.files.write_identified_stiffness": "reads",
     "reducers.reducer.files.write_modified": "reads",

@@ -190,6 +190,7 @@ def _units(record: MeasurementRecord, path: Path) -> tuple[BuiltUnit, ...]:
     for name in record.units:
         if name.lower().endswith(".toml"):
             unit = load_unit(path.parent / name)
+            unit.require_no_form(str(path))
             units.append(replace(unit, neglected=unit.neglected + record.neglected))
         else:
             units.extend(load_units(path.parent / name, record.neglected))

@@ -81,6 +81,7 @@ def bind(
         offsets={name: errors.fixed[name] for name in reducer.modification.deviations if errors.fixed.get(name)},
     )
     if unit:
+        unit.require_no_form(place)
         unit.errors(model.columns, reducer.modification.deviations)
     exact = ", ".join(pattern for pattern, columns in left_out.items() if columns)
     return kernel, ((f"not in the tolerance table and taken as exact: {exact}",) if exact else ())

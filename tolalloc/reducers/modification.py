@@ -8,18 +8,15 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Float
 
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.contact import ContactResult, contact_of
 from tolalloc.reducers.cycloid.clearance import LARGE, formula_gap
-from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
+from tolalloc.reducers.cycloid.tooth_profile import Amounts, ToothProfile, nearest_angles, path_of
 from tolalloc.reducers.equivalent.perfect import exact_loop
 from tolalloc.reducers.reducer.design import CycloidStage, Modification, Reducer
-
-Amounts = Float[np.ndarray, "n 2"]
-"""Pairs of Δr_rp and Δr_p, `tolalloc.reducers.reducer.design.Modification` [m]."""
 
 _ROUNDING = 1e-17  # violation that counts as none [m]
 _MOST_OFF = 2 * MICROMETRE  # by which a wanted clearance may be missed by exact distances [m]
@@ -269,9 +266,6 @@ METRICS: dict[Metric, str] = {
     "nearest": "mean distance of the rotated profile's points from the modified profile",
 }
 
-_REACH = np.pi / 2  # the nearest point of the modified profile is at most that far in φ [rad]
-_CLOSE = 1e-8  # a step of Newton's method after which the next one is rounding [rad]
-
 
 def rotated_profile_fit(
     stage: CycloidStage,
@@ -334,8 +328,8 @@ def rotated_profile_fit(
     rotated = place[:, 0] + 1j * place[:, 1]
 
     def mean_distance(amounts: Amounts) -> Float[np.ndarray, " n"]:
-        angle = _nearest(stage, rotated, angles, amounts) if metric == "nearest" else angles
-        path, slope, _ = _path(stage, amounts, angle)
+        angle = nearest_angles(stage, rotated, angles, amounts) if metric == "nearest" else angles
+        path, slope, _ = path_of(stage, amounts, angle)
         normal = -1j * slope / np.abs(slope)
         difference = rotated - path - (stage.pin_radius + amounts[:, :1]) * normal
         if metric != "same_angle":
@@ -353,43 +347,6 @@ def rotated_profile_fit(
         radial_clearance=radial_clearance,
         require_gap=require_gap,
     )
-
-
-def _nearest(
-    stage: CycloidStage, points: Complex[np.ndarray, " point"], angles: Float[np.ndarray, " point"], amounts: Amounts
-) -> Float[np.ndarray, "n point"]:
-    """Return φ of the modified profiles' points that are nearest to points of another with these φ [rad].
-
-    There (P − w)·w′ of a point P and the path w falls through zero; profile and path share their normals.
-    """
-    angle = np.tile(angles, (len(amounts), 1))
-    low, high = angle - _REACH, angle + _REACH
-    for _ in range(60):
-        path, slope, bend = _path(stage, amounts, angle)
-        offset = (points - path).conj()
-        value, change = (offset * slope).real, (offset * bend - slope * slope.conj()).real
-        low, high = np.where(value > 0, angle, low), np.where(value > 0, high, angle)
-        falls = change < 0
-        new = angle - value / np.where(falls, change, 1.0)
-        new = np.where(falls & (low <= new) & (new <= high), new, (low + high) / 2)
-        step, angle = np.abs(new - angle).max(), new
-        if step < _CLOSE:
-            break
-    return angle
-
-
-def _path(
-    stage: CycloidStage, amounts: Amounts, angle: Float[np.ndarray, "*n point"]
-) -> tuple[Complex[np.ndarray, "n point"], Complex[np.ndarray, "n point"], Complex[np.ndarray, "n point"]]:
-    """Return the path of the grinding pin's centre on the disc and its first two derivatives by φ, x + iy [m].
-
-    The normal into the disc is the direction of its derivative, turned by −90°: theory page (34) for many modifications
-    at once, where `tolalloc.reducers.cycloid.tooth_profile.ToothProfile` is one.
-    """
-    pin = (stage.pin_circle_radius + amounts[:, 1:]) * np.exp(-1j * angle / stage.disc_teeth)
-    crank = stage.eccentricity * np.exp(-1j * angle * (stage.pin_count / stage.disc_teeth))
-    slope = 1j / stage.disc_teeth * (stage.pin_count * crank - pin)
-    return pin - crank, slope, (stage.pin_count**2 * crank - pin) / stage.disc_teeth**2
 
 
 def wanted_clearances(stage: CycloidStage, flank: float, radial: float) -> ModificationProblem:
@@ -580,6 +537,10 @@ def choose(request: ModificationRequest, reducer: Reducer, torque: float) -> Mod
     >>> [round(float(amount) / 1e-6, 3) for amount in found.best.amounts]  # Δr_rp, Δr_p [µm]
     [35.968, 20.968]
     """
+    if reducer.form is not None:
+        raise InputError.at(
+            reducer.name, "profile", "a free form", "none, as amounts are chosen for a profile that they alone make"
+        )
     problem = request.problem(reducer)
     best = _solved(problem)
     if best.violation > 0:

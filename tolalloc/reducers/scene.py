@@ -95,7 +95,7 @@ def _tooth(reducer: Reducer) -> dict[str, list[Any]]:
     (22, 62.098, 59.7)
     """
     stage = reducer.cycloid_stage
-    exact, modified = ToothProfile(stage=stage), ToothProfile(stage=stage, modification=reducer.modification)
+    exact, modified = ToothProfile(stage=stage), ToothProfile.of(reducer)
     # Points stand dense where the tooth bends most; those of a space begin at the tip before it.
     flank = -profile_points(exact, _POINTS).angle[: _POINTS // 2 + 1][::-1]
 

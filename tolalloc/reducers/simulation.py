@@ -187,7 +187,8 @@ def prepare_simulation(asked: SimulationRequest) -> PreparedSimulation:
     >>> f"{prepared.crank_turn:.4f} s, {prepared.crank_turns} whole crank turns"
     '0.2374 s, 2 whole crank turns'
     """
-    reducer, unit = load_reducer(asked.reducer), load_unit(asked.unit)
+    unit = load_unit(asked.unit)
+    reducer = unit.as_built(load_reducer(asked.reducer))
     if asked.engine == "exudyn":
         multibody_engine()
         reducer = _with_modification_of(unit, with_ideal_gears(reducer))

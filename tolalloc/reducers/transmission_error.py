@@ -32,7 +32,7 @@ from tolalloc.reducers.unit_file import BuiltUnit
 class TransmissionErrorResult:
     """One unit under one torque."""
 
-    reducer: Reducer  # Nominal design, as given
+    reducer: Reducer  # Nominal design, as given, with the measured form of the unit's parts
     unit: BuiltUnit  # Its errors
     torque: float  # Torque on the carrier; negative resists the rotation [N·m]
     equilibria: Equilibria  # At equally spaced angles of one output turn
@@ -99,6 +99,7 @@ def transmission_error(
     >>> round(float(found.extremes.peak_to_peak[0]) * 206264.8, 1)  # [arcsec]
     96.6
     """
+    reducer = unit.as_built(reducer)
     model = EquivalentModel(at_torque(reducer, torque), orders=unit.orders or HARMONICS)
     errors = unit.errors(model.columns, reducer.modification.deviations)
     equilibria, extremes = model.equilibria(errors, torque), model.exact_extremes(errors, torque)
@@ -106,7 +107,7 @@ def transmission_error(
     if worst is not Status.CONVERGED:
         raise SolveError(f"unit {unit.name}: no transmission error can be given, at some angle: {worst.sentence}.")
     forward, backward = both_directions(model, errors, torque)
-    loops = np.concatenate([errors, np.zeros_like(errors), exact_unit(model)])
+    drawn = model.with_form(reducer.form.drawn if reducer.form else None)
     return TransmissionErrorResult(
         reducer=reducer,
         unit=unit,
@@ -114,11 +115,21 @@ def transmission_error(
         equilibria=equilibria,
         extremes=extremes,
         preload=preload(model, errors),
-        rated_pin_force=rated_pin_force(equilibria.reducer),
-        loop=hysteresis_loop(model, loops, LOOP_ANGLES),
+        rated_pin_force=rated_pin_force(drawn.reducer),
+        loop=_loops(model, drawn, errors),
         own_loads=own_load_loop(model, errors, TURN_ANGLES, (LOST_MOTION, 1.0)) if reducer.parts else None,
         friction=None if reducer.friction_dimensions.unknown else friction_loop(model, errors, TURN_ANGLES),
         reversed_by=(backward - forward)[0],
         attribution=attribute(model, errors, torque) if attributed else None,
         equally_spaced=model.search.coarse,
     )
+
+
+def _loops(model: EquivalentModel, drawn: EquivalentModel, errors: Float[np.ndarray, "1 column"]) -> HysteresisLoop:
+    """Return the loops of a unit, of the perfect reducer, and of exact parts as they are drawn."""
+    perfect, exact = np.zeros_like(errors), exact_unit(model)
+    if model.reducer.form is None:
+        return hysteresis_loop(model, np.concatenate([errors, perfect, exact]), LOOP_ANGLES)
+    each = ((model, errors), (model.with_form(None), perfect), (drawn, exact))
+    own = [hysteresis_loop(one, row, LOOP_ANGLES) for one, row in each]
+    return HysteresisLoop(torque=own[0].torque, twist=np.concatenate([loop.twist for loop in own]))

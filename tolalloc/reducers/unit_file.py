@@ -8,23 +8,27 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from io import StringIO
 from math import cos, isfinite, radians, sin
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import Field
+from pydantic import Field, StrictBool
 
-from tolalloc.drawings.sources import is_angular, neglected_columns
+from tolalloc.drawings.sources import Source, is_angular, neglected_columns
 from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.files import Record, no_formula, read_toml, shipped_or_path, validated, write_new
 from tolalloc.reading.units import MICROMETRE, MICRORADIAN
+from tolalloc.reducers.cycloid.measured_profile import MeasuredProfile
+from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
 from tolalloc.reducers.families.known import SOURCES
+from tolalloc.reducers.reducer.design import Modification, Reducer
 from tolalloc.reducers.reducer.files import PRESETS
+from tolalloc.reducers.reducer.form import FlankForm, Form, PinForm
 
 _HARMONIC = re.compile(r"(.*)\.(?:cos|sin)(\d+)")
 
@@ -33,6 +37,17 @@ Magnitude = Annotated[float, Field(ge=0, le=200)]
 Microradians = Annotated[float, Field(ge=-20000, le=20000)]
 Degrees = Annotated[float, Field(ge=-360, le=360)]
 Order = Annotated[int, Field(ge=1, le=100)]
+
+
+class ProfileRecord(Record):
+    """Table ``[profiles.disc1]``: the measured profile of a disc in a CSV file beside the unit file."""
+
+    file: str
+    datum_deg: Degrees = 0.0
+    aligned: StrictBool = False
+    from_drawing: StrictBool = False
+    spans: Annotated[int, Field(ge=0, le=1000)] | None = None
+    across: Literal["mean", "highest"] = "mean"
 
 
 class UnitRecord(Record):
@@ -47,6 +62,7 @@ class UnitRecord(Record):
     harmonics: dict[str, tuple[tuple[Order, Magnitude, Degrees], ...]] = Field(default_factory=dict)
     angles: dict[str, Microradians] = Field(default_factory=dict)
     tilts: dict[str, tuple[Microradians, Degrees]] = Field(default_factory=dict)
+    profiles: dict[str, ProfileRecord] = Field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,12 +75,80 @@ class BuiltUnit:
     deviations: dict[str, float]  # Column → deviation [m, angles rad]
     neglected: tuple[str, ...] = ()  # Sources that the unit leaves out, taken as zero; ``*`` stands for anything
     assumptions: tuple[str, ...] = ()  # What the source does not print
+    # Form of its parts: disc ``disc1`` → its measured profile, pin ``each_pin.roundness.7`` → waves of its radius
+    profiles: Mapping[str, MeasuredProfile] = field(default_factory=dict)
+    roundness: Mapping[str, PinForm] = field(default_factory=dict)
+
+    def as_built(self, reducer: Reducer) -> Reducer:
+        """Return the reducer with the form of the unit's measured discs and pins, itself where none is stated.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            A disc or pin that the reducer does not have, or a profile that is not one of its discs.
+        """
+        if not (self.profiles or self.roundness):
+            return reducer
+        stage, form, assumptions = reducer.cycloid_stage, reducer.form or Form(), list(reducer.assumptions)
+        stated = {**reducer.modification.deviations, **self.deviations}
+        amounts = {name.rpartition(".")[2]: stated[name] for name in reducer.modification.deviations}
+        drawn = ToothProfile(stage=stage, modification=Modification(**amounts), form=form.designed)
+        numbers = {f"disc{disc + 1}": disc for disc in range(reducer.disc_count)}
+        discs: dict[int, FlankForm] = {}
+        for name, profile in self.profiles.items():
+            if name not in numbers:
+                raise UnknownNameError.among(f"unit {self.name}", "disc with a profile", name, numbers)
+            discs[numbers[name]], moved = profile.form(drawn, numbers[name] + 1)
+            assumptions.append(f"{name} as {profile.path.name} states it{moved.sentence if moved else ''}")
+        pins = {f"each_pin.roundness.{pin + 1}": pin for pin in range(stage.pin_count)}
+        for name in self.roundness:
+            if name not in pins:
+                raise UnknownNameError.among(f"unit {self.name}", "roundness of a pin", name, pins)
+        rounds = {pins[name]: own for name, own in self.roundness.items()}
+        form = replace(form, discs=tuple(sorted(discs.items())), pins=tuple(sorted(rounds.items())))
+        return replace(reducer, form=form, assumptions=tuple(assumptions))
+
+    def without_measured(self, sources: Iterable[Source]) -> tuple[Source, ...]:
+        """Return sources of a drawing without a zone where a measured profile holds what they let vary."""
+        held = [_columns_in_profile(disc) for disc in self.profiles]
+        return tuple(
+            replace(source, zone=0.0, systematic=()) if any(own.match(f"{source.name}.") for own in held) else source
+            for source in sources
+        )
+
+    def require_no_form(self, place: str) -> None:
+        """Raise if the unit states profiles or roundness where units share one model.
+
+        Raises
+        ------
+        InputError
+            It states them.
+        """
+        for name in (*self.profiles, *self.roundness):
+            raise InputError.at(
+                place, "unit", self.name, f"one without the form of single parts, and this one states that of {name}"
+            )
 
     @property
     def orders(self) -> tuple[int, ...]:
         """Orders of all its harmonics, ascending [-]."""
         found = (_HARMONIC.fullmatch(column) for column in self.deviations)
         return tuple(sorted({int(match[2]) for match in found if match}))
+
+    def _in_profiles(self, columns: Iterable[str]) -> dict[str, float]:
+        """Return the columns that measured profiles hold, as zero beside them."""
+        held: dict[str, float] = {}
+        for disc in self.profiles:
+            teeth = _columns_in_profile(disc)
+            if stated := next(
+                (column for column, value in self.deviations.items() if value and teeth.match(column)), ""
+            ):
+                raise InputError(
+                    f"unit {self.name}: {stated} is stated beside the profile of {disc}, which holds it; allowed is "
+                    "one of the two."
+                )
+            held |= {column: 0.0 for column in columns if teeth.match(column)}
+        return held
 
     def errors(
         self, columns: Iterable[str], nominal: Mapping[str, float] | None = None
@@ -81,7 +165,7 @@ class BuiltUnit:
         InputError
             The model has a column that the unit neither states nor neglects.
         """
-        names, deviations = tuple(columns), {**(nominal or {}), **self.deviations}
+        names, deviations = tuple(columns), {**self._in_profiles(columns), **(nominal or {}), **self.deviations}
         for column in self.deviations:
             if column not in names:
                 raise UnknownNameError.among(f"unit {self.name}", "error", column, names)
@@ -100,6 +184,11 @@ class BuiltUnit:
         return np.array([[deviations.get(column, 0.0) for column in names]])
 
 
+def _columns_in_profile(disc: str) -> re.Pattern[str]:
+    """Return what matches the columns that a measured profile of a disc holds: those of its teeth along the ring."""
+    return re.compile(rf"{disc}\.(?:each_tooth\.)?(?:pitch|runout)\..*")
+
+
 def load_unit(name: str | Path) -> BuiltUnit:
     """Return a built unit by shipped name or from the user's TOML file.
 
@@ -115,19 +204,39 @@ def load_unit(name: str | Path) -> BuiltUnit:
         deviations[f"{source}.x"] = magnitude * MICROMETRE * cos(radians(direction))
         deviations[f"{source}.y"] = magnitude * MICROMETRE * sin(radians(direction))
     deviations |= {column: value * MICRORADIAN for column, value in record.angles.items()}
+    roundness = {}
     for source, (magnitude, direction) in record.tilts.items():
         deviations[f"{source}.x"] = magnitude * MICRORADIAN * cos(radians(direction))
         deviations[f"{source}.y"] = magnitude * MICRORADIAN * sin(radians(direction))
     for source, waves in record.harmonics.items():
-        for order, amplitude, phase in waves:
-            deviations[f"{source}.cos{order}"] = amplitude * MICROMETRE * sin(radians(phase))
-            deviations[f"{source}.sin{order}"] = amplitude * MICROMETRE * cos(radians(phase))
+        sines = [
+            (order, amplitude * MICROMETRE * sin(radians(phase)), amplitude * MICROMETRE * cos(radians(phase)))
+            for order, amplitude, phase in waves
+        ]
+        if source.startswith("each_pin.roundness."):
+            roundness[source] = PinForm(waves=tuple(sines))
+            continue
+        for order, cosine, sine in sines:
+            deviations |= {f"{source}.cos{order}": cosine, f"{source}.sin{order}": sine}
     return BuiltUnit(
         name=record.name,
         source=record.source,
         deviations=deviations,
         neglected=record.neglected,
         assumptions=record.assumptions,
+        profiles={name: _profile(path.parent, own) for name, own in record.profiles.items()},
+        roundness=roundness,
+    )
+
+
+def _profile(folder: Path, record: ProfileRecord) -> MeasuredProfile:
+    return MeasuredProfile(
+        path=folder / record.file,
+        datum=radians(record.datum_deg),
+        aligned=record.aligned,
+        from_drawing=record.from_drawing,
+        spans=record.spans,
+        across=record.across,
     )
 
 

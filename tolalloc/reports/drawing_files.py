@@ -10,7 +10,7 @@ import numpy as np
 from tolalloc.exceptions import InputError
 from tolalloc.reading.files import require_new
 from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
-from tolalloc.reducers.cycloid.clearance import linear_clearance
+from tolalloc.reducers.cycloid.clearance import removed
 from tolalloc.reducers.cycloid.tooth_profile import ProfilePoints, ToothProfile, profile_points, require_points
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def points_frame(profile: ToothProfile, points: ProfilePoints) -> pd.DataFrame:
             "y [mm]": points.place[:, 1] / MILLIMETRE,
             "angle [deg]": angle / DEGREE,
             "curvature, convex positive [1/mm]": profile.curvature(np.abs(angle)) * MILLIMETRE,
-            "removed along the normal [µm]": linear_clearance(profile.stage, profile.modification, angle) / MICROMETRE,
+            "removed along the normal [µm]": removed(profile, angle) / MICROMETRE,
         }
     )
 

@@ -309,7 +309,7 @@ def clearance(reducer: Reducer) -> Clearance:
     from tolalloc.reducers.cycloid.clearance import clearance_of
     from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
 
-    found = clearance_of(ToothProfile(stage=reducer.cycloid_stage, modification=reducer.modification))
+    found = clearance_of(ToothProfile.of(reducer))
     return Clearance(found.pin_angle, found.after, found.backlash, found.radial)
 
 

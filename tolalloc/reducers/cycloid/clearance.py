@@ -73,6 +73,22 @@ def linear_clearance(
     return np.asarray(modification.equidistant - modification.shift * into.along_radius + turned)
 
 
+def removed(profile: ToothProfile, pin_angle: Angles) -> Float[np.ndarray, "*angles"]:
+    """Return the material that a drawing's profile removes, `linear_clearance` less a free form, theory page (83) [m].
+
+    Own derivation, first order in amounts and form.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> profile = ToothProfile.of(load_reducer("rv40e_xi2015"))
+    >>> round(1e6 * float(removed(profile, np.zeros(1))[0]), 3)  # at the root [µm]
+    6.0
+    """
+    found = linear_clearance(profile.stage, profile.modification, pin_angle)
+    return found if profile.form is None else found - profile.form.at(pin_angle)
+
+
 def formula_gap(stage: CycloidStage, modification: Modification, pin_angle: Angles) -> Float[np.ndarray, "*angles"]:
     """Return Li Lixing's gap after closing at φ0, Δr_rp(1 − S) − Δr_p(cos κ − q·S) [m].
 
@@ -134,6 +150,8 @@ Gap = Callable[[Angles, Rotation], Float[np.ndarray, "*angles"]]
 def gap_of(profile: ToothProfile, exact: bool) -> Gap:
     """Return the clearance as a function of the pins' angles and of the disc's rotation, exact or linear.
 
+    A free form of the profile is taken off along the normal at the pin's φ in either case, theory page (83).
+
     Linear: `linear_clearance` − β·r_d·S (own derivation), β the disc's rotation [rad], φ [rad], within `is_large`.
 
     Examples
@@ -145,7 +163,7 @@ def gap_of(profile: ToothProfile, exact: bool) -> Gap:
     >>> round(1e9 * float(closed[0]), 2)  # [nm]
     -50.7
     """
-    stage, lever = profile.stage, profile.stage.disc_pitch_radius
+    stage, lever, form = profile.stage, profile.stage.disc_pitch_radius, profile.form
 
     def linear(pin_angle: Angles, rotation: Rotation) -> Float[np.ndarray, "*angles"]:
         closing = lever * normals(stage.shortening, pin_angle).lever * rotation
@@ -155,7 +173,8 @@ def gap_of(profile: ToothProfile, exact: bool) -> Gap:
         by = np.broadcast_to(rotation, pin_angle.shape).ravel()
         return np.asarray(exact_clearance([profile], pin_angle.ravel(), by)[0].reshape(pin_angle.shape))
 
-    return distance if exact else linear
+    known: Gap = distance if exact else linear
+    return known if form is None else lambda pin_angle, rotation: known(pin_angle, rotation) - form.at(pin_angle)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -244,6 +263,6 @@ def clearance_of(profile: ToothProfile, exact: bool | None = None) -> Clearance:
         formula=formula_gap(stage, modification, FLANK),
         rotation=rotation,
         first_contact=first_contact[0],
-        radial=modification.radial_clearance,
+        radial=modification.radial_clearance if profile.form is None else float(min(gap(FLANK[[0, -1]], 0.0))),
         exact=exact,
     )

@@ -200,7 +200,7 @@ class PressedDiscs:
     @cached_property
     def profile(self) -> ToothProfile:
         """The ground profile."""
-        return ToothProfile(stage=self.reducer.cycloid_stage, modification=self.reducer.modification)
+        return ToothProfile.of(self.reducer)
 
     @cached_property
     def clearance(self) -> Clearance:
@@ -599,7 +599,7 @@ def assess(
     See `tolalloc.reducers.contact.contact_of`.
     """
     reducer = replace(reducer, stiffness=replace(reducer.stiffness, pin_contact_law=law))
-    profile, torque = ToothProfile(stage=reducer.cycloid_stage, modification=reducer.modification), abs(torque)
+    profile, torque = ToothProfile.of(reducer), abs(torque)
     require_sound(profile, reducer.name)
     share, phase = _disc_share(reducer.disc_count), default_phases(reducer, phases)
     one = PressedDiscs(reducer=reducer, torque=share * torque, exact=exact)

@@ -10,14 +10,18 @@ from functools import cached_property
 from math import acos, pi
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Complex, Float
 
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import MICROMETRE, MILLIMETRE
-from tolalloc.reducers.reducer.design import CycloidStage, Modification
+from tolalloc.reducers.reducer.design import CycloidStage, Modification, Reducer
+from tolalloc.reducers.reducer.form import FlankForm
 
 Angles = Float[np.ndarray, "*angles"]
 """Angles φ of pins from the crank direction [rad], and what has their shape."""
+
+Amounts = Float[np.ndarray, "n 2"]
+"""Pairs of Δr_rp and Δr_p, `tolalloc.reducers.reducer.design.Modification` [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,6 +134,13 @@ class ToothProfile:
     stage: CycloidStage  # Cycloid stage
     # Tooth modification; none unless given
     modification: Modification = field(default_factory=lambda: Modification(equidistant=0.0, shift=0.0))
+    form: FlankForm | None = None  # Free form that is added, alike on both flanks of all teeth; none unless given
+
+    @classmethod
+    def of(cls, reducer: Reducer) -> ToothProfile:
+        """Return the profile that the drawing of a reducer's discs states."""
+        form = reducer.form.designed if reducer.form else None
+        return cls(stage=reducer.cycloid_stage, modification=reducer.modification, form=form)
 
     @cached_property
     def ground(self) -> CycloidStage:
@@ -143,12 +154,23 @@ class ToothProfile:
     @property
     def tip_radius(self) -> float:
         """Radius r_ac of the tip circle [m]."""
-        return self.ground.pin_circle_radius + self.ground.eccentricity - self.ground.pin_radius
+        amounts = self.ground.pin_circle_radius + self.ground.eccentricity - self.ground.pin_radius
+        return amounts + self._stands_out(pi)
 
     @property
     def root_radius(self) -> float:
         """Radius r_fc of the root circle [m]."""
-        return self.ground.pin_circle_radius - self.ground.eccentricity - self.ground.pin_radius
+        amounts = self.ground.pin_circle_radius - self.ground.eccentricity - self.ground.pin_radius
+        return amounts + self._stands_out(0.0)
+
+    @property
+    def flank_clearance(self) -> float:
+        """The gap on the flank where cos φ = K1 [m]."""
+        return self.modification.flank_clearance(self.stage) - self._stands_out(flank_angle(self.stage))
+
+    def _stands_out(self, angle: float) -> float:
+        """Return the free form at φ, outward positive [m]."""
+        return 0.0 if self.form is None else float(self.form.at(np.array([angle]))[0])
 
     @property
     def inflection_angle(self) -> float:
@@ -180,6 +202,8 @@ class ToothProfile:
         pin = ground.pin_circle_radius * np.exp(-1j * angle / ground.disc_teeth)
         into = direction.towards_crank + 1j * direction.towards_tangent
         contact = (ground.pin_radius * into - ground.eccentricity) * np.exp(-1j * angle * self._turns)
+        if self.form is not None:
+            contact = contact - self.form.at(angle) * into * np.exp(-1j * angle * self._turns)
         point = (pin + contact) * np.exp(-1j * self.modification.rotation)
         return np.stack([point.real, point.imag], axis=-1)
 
@@ -196,7 +220,7 @@ class ToothProfile:
         return np.stack([into.real, into.imag], axis=-1)
 
     def curvature(self, angle: Angles) -> Float[np.ndarray, "*angles"]:
-        """Return the curvature of the profile, convex positive [1/m]."""
+        """Return the curvature of the profile without its free form, convex positive [1/m]."""
         path = path_curvature(self.ground, angle)
         return np.asarray(-path / (1 + self.ground.pin_radius * path))
 
@@ -232,6 +256,8 @@ def require_sound(profile: ToothProfile, place: str) -> None:
             f"{place}: the grinding pin of radius {ground.pin_radius / MILLIMETRE:.4g} mm undercuts the teeth; "
             f"allowed is a radius above 0 and below {limit:.4g} mm."
         )
+    if profile.form is not None:
+        return  # what touches then is seen along the whole flank, `tolalloc.reducers.cycloid.clearance.clearance_of`
     stage, amounts = profile.stage, profile.modification
     radial, flank = amounts.radial_clearance / MICROMETRE, amounts.flank_clearance(stage) / MICROMETRE
     for value, where, formula in (
@@ -244,6 +270,63 @@ def require_sound(profile: ToothProfile, place: str) -> None:
                 "0 or more, in the convention r_rp + Δr_rp, Rp + Δr_p (xi2015 and li2018 write Rp − Δr_p; "
                 'say so by convention = "minus").'
             )
+
+
+_REACH = np.pi / 2  # the nearest point of the modified profile is at most that far in φ [rad]
+_CLOSE = 1e-8  # a step of Newton's method after which the next one is rounding [rad]
+
+
+def nearest_angles(
+    stage: CycloidStage, points: Complex[np.ndarray, " point"], angles: Float[np.ndarray, " point"], amounts: Amounts
+) -> Float[np.ndarray, "n point"]:
+    """Return φ of the modified profiles' points that are nearest to points of another with these φ [rad].
+
+    There (P − w)·w′ of a point P and the path w falls through zero; profile and path share their normals. Newton's
+    method from the angles given, which are at most a quarter of a turn of φ away; own derivation.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> stage = load_reducer("rv20e").cycloid_stage
+    >>> place = ToothProfile(stage=stage).points(np.array([0.8]))[0]
+    >>> nearest_angles(stage, np.array([complex(*place)]), np.array([0.9]), np.zeros((1, 2))).round(9).tolist()
+    [[0.8]]
+    """
+    angle = np.tile(angles, (len(amounts), 1))
+    low, high = angle - _REACH, angle + _REACH
+    for _ in range(60):
+        path, slope, bend = path_of(stage, amounts, angle)
+        offset = (points - path).conj()
+        value, change = (offset * slope).real, (offset * bend - slope * slope.conj()).real
+        low, high = np.where(value > 0, angle, low), np.where(value > 0, high, angle)
+        falls = change < 0
+        new = angle - value / np.where(falls, change, 1.0)
+        new = np.where(falls & (low <= new) & (new <= high), new, (low + high) / 2)
+        step, angle = np.abs(new - angle).max(), new
+        if step < _CLOSE:
+            break
+    return angle
+
+
+def path_of(
+    stage: CycloidStage, amounts: Amounts, angle: Float[np.ndarray, "*n point"]
+) -> tuple[Complex[np.ndarray, "n point"], Complex[np.ndarray, "n point"], Complex[np.ndarray, "n point"]]:
+    """Return the path of the grinding pin's centre on the disc and its first two derivatives by φ, x + iy [m].
+
+    The normal into the disc is the direction of its derivative, turned by −90°: theory page (34) for many modifications
+    at once, where `ToothProfile` is one; own derivation.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> path, slope, _ = path_of(load_reducer("rv20e").cycloid_stage, np.zeros((1, 2)), np.zeros((1, 1)))
+    >>> round(1e3 * float(path[0, 0].real), 3), round(1e3 * float(slope[0, 0].imag), 3)  # at the root [mm, mm/rad]
+    (51.1, -0.41)
+    """
+    pin = (stage.pin_circle_radius + amounts[:, 1:]) * np.exp(-1j * angle / stage.disc_teeth)
+    crank = stage.eccentricity * np.exp(-1j * angle * (stage.pin_count / stage.disc_teeth))
+    slope = 1j / stage.disc_teeth * (stage.pin_count * crank - pin)
+    return pin - crank, slope, (stage.pin_count**2 * crank - pin) / stage.disc_teeth**2
 
 
 FEWEST, MOST = 8, 20_000

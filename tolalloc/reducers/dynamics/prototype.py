@@ -141,6 +141,18 @@ def part_errors(reducer: Reducer, errors: Mapping[str, float]) -> PartErrors:
 
 
 _TABULATED = 1801  # angles of the contact's stiffness along a tooth
+_FORM_ANGLES = 720  # of the form in one tooth space, and around a pin
+
+
+def _forms(reducer: Reducer) -> tuple[Float[np.ndarray, "disc angle"], Float[np.ndarray, "pin angle"]]:
+    """Return the form of discs and pins at equally spaced angles; no angles where the reducer has none [m]."""
+    discs, stage, form = range(reducer.disc_count), reducer.cycloid_stage, reducer.form
+    if form is None:
+        return np.empty((len(discs), 0)), np.empty((stage.pin_count, 0))
+    around = 2 * np.pi * np.arange(_FORM_ANGLES * stage.disc_teeth) / _FORM_ANGLES
+    direction = 2 * np.pi * np.arange(_FORM_ANGLES) / _FORM_ANGLES - np.pi
+    pins = form.of_pins(np.repeat(direction[:, np.newaxis], stage.pin_count, axis=1)).T
+    return np.stack([form.of_flank(disc, around) for disc in discs]), np.ascontiguousarray(pins)
 
 
 def mesh_of(reducer: Reducer, errors: PartErrors) -> Mesh:
@@ -170,6 +182,7 @@ def mesh_of(reducer: Reducer, errors: PartErrors) -> Mesh:
     angle = Positions(reducer, np.zeros(1)).pin_direction
     deviation = errors.pin[:, 0] + 1j * errors.pin[:, 1]
     contact, log_length = contact_stiffness(stage, stiffness, np.linspace(0.0, np.pi, _TABULATED))
+    flanks, pins = _forms(reducer)
     return Mesh(
         teeth=float(stage.disc_teeth),
         circle=ground.pin_circle_radius,
@@ -183,6 +196,8 @@ def mesh_of(reducer: Reducer, errors: PartErrors) -> Mesh:
         law=LAWS[stiffness.pin_contact_law],
         stiffness=contact,
         log_length=log_length,
+        flank_form=flanks,
+        pin_form=pins,
     )
 
 

@@ -33,11 +33,11 @@ class Layout(NamedTuple):
     clearance: int  # Clearance of every element with play [-]
     flank: int  # δ·r_d, by which the flanks of all discs are turned towards the middles of their teeth [-]
     pin: int  # Radial, tangential and radius deviation of every pin [-]
-    wave: int  # Of each disc: harmonic amplitudes of pitch, then run-out [-]
+    wave: int  # Of each disc: harmonic amplitudes of pitch, then run-out, then how often its form counts [-]
     tooth: int  # Pitch, then run-out of single teeth [-]
     tilt: int  # Tilt x, y [-]
     end: int  # Number of values [-]
-    # Pins, harmonic amplitudes and teeth of one disc [-]
+    # Pins, waves and teeth of one disc [-]
     pins: int
     waves: int
     teeth: int
@@ -82,7 +82,8 @@ def columns_of(reducer: Reducer, groups: Sequence[SpringGroup], orders: tuple[in
     entries = [(at, names[name], 1.0) for at, name in enumerate(values) if name in names]
     played = [group for group in groups if group.contact == "play"]
     discs, pins, teeth = reducer.disc_count, reducer.cycloid_stage.pin_count, reducer.cycloid_stage.disc_teeth
-    waves, torque = 4 * len(orders), len(values)
+    form = int(reducer.form is not None)
+    waves, torque = 4 * len(orders) + form, len(values)
     clearance = torque + 1
     flank = clearance + sum(len(group.clearance_columns) for group in played)
     pin = flank + 1
@@ -105,6 +106,8 @@ def columns_of(reducer: Reducer, groups: Sequence[SpringGroup], orders: tuple[in
             add(tilt + disc * 2, tilt_terms(disc))
     nominal, element = np.zeros(layout.end), clearance
     nominal[:torque] = [constants.get(name, 0.0) for name in values]
+    if form:
+        nominal[wave + waves - 1 : tooth : waves] = 1.0  # once on every disc, whatever the errors are
     for group in played:
         add(element, {name: [(at, 1.0)] for at, name in enumerate(group.clearance_columns)})
         add(element, group.clearance_terms)

@@ -42,7 +42,7 @@ class CondensedAngles(NamedTuple):
     # Displacement x, y of a disc's pole, through which all contact normals pass, per its rotation coordinate [m/m]
     pole_by_rotation: Float[np.ndarray, "angle disc 2"]
     # Pin compression per deviation: pin radial and tangential, harmonic amplitudes of the disc's pitch and run-out,
-    # pitch and run-out of the tooth met [m/m]
+    # pitch and run-out of the tooth met [m/m]; before these the form of flank and pin, if the reducer has one [m]
     contact_by_error: Float[np.ndarray, "angle disc deviation pin"]
     tooth: Int[np.ndarray, "angle disc pin"]  # Number of the tooth that each pin meets [-]
     # Stiffness of each pin contact [N/m] and L of the logarithmic law [m]
@@ -144,7 +144,7 @@ def _contact_by_error(contact: PinContact, orders: tuple[int, ...]) -> Float[np.
     harmonic = (contact.by_tooth[:, :, :, np.newaxis] * waves[:, :, np.newaxis]).reshape(
         *waves.shape[:2], 2 * waves.shape[2], -1
     )
-    return np.concatenate([contact.by_pin, harmonic, contact.by_tooth], axis=2)
+    return np.concatenate([contact.by_pin, harmonic, contact.by_form, contact.by_tooth], axis=2)
 
 
 def _condense_some(at: Positions) -> CondensedAngles:

@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 
 from tolalloc.drawings.zones import PHASE, ROTATION, TILT, Characteristic
 from tolalloc.reducers.cycloid.loaded_contact import contact_stiffness
-from tolalloc.reducers.cycloid.tooth_profile import normals
+from tolalloc.reducers.cycloid.tooth_profile import Normals, normals
 from tolalloc.reducers.equivalent.sources import ErrorSource, Nominal
 from tolalloc.reducers.equivalent.springs import (
     Positions,
@@ -416,6 +416,8 @@ class PinContact:
     by_pin: Float[np.ndarray, "angle disc 2 pin"]
     # Compression per pitch and run-out deviation of the tooth that the pin meets [m/m]
     by_tooth: Float[np.ndarray, "angle disc 2 pin"]
+    # Compression by the form of flank and pin, where the reducer states one: a free or measured profile, roundness [m]
+    by_form: Float[np.ndarray, "angle disc form pin"]
     tooth: Int[np.ndarray, "angle disc pin"]  # Which tooth that is, counted from 0 at the disc's zero direction [-]
     # θ_b, where on the disc the contact is, in the disc's own frame [rad]
     tooth_angle: Float[np.ndarray, "angle disc pin"]
@@ -466,11 +468,28 @@ def pin_contact(at: Positions) -> PinContact:
             ],
             axis=2,
         ),
+        by_form=_by_form(at, pin_angle, into),
         tooth=np.floor(turned * teeth / (2 * np.pi) + 1e-9).astype(np.int64) % teeth,
         tooth_angle=turned,
         stiffness=contact,
         log_length=log_length,
     )
+
+
+def _by_form(
+    at: Positions, pin_angle: Float[np.ndarray, "angle disc pin"], into: Normals
+) -> Float[np.ndarray, "angle disc form pin"]:
+    """Return the compression by the form of flanks and pins, theory page (83) and (84), where there is one [m].
+
+    Along a disc φ goes on clockwise, by a turn from each pin to the next; a pin is touched at κ from the inward radius.
+    """
+    form = at.reducer.form
+    if form is None:
+        return np.empty((*pin_angle.shape[:2], 0, pin_angle.shape[2]))
+    around = pin_angle - 2 * np.pi * np.arange(pin_angle.shape[2])
+    flanks = np.stack([form.of_flank(disc, around[:, disc]) for disc in range(around.shape[1])], axis=1)
+    pins = form.of_pins(np.arctan2(into.across_radius, into.along_radius))
+    return np.asarray((flanks + pins)[:, :, np.newaxis])
 
 
 def pin_terms(reducer: Reducer, orders: tuple[int, ...]) -> Terms:

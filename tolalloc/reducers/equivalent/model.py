@@ -31,6 +31,7 @@ from tolalloc.reducers.equivalent.solvers.records import (
 )
 from tolalloc.reducers.equivalent.springs import HARMONICS
 from tolalloc.reducers.reducer.design import Reducer, at_torque
+from tolalloc.reducers.reducer.form import Form
 
 
 class Status(IntEnum):
@@ -109,7 +110,9 @@ class Derivatives:
     # By every error column, modification included; by the torque [rad/m, rad/rad; rad/(N·m)]
     by_error: Float[np.ndarray, "item column"]
     by_torque: Float[np.ndarray, " item"]
-    by_nominal: Float[np.ndarray, " item"]  # By the relative change of all nominal distances and clearances [rad]
+    # By the relative change of all nominal distances and clearances, and of the form of flanks and pins [rad]
+    by_nominal: Float[np.ndarray, " item"]
+    by_form: Float[np.ndarray, " item"]
     # By the relative change of each stiffness of `tolalloc.reducers.reducer.stiffness.Stiffness` [rad]
     by_stiffness: dict[str, Float[np.ndarray, " item"]]
     status: UInt8[np.ndarray, " item"]  # Worst status of the equilibria behind them [-]
@@ -142,6 +145,10 @@ class EquivalentModel:
     def at_torque(self, torque: float) -> EquivalentModel:
         """Return the model with the stiffness that the reducer's parts have under a torque on the carrier [N·m]."""
         return replace(self, reducer=at_torque(self.reducer, torque)) if self.reducer.parts else self
+
+    def with_form(self, form: Form | None) -> EquivalentModel:
+        """Return the model of parts with another form of flanks and pins, of perfect ones if it is none."""
+        return self if form == self.reducer.form else replace(self, reducer=replace(self.reducer, form=form))
 
     @cached_property
     def error_columns(self) -> Columns:
@@ -394,11 +401,17 @@ class EquivalentModel:
             name: columns.stiffness[name] * derivative.by_row[:, rows].sum(axis=1)
             for name, rows in columns.rows_of_stiffness.items()
         }
-        present, nothing = np.flatnonzero(columns.map.nominal), np.zeros(len(derivative.by_value))
+        present, wave = np.flatnonzero(columns.map.nominal), columns.layout.wave
+
+        def summed(entries: Int[np.ndarray, " entry"]) -> Float[np.ndarray, " item"]:
+            start = np.zeros(len(derivative.by_value))
+            return sum((columns.map.nominal[at] * derivative.by_value[:, at] for at in entries), start)
+
         return Derivatives(
             by_error=np.asarray((columns.matrix.T @ derivative.by_value.T).T),
             by_torque=derivative.by_value[:, columns.layout.torque],
-            by_nominal=sum((columns.map.nominal[at] * derivative.by_value[:, at] for at in present), nothing),
+            by_nominal=summed(present[present < wave]),
+            by_form=summed(present[present >= wave]),
             by_stiffness={**by_stiffness, "pin_contact": derivative.by_pin},
             status=derivative.status,
         )

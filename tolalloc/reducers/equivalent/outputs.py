@@ -23,6 +23,7 @@ from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel
 from tolalloc.reducers.equivalent.solvers.records import design_of
 from tolalloc.reducers.equivalent.springs import Positions, harmonic_waves
 from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.form import Form
 
 SINGLE = ("gear_mesh",)
 """Interfaces that carry along one direction; the others carry x and y."""
@@ -288,7 +289,8 @@ def radial_clearance_derivatives(
             by_value[rows, layout.pin + kind * layout.pins + pin] = -factor
         waves = own.by_tooth[:, place, np.newaxis] * own.waves[place]
         first, single = layout.wave + at * layout.waves, layout.tooth + at * 2 * layout.teeth
-        by_value[rows, first : first + layout.waves] = -waves.transpose(1, 0, 2).reshape(rows.size, layout.waves)
+        last = first + 2 * own.waves.shape[1]
+        by_value[rows, first:last] = -waves.transpose(1, 0, 2).reshape(rows.size, last - first)
         for kind in range(2):
             by_value[rows, single + kind * layout.teeth + own.number[place]] = -own.by_tooth[kind, place]
     return np.asarray((model.error_columns.matrix.T @ by_value.T).T)
@@ -311,19 +313,21 @@ def _standing_out(model: EquivalentModel, errors: Float[np.ndarray, "sample colu
     mapped, layout, orders = model.error_columns, model.error_columns.layout, model.orders
     values = np.asarray((mapped.matrix @ errors.T).T) + mapped.map.nominal
     pins = values[:, layout.pin : layout.wave].reshape(-1, 3, layout.pins)
-    found = []
+    found, form = [], model.reducer.form or Form()
+    round_pins = form.of_pins(np.zeros(layout.pins))
     for disc in range(model.reducer.disc_count):
         contact = _at_tips_and_roots(model, disc)
         waves = harmonic_waves(contact.tooth_angle[:, disc, 0], orders)
         first, single = layout.wave + disc * layout.waves, layout.tooth + disc * 2 * layout.teeth
-        along_ring = values[:, first : first + layout.waves].reshape(-1, 2, waves.shape[1])
+        along_ring = values[:, first : first + 2 * waves.shape[1]].reshape(-1, 2, waves.shape[1])
         own = values[:, single : single + 2 * layout.teeth].reshape(-1, 2, layout.teeth)
         tooth = np.einsum("skw,pw->skp", along_ring, waves) + own[:, :, contact.tooth[:, disc, 0]]
+        flanks = form.of_flank(disc, np.pi * np.arange(contact.tooth.shape[0]))
         by_tooth, by_pin = contact.by_tooth[:, disc, :, 0].T, contact.by_pin[0, disc, :, 0]
         found.append(
             _StandingOut(
-                pin=by_pin[0] * pins[:, 0] + by_pin[1] * pins[:, 1] + pins[:, 2],
-                tooth=(by_tooth * tooth).sum(axis=1),
+                pin=by_pin[0] * pins[:, 0] + by_pin[1] * pins[:, 1] + pins[:, 2] + round_pins,
+                tooth=(by_tooth * tooth).sum(axis=1) + flanks,
                 by_pin=np.repeat(by_pin[:, np.newaxis], layout.pins, axis=1),
                 by_tooth=by_tooth,
                 waves=waves,
@@ -539,6 +543,7 @@ def contact_pattern(
 
 
 TORQUE, CLEARANCE, CURVATURE = "torque", "nominal clearance", "curvature of the contact law"
+FORM = "form of flanks and pins"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -584,8 +589,9 @@ def attribute(model: EquivalentModel, errors: Float[np.ndarray, "1 column"], tor
     for at in np.flatnonzero(errors[0]):
         name = source_name(model.columns[at])
         parts[name] = parts.get(name, 0.0) + errors[0, at] * derivatives.by_error[:, at]
-    if model.error_columns.map.nominal.any():
-        parts[CLEARANCE] = derivatives.by_nominal
+    for name, own in ((CLEARANCE, derivatives.by_nominal), (FORM, derivatives.by_form)):
+        if own.any():
+            parts[name] = own
     parts[TORQUE] = torque * derivatives.by_torque
     if LAWS[model.reducer.stiffness.pin_contact_law] != LINEAR:
         parts[CURVATURE] = curve[0] - np.sum(list(parts.values()), axis=0)

@@ -17,6 +17,7 @@ from tolalloc.reading.files import times
 from tolalloc.reading.named_fields import is_number
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.reducer.bearings import Friction, FrictionDimensions, Part
+from tolalloc.reducers.reducer.form import Form
 from tolalloc.reducers.reducer.stiffness import Material, Stiffness, contact_modulus, line_contact, pin_bending
 
 Teeth = Annotated[int, Field(ge=5, le=1000)]
@@ -258,6 +259,8 @@ class Reducer:
     first_stage: FirstStage | None = None
     output_pins: OutputPins | None = None
     assumptions: tuple[str, ...] = field(default=())
+    # Free profile of the flanks, form of measured discs and pins; none unless stated
+    form: Form | None = field(default=None, repr=False)
 
     @property
     def family(self) -> str:

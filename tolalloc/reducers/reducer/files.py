@@ -41,6 +41,7 @@ from tolalloc.reducers.reducer.design import (
     SingleStageClearances,
     at_torque,
 )
+from tolalloc.reducers.reducer.form import Form, load_designed
 from tolalloc.reducers.reducer.idle_torque import IdleTorque
 from tolalloc.reducers.reducer.stiffness import (
     TAPER_ANGLE,
@@ -354,12 +355,16 @@ Micrometres = Annotated[float, Field(ge=-200, le=200), times(MICROMETRE)]
 
 
 class ModificationRecord(Record):
-    """Table ``[modification]``; the convention says whether the shift was written Rp + Δr_p or Rp − Δr_p."""
+    """Table ``[modification]``; the convention says whether the shift was written Rp + Δr_p or Rp − Δr_p.
+
+    ``profile`` names a CSV file beside it, a free form that is added to the amounts.
+    """
 
     equidistant_um: Micrometres
     shift_um: Micrometres
     rotation_urad: Annotated[float, Field(ge=-5000, le=5000), times(MICRORADIAN)] = 0.0
     convention: Literal["plus", "minus"] = "plus"
+    profile: str = ""
 
 
 class _AnyReducerRecord(Record):
@@ -511,7 +516,13 @@ def load_reducer(name: str | Path) -> Reducer:
     """
     path = shipped_or_path(name, PRESETS, ".reducer.toml", "reducer")
     content = read_toml(path)
-    return validated(_record_of(content), content, path).reducer()
+    record = validated(_record_of(content), content, path)
+    reducer = record.reducer()
+    if not record.modification.profile:
+        return reducer
+    profile = path.parent / record.modification.profile
+    said = f"the flanks stand out of the profile of the amounts as {profile.name} states"
+    return replace(reducer, form=Form(designed=load_designed(profile)), assumptions=(*reducer.assumptions, said))
 
 
 def _record_of(content: Mapping[str, Any]) -> type[SingleStageRecord] | type[ReducerRecord]:
@@ -531,12 +542,14 @@ def write_modified(name: str | Path, modification: Modification, path: Path) -> 
         The new file is there already or cannot be made, or the old one has no table ``[modification]``.
     """
     source = shipped_or_path(name, PRESETS, ".reducer.toml", "reducer")
+    profile = read_toml(source).get("modification", {}).get("profile", "")
+    free = f"profile = {as_toml(str((source.parent / profile).resolve()))}\n" if profile else ""
     turned = f"rotation_urad = {as_toml(modification.rotation / MICRORADIAN)}\n" if modification.rotation else ""
     table = (
         "[modification] # pin radius + equidistant, pin circle radius + shift, at grinding\n"
         f"equidistant_um = {as_toml(modification.equidistant / MICROMETRE)}\n"
         f"shift_um = {as_toml(modification.shift / MICROMETRE)}\n"
-        f"{turned}"
+        f"{turned}{free}"
         'convention = "plus"\n\n'
     )
     text, found = _MODIFICATION.subn(table, read_text(source, "a text file in TOML"))

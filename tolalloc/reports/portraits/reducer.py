@@ -83,7 +83,7 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
     @property
     def facts(self) -> Mapping[str, Any]:
         """Torsional stiffness of the perfect reducer between 3 % and 100 % of rated torque."""
-        own = self.model.kernel.model
+        own = self.model.kernel.model.with_form(None)
         loop = hysteresis_loop(own, np.zeros((1, len(own.columns))), TURN_ANGLES)
         stiffness = float(loop.torsional_stiffness[0] * ARCMINUTE)
         return {"torsional stiffness of the perfect reducer [N·m/arcmin]": stiffness}

@@ -9,7 +9,7 @@ import numpy as np
 
 from tolalloc.reading.units import ARCMINUTE, DEGREE, MEGAPASCAL, MICROMETRE, MICRORADIAN, MILLIMETRE
 from tolalloc.reducers.contact import ContactResult, YieldingContact
-from tolalloc.reducers.cycloid.clearance import FLANK, linear_clearance
+from tolalloc.reducers.cycloid.clearance import FLANK, removed
 from tolalloc.reducers.cycloid.loaded_contact import Assessment, LoadedContact
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile, normals
 from tolalloc.reports.document import Section
@@ -225,7 +225,7 @@ def _profile_summary(found: Assessment) -> dict[str, float | str | None]:
         "smallest convex radius of the tooth [mm]": (profile.ground.smallest_convex_radius - profile.ground.pin_radius)
         / MILLIMETRE,
         "radial clearance at tip and root [µm]": clearance.radial / MICROMETRE,
-        "clearance on the flank [µm]": profile.modification.flank_clearance(profile.stage) / MICROMETRE,
+        "clearance on the flank [µm]": profile.flank_clearance / MICROMETRE,
         "first contact at [deg]": clearance.first_contact / DEGREE,
         "free rotation to one side [arcmin]": clearance.rotation / ARCMINUTE,
         "backlash [arcmin]": clearance.backlash / ARCMINUTE,
@@ -277,9 +277,9 @@ def _carrying(contact: LoadedContact) -> list[int]:
 def _profile_figure(profile: ToothProfile) -> Figure:
     """Draw one tooth, exact and with the modification magnified."""
     exact, angle = ToothProfile(stage=profile.stage), np.linspace(0.0, np.pi, 361)
-    removed = linear_clearance(profile.stage, profile.modification, angle)
-    places, apart = exact.points(angle), removed[:, np.newaxis] * exact.normals(angle)
-    largest = max(float(np.abs(removed).max()), 1e-12)
+    depth = removed(profile, angle)
+    places, apart = exact.points(angle), depth[:, np.newaxis] * exact.normals(angle)
+    largest = max(float(np.abs(depth).max()), 1e-12)
     height = exact.tip_radius - exact.root_radius
     factor = max(float(f"{0.12 * height / largest:.0e}"), 1.0)
     middle = np.exp(1j * (np.pi / profile.stage.disc_teeth + np.pi / 2))  # the tooth's middle upright

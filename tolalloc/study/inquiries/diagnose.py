@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
@@ -33,6 +33,7 @@ class Diagnose(Inquiry["DiagnosisRequest"]):
     discrepancy: Annotated[float, Word("Standard deviation of what the model leaves out [arcsec].")] = 0.5
     angle_offset: Annotated[float, Word("Added to every angle of the bench [deg].")] = 0.0
     stiffness: StiffnessName = ""
+    form: Annotated[str, Word("Unit file of measured discs and pins, whose form is then known.")] = ""
     correlations: Annotated[str, Word("Correlations between sources: CSV or XLSX.")] = ""
     level: Annotated[float, Word("Probability that the named sources hold the dominant one.")] = 0.97
     seed: Annotated[int, Word("Seed of every random number.")] = 1
@@ -43,6 +44,7 @@ class Diagnose(Inquiry["DiagnosisRequest"]):
         from tolalloc.drawings.drawing import load_drawing
         from tolalloc.reducers.choice import ReducerChoice
         from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
+        from tolalloc.reducers.unit_file import load_unit
 
         design = load_reducer(str(self.reducer))
         if self.stiffness:
@@ -50,10 +52,15 @@ class Diagnose(Inquiry["DiagnosisRequest"]):
         drawing = load_drawing(self.tolerances, correlations=self.correlations, sheet=self.sheet)
         if drawing.settings:  # the unit was made with the modification of its drawing
             design = ReducerChoice(reducer=design).set_to(drawing.settings).reducer
+        errors = drawing.errors
+        if self.form:
+            unit = load_unit(self.form)
+            design = unit.as_built(design)
+            errors = replace(errors, sources=unit.without_measured(errors.sources))
         return DiagnosisRequest(
             curve=self.curve,
             reducer=design,
-            errors=drawing.errors,
+            errors=errors,
             torque_nm=self.torque,
             noise_arcsec=self.noise,
             discrepancy_arcsec=self.discrepancy,
@@ -67,13 +74,14 @@ class Diagnose(Inquiry["DiagnosisRequest"]):
         from tolalloc.bench.diagnosis import diagnose_unit
         from tolalloc.reducers.equivalent.model import OUTCOMES
 
+        known = (f"the form of the parts is known from {self.form}",) if self.form else ()
         record = RunRecord(progress, OUTCOMES)
         result = diagnose_unit(prepared, record)
         header = Header(
             name=prepared.curve.stem,
             model=prepared.reducer.name,
             seed=prepared.seed,
-            assumptions=result.assumed,
+            assumptions=(*result.assumed, *known),
             statuses=record.counts,
             stages=record.stages,
         )

@@ -55,7 +55,7 @@ class TransmissionError(Inquiry["tuple[Reducer, BuiltUnit, float]"]):
             name=unit.name,
             model=design.name,
             conditions={"torque on the carrier [N·m]": torque},
-            assumptions=(*design.assumptions, *unit.assumptions),
+            assumptions=(*result.reducer.assumptions, *unit.assumptions),
             statuses=result.statuses,
         )
         return Answer(kind="transmission error", header=header, result=result)

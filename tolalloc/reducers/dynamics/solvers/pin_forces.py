@@ -26,11 +26,15 @@ class Mesh(NamedTuple):
     # What its contacts take at equally spaced angles of a pin from the crank direction, 0 to π [N/m, -]
     stiffness: np.ndarray
     log_length: np.ndarray
+    # Form at equally spaced angles, outward positive: of every disc around it over φ, of every pin over κ from −π to π;
+    # without an angle where the reducer has none, [disc, angle] and [pin, angle] [m]
+    flank_form: np.ndarray
+    pin_form: np.ndarray
 
 
 @jit
 def _depth(mesh, t, p):
-    """Return how far the pin's centre p lies inside the path of the grinding pin's centre, and the normal there.
+    """Return how far the pin's centre p lies inside the path of the grinding pin's centre, the normal there, and t.
 
     The path is w(t) = R·exp(−it/z) − e·exp(−it(z+1)/z); Newton's method finds the t where p lies on its normal. Depth
     and normal do not feel a slip below a microradian, whose square they take. nan where none is found.
@@ -51,8 +55,16 @@ def _depth(mesh, t, p):
         t -= miss / slope
         if abs(miss) < 1e-6 * -slope:
             normal = -1j * along / np.sqrt(length2)
-            return off.real * normal.real + off.imag * normal.imag, normal
-    return np.nan, complex(np.nan, np.nan)
+            return off.real * normal.real + off.imag * normal.imag, normal, t
+    return np.nan, complex(np.nan, np.nan), t
+
+
+@jit
+def _around(table, turns):
+    """Return a table's value so many turns around, straight between its angles [m]."""
+    place = (turns - np.floor(turns)) * table.size
+    at = int(place) % table.size
+    return table[at] + (place - np.floor(place)) * (table[(at + 1) % table.size] - table[at])
 
 
 @jit
@@ -61,7 +73,8 @@ def pin_contacts(mesh, disc, q, contact):
 
     ``q`` are x, y and turn of a disc; ``contact`` is [pin, 6]. The pins only push.
 
-    Compression = depth + r_k − r_rp, depth that of the pin's centre behind the path of the grinding pin's.
+    Compression = depth + r_k − r_rp and the form of both where they touch, depth that of the pin's centre behind the
+    path of the grinding pin's.
 
     References
     ----------
@@ -87,11 +100,16 @@ def pin_contacts(mesh, disc, q, contact):
         around = mesh.angle[k] - crank
         t = around - 2.0 * np.pi * np.floor(around / (2.0 * np.pi) + 0.5)
         # Of the disc's roots the one that this pin would have ground.
-        own = root + pitch * np.rint((mesh.angle[k] + t / mesh.teeth - root) / pitch)
+        space = np.rint((mesh.angle[k] + t / mesh.teeth - root) / pitch)
+        own = root + pitch * space
         frame, arm = np.exp(complex(0.0, own)), mesh.place[k] - centre
-        depth, normal = _depth(mesh, t, arm * np.conj(frame))
+        depth, normal, touched = _depth(mesh, t, arm * np.conj(frame))
         normal *= frame
         compression = depth + mesh.radius[k] - mesh.pin
+        if mesh.flank_form.shape[1] and compression == compression:
+            inward = -normal * np.exp(complex(0.0, -mesh.angle[k]))
+            compression += _around(mesh.flank_form[disc], (touched / (2.0 * np.pi) - space) / mesh.teeth)
+            compression += _around(mesh.pin_form[k], np.angle(inward) / (2.0 * np.pi) + 0.5)
         part = abs(t) / np.pi * last
         at = min(int(part), last - 1)
         part -= at
