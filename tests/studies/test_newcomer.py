@@ -1,7 +1,7 @@
 """A script plays the newcomer: a new folder, three cells changed in Excel, a check, a run.
 
-The whole `run --quick` of such a folder takes minutes, so the effort here is smaller still, and the ranking is left out;
-the golden case ``three`` asks both questions of a folder of three cranks.
+The whole `run --quick` of such a folder takes minutes, so the effort here is smaller still and the ranking left out.
+The golden case ``three`` asks both questions of a folder of three cranks.
 """
 
 from __future__ import annotations
