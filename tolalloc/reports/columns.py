@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
@@ -73,6 +73,29 @@ class Table(Generic[Row]):
             for own, cells in told
             if own.nothing is None or any(cell not in (own.nothing, "") for cell in cells)
         ]
+
+
+def of_positions(name: str, columns: Mapping[str, Any], rows: Iterable[int]) -> Table[int]:
+    """Return a table whose rows are positions in arrays.
+
+    Parameters
+    ----------
+    name
+        Name of its sheet and file.
+    columns
+        Header → what stands at every position, or what says it of one.
+    rows
+        The positions in the order of the table.
+
+    Examples
+    --------
+    >>> of_positions("zones", {"zone [µm]": [4.0, 9.0], "row [-]": lambda at: at + 1}, [1, 0]).records()
+    [{'zone [µm]': 9.0, 'row [-]': 2}, {'zone [µm]': 4.0, 'row [-]': 1}]
+    """
+    made = [
+        Column[int](header=header, value=own if callable(own) else own.__getitem__) for header, own in columns.items()
+    ]
+    return Table(name=name, columns=made, rows=list(rows))
 
 
 def _framed(told: Sequence[tuple[Column[Row], list[Any]]], cost_unit: str) -> pd.DataFrame:

@@ -20,14 +20,12 @@ _GAP = 1e-9
 """Share of the cost by which a choice that is left out could be cheaper at most [-]."""
 
 Allowed = Bool[np.ndarray, " process"]
-_MOST_NODES = 500
-"""Nodes after which a search ends [-]."""
 
 
-def allocate(problem: AllocationProblem) -> Solution | LeastInfeasible:
+def allocate(problem: AllocationProblem, most_nodes: int = 500) -> Solution | LeastInfeasible:
     """Return the cheapest choice of processes and zones with a bound over all choices, or what violates stacks least.
 
-    After 500 nodes the search ends with what it has; the gap of the solution says what is left.
+    After so many nodes [-] the search ends with what it has; the gap of the solution says what is left.
 
     Raises
     ------
@@ -56,11 +54,11 @@ def allocate(problem: AllocationProblem) -> Solution | LeastInfeasible:
     >>> found.processes, round(found.cost, 6), round(found.bound, 6)
     (array([1]), 4.0, 4.0)
     """
-    return _BranchAndBound(problem).answer()
+    return _BranchAndBound(problem).answer(most_nodes)
 
 
 def front(
-    problem: AllocationProblem, at: int, budgets: Float[np.ndarray, " point"]
+    problem: AllocationProblem, at: int, budgets: Float[np.ndarray, " point"], most_nodes: int = 500
 ) -> tuple[Solution | LeastInfeasible, ...]:
     """Return what `allocate` finds for every budget of the stack at a position.
 
@@ -71,7 +69,7 @@ def front(
     """
     series, rows = BudgetSeries(problem), np.tile([stack.budget for stack in problem.stacks], (budgets.size, 1))
     rows[:, at] = budgets
-    return tuple(series.allocate(row) for row in rows)
+    return tuple(series.allocate(row, most_nodes) for row in rows)
 
 
 class BudgetSeries:
@@ -90,7 +88,7 @@ class BudgetSeries:
         self.problem = problem
         self._before: _BranchAndBound | None = None
 
-    def allocate(self, budgets: Float[np.ndarray, " stack"]) -> Solution | LeastInfeasible:
+    def allocate(self, budgets: Float[np.ndarray, " stack"], most_nodes: int = 500) -> Solution | LeastInfeasible:
         """Return what `allocate` finds for other budgets [unit of each stack].
 
         Raises
@@ -114,14 +112,14 @@ class BudgetSeries:
         pairs = zip(self.problem.stacks, budgets.tolist(), strict=True)
         stacks = tuple(replace(stack, budget=budget) for stack, budget in pairs)
         self._before = _BranchAndBound(replace(self.problem, stacks=stacks), self._before)
-        return self._before.answer()
+        return self._before.answer(most_nodes)
 
 
-def second_best(problem: AllocationProblem, best: Solution) -> Solution | None:
+def second_best(problem: AllocationProblem, best: Solution, most_nodes: int = 500) -> Solution | None:
     """Return the cheapest design made by another set of processes than the best, or None if no other keeps the stacks.
 
     Sets that differ only in which of several alike features takes which process count as one. The search ends with what
-    it has after 500 nodes.
+    it has after so many nodes [-].
 
     Branch and bound over all sets but one: Lawler 1972, Management Science 18, 401–405.
 
@@ -147,7 +145,7 @@ def second_best(problem: AllocationProblem, best: Solution) -> Solution | None:
         others.append(differently)
         free[search.dual.feature == at] = False
         free[chosen] = True
-    return search.cheapest(others)
+    return search.cheapest(others, most_nodes)
 
 
 class _BranchAndBound:
@@ -174,22 +172,22 @@ class _BranchAndBound:
         """Bound from which on a node cannot hold anything cheaper [cost units]."""
         return np.inf if self._best is None else self._best.cost - _GAP * abs(self._best.cost)
 
-    def answer(self) -> Solution | LeastInfeasible:
+    def answer(self, most_nodes: int) -> Solution | LeastInfeasible:
         """Return the cheapest design of all, or what violates the stacks least."""
-        best = self.cheapest([np.ones(self.dual.feature.size, dtype=bool)])
+        best = self.cheapest([np.ones(self.dual.feature.size, dtype=bool)], most_nodes)
         if best is not None:
             return best
         closest = least_infeasible(self.problem)
         if closest.feasible:
-            raise SolveError(f"No design was found within {_MOST_NODES} nodes, though there are some.")
+            raise SolveError(f"No design was found within {most_nodes} nodes, though there are some.")
         return closest
 
-    def cheapest(self, nodes: Iterable[Allowed]) -> Solution | None:
+    def cheapest(self, nodes: Iterable[Allowed], most_nodes: int) -> Solution | None:
         """Return the cheapest design within the nodes, None if there is none."""
         open_nodes = [(-np.inf, at, allowed) for at, allowed in enumerate(nodes)]
-        count, closed, nodes_left = len(open_nodes), [np.inf], _MOST_NODES
-        while open_nodes and open_nodes[0][0] < self._enough and nodes_left > 0:
-            nodes_left -= 1
+        count, closed = len(open_nodes), [np.inf]
+        while open_nodes and open_nodes[0][0] < self._enough and most_nodes > 0:
+            most_nodes -= 1
             allowed = _ordered(self._alike, heapq.heappop(open_nodes)[2])
             if not self._possible(allowed):
                 continue

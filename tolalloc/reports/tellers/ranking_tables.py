@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from tolalloc.drawings.sources import Source, zone_in, zone_unit
 from tolalloc.drawings.tolerance_table import with_own_words
 from tolalloc.reading.units import MICROMETRE, unit_of
-from tolalloc.reports.columns import Column, Table, span
+from tolalloc.reports.columns import Column, Table, of_positions, span
 from tolalloc.reports.feature_frame import Frames, callout
 from tolalloc.reports.header import Header
 from tolalloc.reports.templates import Sentences
@@ -36,26 +36,6 @@ if TYPE_CHECKING:
 _say = Sentences("ranking")
 _ALIKE = 9
 """Decimals of a value over the largest one to which equal ones are alike, so that no last digit orders them [-]."""
-
-
-def of_positions(name: str, columns: Mapping[str, Any], rows: Iterable[int]) -> Table[int]:
-    """Return a table whose rows are positions in arrays.
-
-    Parameters
-    ----------
-    name
-        Name of its sheet and file.
-    columns
-        Header → what stands at every position, or what says it of one.
-    rows
-        The positions in the order of the table.
-    """
-    made = (Column(header=header, value=_reader(own)) for header, own in columns.items())
-    return Table[int](name=name, columns=tuple(made), rows=list(rows))
-
-
-def _reader(column: Any) -> Any:
-    return column if callable(column) else column.__getitem__
 
 
 def largest_first(values: Sequence[float] | np.ndarray) -> list[int]:
