@@ -1,7 +1,7 @@
-"""A script plays the newcomer: a new folder, three cells changed in Excel, a check, a run, for 2, 3 and 4 cranks.
+"""A script plays the newcomer: a new folder, three cells changed in Excel, a check, a run.
 
-The whole `run --quick` of such a folder takes minutes, most of them for how far each zone may open alone. So the effort
-here is smaller still, and only the folder of three cranks is asked both questions.
+The whole `run --quick` of such a folder takes minutes, so the effort here is smaller still and the ranking left out.
+The golden case ``three`` asks both questions of a folder of three cranks.
 """
 
 from __future__ import annotations
@@ -17,16 +17,12 @@ from tolalloc.drawings.drawing import load_drawing
 
 SMALL = """seed=1,
     effort=ta.Effort(
-        ranking=RankingEffort(
-            units=1000, sobol=SobolEffort(start=16, limit=16), trajectories=2, moment_units=100, derivative_units=10,
-            inverse_units=1, surrogate_units=96, level_units=100, level_runs=2, widened_units=100, permutations=2),
         allocation=AllocationEffort(
-            verification_units=400, confirmation_units=800, shared_units=24, exact_points=4, share_blocks=4, error=0.5,
+            verification_units=300, confirmation_units=600, shared_units=16, exact_points=4, share_blocks=4, error=0.5,
             search=SearchEffort(steps=2)),
         is_quick=True),
 """
 IMPORTS = """from tolalloc.allocation.space.effort import AllocationEffort, SearchEffort
-from tolalloc.sensitivity.effort import RankingEffort, SobolEffort
 
 import tolalloc as ta
 """
@@ -49,18 +45,16 @@ def change_cells(path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("cranks", "questions"), [(2, "ta.Allocation"), (3, "ta.Ranking")])
-def test_a_newcomer_comes_from_nothing_to_an_answer(tmp_path, cranks, questions):
+def test_a_newcomer_comes_from_nothing_to_an_answer(tmp_path):
     place = tmp_path / "mine"
-    assert tolalloc("new", place, "--cranks", cranks).returncode == 0
+    assert tolalloc("new", place, "--cranks", 2).returncode == 0
     change_cells(place / "zones.xlsx")
     checked = tolalloc("check", place / "study.py")
     assert checked.returncode == 0, checked.stderr
     study = (place / "study.py").read_text(encoding="utf-8")
     asked = "[ta.Ranking(), ta.Allocation()]"
     assert asked in study
-    allocation = "ta.Allocation(fixed_first=False, front=False, what_if=False)"
-    kept = f"[{allocation}]" if questions == "ta.Allocation" else f"[ta.Ranking(), {allocation}]"
+    kept = "[ta.Allocation(fixed_first=False, front=False, what_if=False)]"
     study = study.replace("import tolalloc as ta\n", IMPORTS).replace("seed=1,\n", SMALL).replace(asked, kept)
     (place / "study.py").write_text(study.replace("0.9973", "0.9"), encoding="utf-8")
     run = tolalloc("run", place / "study.py", "--out", tmp_path / "run")

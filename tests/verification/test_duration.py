@@ -38,12 +38,11 @@ def test_the_units_of_an_own_function_are_foretold():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("identified", [False, True])
-def test_the_units_of_a_reducer_are_foretold(identified):
-    stiffness = {"stiffness": "rv20e_table6"} if identified else {}
+def test_the_units_of_a_reducer_of_uncertain_stiffness_are_foretold():
+    modification = {"flank_clearance": (1.0, 5.0), "radial_clearance": (5.0, 20.0)}
     require_foretold(
         ta.Study(
-            ta.reducer("rv20e_liu2020", flank_clearance=(1.0, 5.0), radial_clearance=(5.0, 20.0), **stiffness),
+            ta.reducer("rv20e_liu2020", stiffness="rv20e_table6", **modification),
             ta.drawing("rv20e_table4"),
             limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)},
             effort="quick",

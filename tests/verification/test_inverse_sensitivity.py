@@ -172,11 +172,9 @@ def test_a_jump_over_the_limit_is_refused():
 
     errors = ErrorModel(ERRORS.sources[:1])
     with pytest.raises(SolveError, match="jumps over the limit"):
-        found(0.5, response=Jump(columns=("a",)), errors=errors, largest_factor=2.0)
+        found(0.5, response=Jump(columns=("a",)), errors=errors)
 
 
-def test_too_few_units_and_a_factor_that_does_not_open_are_refused():
+def test_too_few_units_are_refused():
     with pytest.raises(InputError, match="500 or more"):
         found(14.0, units=400)
-    with pytest.raises(InputError, match="above 1"):
-        found(14.0, largest_factor=1.0)

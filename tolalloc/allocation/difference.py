@@ -24,31 +24,17 @@ _CHUNKS_AT_ONCE = 16
 
 @dataclass(frozen=True, kw_only=True)
 class DifferenceResult:
-    """Two drawings on the same random units.
+    """Two drawings on the same random units."""
 
-    Parameters
-    ----------
-    requirements
-        What is limited, the leading output first.
-    before, after
-        The sources that change, as they are and at their other zones with their costs.
-    whole_cost
-        Cost of the whole drawing before [cost units].
-    outputs
-        Names of the outputs.
-    values
-        Of the drawing before and after, NaN where a unit has none [as the names state].
-    seeds
-        Of the resamples.
-    """
-
-    requirements: tuple[Requirement, ...]
+    requirements: tuple[Requirement, ...]  # What is limited, the leading output first
+    # The sources that change, as they are and at their other zones with their costs
     before: tuple[Source, ...]
     after: tuple[Source, ...]
-    whole_cost: float
-    outputs: tuple[str, ...]
+    whole_cost: float  # Cost of the whole drawing before [cost units]
+    outputs: tuple[str, ...]  # Names of the outputs
+    # Of the drawing before and after, NaN where a unit has none [as the names state]
     values: Float[np.ndarray, "2 unit output"]
-    seeds: SeedTree
+    seeds: SeedTree  # Of the resamples
 
     @property
     def cost_change(self) -> float:

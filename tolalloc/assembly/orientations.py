@@ -159,12 +159,13 @@ class OrientationResponse:
         place, moved = f"datum flow chain of {reducer.name}", self._moved(np.zeros((1, len(self.columns))))
         if not moved:
             raise InputError.at(place, "columns that its parts move", [], "at least one column of the reducer's model")
+        tilts = [f"disc{disc + 1}.tilt" for disc in range(reducer.disc_count)]
         for name in moved:
             if name in self.model.columns:
                 if not is_angular(source_name(name)):
                     raise InputError.at(place, "column", name, f"an angle, whose source ends in {' or '.join(ANGULAR)}")
                 continue
-            if LAWS[law] != LINEAR and name.rpartition(".")[0] in _disc_tilts(reducer.disc_count):
+            if LAWS[law] != LINEAR and name.rpartition(".")[0] in tilts:
                 linear = " or ".join(known for known in LAWS if LAWS[known] == LINEAR)
                 raise InputError.at(place, f"law of the pin contact, with {name},", law, linear)
             size = f"{reducer.disc_count} discs and {reducer.crank_count} crankshafts"
@@ -205,10 +206,6 @@ class OrientationResponse:
 
     def _deviations(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample moved"]:
         return np.stack(list(self._moved(x).values()), axis=1)
-
-
-def _disc_tilts(discs: int) -> tuple[str, ...]:
-    return tuple(f"disc{disc + 1}.tilt" for disc in range(discs))
 
 
 def transmission_effect(

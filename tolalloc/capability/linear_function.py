@@ -103,11 +103,9 @@ class _Part:
         """Return the probabilities of the cells around multiples of a step, those below zero at the end [-]."""
         places = (np.arange(points) - points // 2) * step
         edges = np.append(places - step / 2, places[-1] + step / 2)
-        below = self.marginal.probability(edges / self.width) if self.width > 0 else self._turned(edges)
+        below = self.marginal.probability(edges / self.width)
+        below = below if self.width > 0 else 1.0 - below
         return np.asarray(np.fft.ifftshift(np.diff(below)))
-
-    def _turned(self, edges: Float[np.ndarray, " edge"]) -> Float[np.ndarray, " edge"]:
-        return np.asarray(1.0 - self.marginal.probability(edges / self.width))
 
     @property
     def reach(self) -> float:
@@ -243,7 +241,8 @@ class LinearLaw:
         """Mean of what the zone gives each normal column beside its middle [m]."""
         found = []
         for source, zone in zip(self.errors.active, self.zones, strict=True):
-            mean = source.zone_mapping.moments[0] / source.lever * zone if _is_normal_size(source) else 0.0
+            is_normal_size = source.feature is Feature.SIZE and _is_normal(source)
+            mean = source.zone_mapping.moments[0] / source.lever * zone if is_normal_size else 0.0
             found += [mean] * len(source.columns)
         return np.array(found)
 
@@ -419,10 +418,6 @@ class NearPlane:
 
 
 _KNOWN = (Feature.SIZE, Feature.POSITION, Feature.PITCH, Feature.RUNOUT)
-
-
-def _is_normal_size(source: Source) -> bool:
-    return source.feature is Feature.SIZE and _is_normal(source)
 
 
 def _is_normal(source: Source) -> bool:

@@ -10,7 +10,6 @@ leaves more units to solve, or far ones beyond the limit, each of which weighs m
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -88,16 +87,12 @@ class Drawn:
         tail = (1 - CONFIDENCE) / 2
         return Yield(
             estimate=1.0 - near / self.units - far / self.whatever,
-            low=1.0 - self._largest(weight, tail),
+            low=1.0 - _largest(self, weight, tail),
             high=proportion(self.units, near).high,
-            bound=1.0 - self._largest(weight, 1 - CONFIDENCE),
+            bound=1.0 - _largest(self, weight, 1 - CONFIDENCE),
             units=self.units,
             rejected=near + far,
         )
-
-    def _largest(self, weight: float, error: float) -> float:
-        """Return the largest share at which so little weight has a probability above the error [-]."""
-        return _crossing(lambda share: self.probability_of_no_more(weight, share) <= error)
 
     def probability_of_no_more(self, weight: float, share: float) -> float:
         """Return the largest probability, over all parts of a share, that no more weight lies beyond the limit [-].
@@ -139,12 +134,13 @@ def _allowed(drawn: Drawn, target: float, confidence: float) -> float:
     return float(allowed)
 
 
-def _crossing(is_beyond: Callable[[float], bool]) -> float:
-    """Return the share at which a statement on shares turns true, by halving [-]."""
+@lru_cache(maxsize=4096)
+def _largest(drawn: Drawn, weight: float, error: float) -> float:
+    """Return the largest share at which so little weight has a probability above the error, by halving [-]."""
     low, high = 0.0, 1.0
     while high - low > 1e-4 * high:
         middle = (low + high) / 2
-        low, high = (low, middle) if is_beyond(middle) else (middle, high)
+        low, high = (low, middle) if drawn.probability_of_no_more(weight, middle) <= error else (middle, high)
     return high
 
 

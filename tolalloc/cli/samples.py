@@ -174,14 +174,9 @@ _CURVE = "# Simulated: a unit whose pitch of the housing is bad.\nangle [deg],tr
 
 @dataclass(frozen=True, kw_only=True)
 class Samples:
-    """Simulated files of one reducer.
+    """Simulated files of one reducer."""
 
-    Parameters
-    ----------
-    reducer, sources
-        The reducer and its tolerance table.
-    """
-
+    # The reducer and its tolerance table
     reducer: Reducer
     sources: tuple[Source, ...]
 

@@ -418,21 +418,11 @@ def _write_schemas(folder: Path, reducer: str) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class NewFolder:
-    """A folder to be made.
+    """A folder to be made."""
 
-    Parameters
-    ----------
-    place
-        Where it will be; its last part names reducer and study.
-    like
-        What the reducer is like.
-    samples
-        Kinds of samples, of those that the family has.
-    """
-
-    place: Path
-    like: Likeness
-    samples: tuple[str, ...] = ()
+    place: Path  # Where it will be; its last part names reducer and study
+    like: Likeness  # What the reducer is like
+    samples: tuple[str, ...] = ()  # Kinds of samples, of those that the family has
 
     def __post_init__(self) -> None:
         if not _NAME.fullmatch(self.place.name):

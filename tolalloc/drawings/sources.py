@@ -113,82 +113,49 @@ def known_as(sources: Iterable[Source]) -> list[str]:
 class Source:
     """One tolerance on a drawing: one source of error, one or more columns of the model.
 
-    Parameters
-    ----------
-    name
-        Identifier; a column is this name, or this name and a component.
-    zone
-        Width, diameter, total pitch deviation or indicator reading of the zone [m].
-    minimum, maximum
-        Smallest and largest zone that may be asked for [m].
-    cost
-        Cost of the feature at its zone [cost units].
-    middle
-        Middle of the zone as a deviation from the nominal size, for sizes only [m].
-    nominal
-        Nominal size, for the drawing and its grades only [m].
-    cp
-        Process capability; at 1, 99.73 % of parts lie in the zone, or all where the distribution is bounded [-].
-    shift
-        Mean shift over half the zone, for sizes only [-].
-    shape
-        Shape of a lognormal, Weibull or trapezoidal distribution, both of a beta distribution, else 0 [-].
-    spectrum
-        Order → relative amplitude of pitch and run-out deviations [-].
-    systematic
-        Waves that all parts share beside the random ones inside the zone, of orders of the spectrum [-, m, rad].
-    teeth
-        Number of teeth on which the range of the spectrum is taken; 0: over the whole turn [-].
-    each
-        Number of like features (pins, teeth) that each deviate on their own inside this zone [-].
-    step
-        Step of the numbers that the drawing states; 0: the usual one, if its model has such [m].
-    over
-        For an angle, the length over which the zone limits the deviation; 0 for everything else [m].
-    unit
-        Unit in which the user's table states its zone: µm, mm, in, or % of the nominal size.
-    own_id
-        What the user's table calls it, if that is not its name.
-    own_cells
-        Head and cell of every column of the user's own that is none of a tolerance table; kept, and written again.
-    part, feature, distribution, batches, measured, sorted, process, written_spectrum, group, locked, grade, drawing,
-    label, note
-        As `tolalloc.drawings.fields.ToleranceRow` says, the one list of what a table may state.
+    What stands here without a word is as `tolalloc.drawings.fields.ToleranceRow` says, the one list of what a table may
+    state.
     """
 
-    name: str
+    name: str  # Identifier; a column is this name, or this name and a component
     part: str
     feature: Feature
-    zone: float
+    zone: float  # Width, diameter, total pitch deviation or indicator reading of the zone [m]
+    # Smallest and largest zone that may be asked for [m]
     minimum: float
     maximum: float
-    cost: float
-    middle: float = 0.0
-    nominal: float = 0.0
+    cost: float  # Cost of the feature at its zone [cost units]
+    middle: float = 0.0  # Middle of the zone as a deviation from the nominal size, for sizes only [m]
+    nominal: float = 0.0  # Nominal size, for the drawing and its grades only [m]
     distribution: Distribution = Distribution.NORMAL
+    # Process capability; at 1, 99.73 % of parts lie in the zone, or all where the distribution is bounded [-]
     cp: float = 1.0
-    shift: float = 0.0
+    shift: float = 0.0  # Mean shift over half the zone, for sizes only [-]
+    # Shape of a lognormal, Weibull or trapezoidal distribution, both of a beta distribution, else 0 [-]
     shape: float | tuple[float, ...] = 0.0
     batches: tuple[Batch, ...] = ()
     measured: MeasuredParts | None = None
     sorted: bool = False
     process: str = ""
-    spectrum: Spectrum = ()
+    spectrum: Spectrum = ()  # Order → relative amplitude of pitch and run-out deviations [-]
+    # Waves that all parts share beside the random ones inside the zone, of orders of the spectrum [-, m, rad]
     systematic: Systematic = ()
-    teeth: int = 0
+    teeth: int = 0  # Number of teeth on which the range of the spectrum is taken; 0: over the whole turn [-]
     written_spectrum: str = ""
-    each: int = 1
-    over: float = 0.0
-    step: float = 0.0
+    each: int = 1  # Number of like features (pins, teeth) that each deviate on their own inside this zone [-]
+    over: float = 0.0  # For an angle, the length over which the zone limits the deviation; 0 for everything else [m]
+    step: float = 0.0  # Step of the numbers that the drawing states; 0: the usual one, if its model has such [m]
     group: str = ""
     locked: bool = False
     grade: str = ""
     drawing: str = ""
     label: str = ""
-    own_id: str = ""
+    own_id: str = ""  # What the user's table calls it, if that is not its name
     note: str = ""
+    # Head and cell of every column of the user's own that is none of a tolerance table; kept, and written again
     own_cells: tuple[tuple[str, str], ...] = ()
-    # How a table says it, which changes nothing that is computed but the inputs of an own function, which knows it
+    # Unit in which the user's table states its zone: µm, mm, in, or % of the nominal size. It changes nothing that is
+    # computed but the inputs of an own function, which knows it
     unit: str = field(default="µm", repr=False)
 
     @property

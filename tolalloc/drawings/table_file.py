@@ -225,20 +225,13 @@ _APOSTROPHE = re.compile(r"^'(?=[=+\-@])")
 
 @dataclass(frozen=True, kw_only=True)
 class Heads:
-    """How a table's heads are read.
+    """How a table's heads are read."""
 
-    Parameters
-    ----------
-    needed
-        Names of columns: the header is the first row that has them all, and rows above it are titles.
-    known
-        Names of columns in the spelling that is meant; a head in other capitals is one of them.
-    called
-        Head as an office writes it, without its unit → the name of the column that it is.
-    """
-
+    # Names of columns: the header is the first row that has them all, and rows above it are titles
     needed: tuple[str, ...] = ()
+    # Names of columns in the spelling that is meant; a head in other capitals is one of them
     known: tuple[str, ...] = ()
+    # Head as an office writes it, without its unit → the name of the column that it is
     called: Mapping[str, str] = field(default_factory=dict)
 
     def meant(self, head: str) -> str:

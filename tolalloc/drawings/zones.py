@@ -245,13 +245,6 @@ def _isotropic(magnitude: Marginal, uniform: Float[np.ndarray, "sample column"])
 class ZoneMapping:
     """Distribution of a source's columns per unit of zone.
 
-    Parameters
-    ----------
-    feature, distribution, cp, shift, spectrum, teeth, sorted
-        As in `tolalloc.drawings.sources.Source` [-].
-    base
-        The distribution with its parameters.
-
     Notes
     -----
     A size spreads around the middle of its zone; a one-sided distribution starts at the lower limit. The radius of a
@@ -259,9 +252,10 @@ class ZoneMapping:
     zone where all orders are at their largest.
     """
 
+    # As in `tolalloc.drawings.sources.Source` [-]
     feature: Feature
     distribution: Distribution
-    base: Marginal
+    base: Marginal  # The distribution with its parameters
     cp: float
     shift: float
     spectrum: Spectrum

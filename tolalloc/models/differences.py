@@ -42,15 +42,6 @@ class _Exact:
 class DifferencedResponse:
     """One output of a response that knows no derivatives.
 
-    Parameters
-    ----------
-    response
-        What answers.
-    output
-        Name of the output with its unit.
-    steps
-        Step of every column to either side [unit of the column].
-
     Raises
     ------
     InputError, UnknownNameError
@@ -62,9 +53,9 @@ class DifferencedResponse:
     step; across a kink a difference is a mean of both sides.
     """
 
-    response: Response
-    output: str
-    steps: Float[np.ndarray, " column"]
+    response: Response  # What answers
+    output: str  # Name of the output with its unit
+    steps: Float[np.ndarray, " column"]  # Step of every column to either side [unit of the column]
 
     def __post_init__(self) -> None:
         if self.output not in self.response.outputs:

@@ -23,25 +23,14 @@ from tolalloc.reading.units import MILLIMETRE
 
 @dataclass(frozen=True)
 class SimulatedUnit:
-    """A unit as a function of its parameters, one sample a call.
+    """A unit as a function of its parameters, one sample a call."""
 
-    Parameters
-    ----------
-    path
-        The file.
-    parameters, variables
-        What is set before, and read after a simulation.
-    stop_time
-        Simulated time [s].
-    engine
-        The library.
-    """
-
-    path: Path
+    path: Path  # The file
+    # What is set before, and read after a simulation
     parameters: tuple[str, ...]
     variables: tuple[str, ...]
-    stop_time: float
-    engine: Any
+    stop_time: float  # Simulated time [s]
+    engine: Any  # The library
 
     @property
     def name(self) -> str:
@@ -97,37 +86,20 @@ _STEP_OF_SIMULATION = 0.02
 
 @dataclass(frozen=True, kw_only=True)
 class FunctionModel:
-    """A function of the dimensions on a drawing.
+    """A function of the dimensions on a drawing."""
 
-    Parameters
-    ----------
-    function
-        Takes the inputs in their order, then the settings; returns the output, or a sequence of outputs. An input is
-        the nominal plus the deviation [mm, or in where its row is in inches], of an angle the deviation [rad]; a
-        function may take arrays of samples, each output then being a number or one number per sample, or single
-        numbers.
-    inputs
-        Names of the inputs: ids of the drawing, for positions ``id.x`` and ``id.y``.
-    outputs
-        Names of the outputs with their units.
-    settings
-        What the designer chooses beside the zones.
-    jacobian
-        Takes what the function takes and returns, for every output, the derivative by every input [unit of the output
-        per mm or in]; central differences unless given.
-    step
-        Step of these differences to either side, over the zone [-].
-    name
-        What a report calls the model.
-    """
-
+    # Takes the inputs in their order, then the settings; returns the output, or a sequence of outputs. An input is the
+    # nominal plus the deviation [mm, or in where its row is in inches], of an angle the deviation [rad]; a function may
+    # take arrays of samples, each output then being a number or one number per sample, or single numbers
     function: Callable[..., Any]
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    settings: tuple[Setting, ...] = ()
+    inputs: tuple[str, ...]  # Names of the inputs: ids of the drawing, for positions ``id.x`` and ``id.y``
+    outputs: tuple[str, ...]  # Names of the outputs with their units
+    settings: tuple[Setting, ...] = ()  # What the designer chooses beside the zones
+    # Takes what the function takes and returns, for every output, the derivative by every input [unit of the output per
+    # mm or in]; central differences unless given
     jacobian: Callable[..., Any] | None = None
-    step: float = _STEP
-    name: str = "own model"
+    step: float = _STEP  # Step of these differences to either side, over the zone [-]
+    name: str = "own model"  # What a report calls the model
 
     def __post_init__(self) -> None:
         for field_name, names in (("inputs", self.inputs), ("outputs", self.outputs)):
@@ -182,36 +154,17 @@ class FunctionModel:
 
 @dataclass(frozen=True, kw_only=True)
 class BoundFunction(Model):
-    """A function at the sources of a drawing.
+    """A function at the sources of a drawing."""
 
-    Parameters
-    ----------
-    source
-        The function with its names.
-    varied
-        Names of the inputs that vary, in the order of X.
-    steps
-        Step of every varied input to either side of a difference [m, angles rad].
-    offsets
-        Nominal of every input, with what a zone of 0 leaves it [m, angles rad].
-    lengths
-        Unit in which every input reaches the function: millimetre or inch; no matter for an angle [m].
-    values
-        Values of the settings in force [units of their names].
-    asked
-        Names of the outputs that a call returns; all unless given.
-    observe
-        Told the statuses of each call.
-    """
-
-    source: FunctionModel
-    varied: tuple[str, ...]
-    steps: Float[np.ndarray, " column"]
-    offsets: Float[np.ndarray, " input"]
+    source: FunctionModel  # The function with its names
+    varied: tuple[str, ...]  # Names of the inputs that vary, in the order of X
+    steps: Float[np.ndarray, " column"]  # Step of every varied input to either side of a difference [m, angles rad]
+    offsets: Float[np.ndarray, " input"]  # Nominal of every input, with what a zone of 0 leaves it [m, angles rad]
+    # Unit in which every input reaches the function: millimetre or inch; no matter for an angle [m]
     lengths: tuple[float, ...]
-    values: tuple[float, ...] = ()
-    asked: tuple[str, ...] = ()
-    observe: Observer = unobserved
+    values: tuple[float, ...] = ()  # Values of the settings in force [units of their names]
+    asked: tuple[str, ...] = ()  # Names of the outputs that a call returns; all unless given
+    observe: Observer = unobserved  # Told the statuses of each call
 
     @property
     def name(self) -> str:

@@ -112,21 +112,11 @@ class KeepsTables(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class SettingDerivatives:
-    """Answers of one output with its exact derivatives.
+    """Answers of one output with its exact derivatives."""
 
-    Parameters
-    ----------
-    evaluation
-        The output and the status of every sample.
-    by_column
-        Derivative by every column [output per unit of the column].
-    by_setting
-        Derivative by every setting [output per unit of the setting].
-    """
-
-    evaluation: Evaluation
-    by_column: Float[np.ndarray, "sample column"]
-    by_setting: Float[np.ndarray, "sample setting"]
+    evaluation: Evaluation  # The output and the status of every sample
+    by_column: Float[np.ndarray, "sample column"]  # Derivative by every column [output per unit of the column]
+    by_setting: Float[np.ndarray, "sample setting"]  # Derivative by every setting [output per unit of the setting]
 
 
 ARRAY_RATE = 500_000.0

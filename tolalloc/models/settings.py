@@ -68,29 +68,16 @@ class Setting(NamedFields):
 
 @dataclass(frozen=True, kw_only=True)
 class DrawnAmounts:
-    """What a drawing says of the settings: amounts that are linear in them, in steps.
+    """What a drawing says of the settings: amounts that are linear in them, in steps."""
 
-    Parameters
-    ----------
-    names
-        Names of the amounts with their units, as many as settings.
-    by_setting
-        Change of every amount (row) with every setting (column) [unit of the amount per unit of the setting].
-    steps
-        Step of every amount on a drawing whose zones climb ladders [unit of the amount].
-    finest
-        Step of every amount on any other drawing; none if it states them as they were found [unit of the amount].
-    convention
-        What their signs mean, a sentence without its full stop; empty where a name says all.
-    sources
-        Source whose zone is the tolerance of each amount, whether the drawing states it or not; none if there is none.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # Names of the amounts with their units, as many as settings
+    # Change of every amount (row) with every setting (column) [unit of the amount per unit of the setting]
     by_setting: Float[np.ndarray, "amount setting"]
-    steps: tuple[float, ...]
+    steps: tuple[float, ...]  # Step of every amount on a drawing whose zones climb ladders [unit of the amount]
+    # Step of every amount on any other drawing; none if it states them as they were found [unit of the amount]
     finest: tuple[float, ...] = ()
-    convention: str = ""
+    convention: str = ""  # What their signs mean, a sentence without its full stop; empty where a name says all
+    # Source whose zone is the tolerance of each amount, whether the drawing states it or not; none if there is none
     sources: tuple[str, ...] = ()
 
 

@@ -31,21 +31,11 @@ def is_number(value: object) -> bool:
 
 @dataclass(frozen=True)
 class Rule:
-    """What a field of a record, or an argument, may hold.
+    """What a field of a record, or an argument, may hold."""
 
-    Parameters
-    ----------
-    allowed
-        The same in words, as a refusal says it.
-    keeps
-        Whether a value is allowed.
-    name
-        What a refusal calls the field; its own name unless given.
-    """
-
-    allowed: str
-    keeps: Callable[[Any], bool]
-    name: str = ""
+    allowed: str  # The same in words, as a refusal says it
+    keeps: Callable[[Any], bool]  # Whether a value is allowed
+    name: str = ""  # What a refusal calls the field; its own name unless given
 
     def check(self, place: str, name: str, value: object, *, of_argument: bool = False) -> None:
         """Raise unless the value is allowed.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
@@ -19,27 +19,15 @@ Row = TypeVar("Row")
 
 @dataclass(frozen=True, kw_only=True)
 class Column(Generic[Row]):
-    """One column of a table.
+    """One column of a table."""
 
-    Parameters
-    ----------
-    header
-        Header with its unit; ``{cost}`` in it stands for what costs are counted in.
-    value
-        What stands in a row's cell.
-    key
-        Name in a summary, where a program reads it; the header unless given, None where no program needs it.
-    terminal
-        Place among the columns that a terminal shows, those of one place in their order; 0 if it does not
-        show it [-].
-    nothing
-        Cell that says nothing: where all cells are so or empty, the column is left out; None to keep it always.
-    """
-
-    header: str
-    value: Callable[[Row], Any]
+    header: str  # Header with its unit; ``{cost}`` in it stands for what costs are counted in
+    value: Callable[[Row], Any]  # What stands in a row's cell
+    # Name in a summary, where a program reads it; the header unless given, None where no program needs it
     key: str | None = ""
+    # Place among the columns that a terminal shows, those of one place in their order; 0 if it does not show it [-]
     terminal: int = 0
+    # Cell that says nothing: where all cells are so or empty, the column is left out; None to keep it always
     nothing: str | None = None
 
     def titled(self, cost_unit: str) -> str:
@@ -49,21 +37,11 @@ class Column(Generic[Row]):
 
 @dataclass(frozen=True, kw_only=True)
 class Table(Generic[Row]):
-    """A table as it is declared, with its rows.
+    """A table as it is declared, with its rows."""
 
-    Parameters
-    ----------
-    name
-        Name of its sheet and file.
-    columns
-        Its columns in their order.
-    rows
-        What its rows tell of.
-    """
-
-    name: str
-    columns: Sequence[Column[Row]]
-    rows: Sequence[Row]
+    name: str  # Name of its sheet and file
+    columns: Sequence[Column[Row]]  # Its columns in their order
+    rows: Sequence[Row]  # What its rows tell of
 
     def frame(self, cost_unit: str = COST_UNITS) -> pd.DataFrame:
         """Return the table for people: all columns that say something, costs in their unit."""
@@ -95,6 +73,29 @@ class Table(Generic[Row]):
             for own, cells in told
             if own.nothing is None or any(cell not in (own.nothing, "") for cell in cells)
         ]
+
+
+def of_positions(name: str, columns: Mapping[str, Any], rows: Iterable[int]) -> Table[int]:
+    """Return a table whose rows are positions in arrays.
+
+    Parameters
+    ----------
+    name
+        Name of its sheet and file.
+    columns
+        Header → what stands at every position, or what says it of one.
+    rows
+        The positions in the order of the table.
+
+    Examples
+    --------
+    >>> of_positions("zones", {"zone [µm]": [4.0, 9.0], "row [-]": lambda at: at + 1}, [1, 0]).records()
+    [{'zone [µm]': 9.0, 'row [-]': 2}, {'zone [µm]': 4.0, 'row [-]': 1}]
+    """
+    made = [
+        Column[int](header=header, value=own if callable(own) else own.__getitem__) for header, own in columns.items()
+    ]
+    return Table(name=name, columns=made, rows=list(rows))
 
 
 def _framed(told: Sequence[tuple[Column[Row], list[Any]]], cost_unit: str) -> pd.DataFrame:

@@ -134,7 +134,9 @@ def joined(title: str, subtitle: str, parts: Iterable[tuple[str, Document]], **m
     reports = tuple(parts)
     leading = [part for part, document in reports if any(section.first for section in document.sections)][-1:]
     for part, document in reports:
-        own = {name: frame for name, frame in document.tables.items() if not _same(known.get(name), frame)}
+        own = {
+            name: frame for name, frame in document.tables.items() if name not in known or not known[name].equals(frame)
+        }
         tables = {name: f"{part} {name}" if name in known else name for name in own}
         figures = {name: f"{part} {name}" if name in drawn else name for name in document.figures}
         known |= {tables[name]: frame for name, frame in own.items()}
@@ -180,8 +182,3 @@ def _once(sentences: Iterable[str]) -> tuple[str, ...]:
     for sentence in sentences:
         first.setdefault(re.sub(r"\d[\d.,]*", "#", sentence), sentence)
     return tuple(first.values())
-
-
-def _same(earlier: pd.DataFrame | None, frame: pd.DataFrame) -> bool:
-    """Return whether an earlier table says the same."""
-    return earlier is not None and earlier.equals(frame)

@@ -64,27 +64,14 @@ Lines = tuple[tuple[tuple[float, float], ...], ...]
 
 @dataclass(frozen=True)
 class FeatureFrame:
-    """What stands on a drawing for one tolerance.
+    """What stands on a drawing for one tolerance."""
 
-    Parameters
-    ----------
-    characteristic
-        One of `SYMBOLS`.
-    zone
-        The zone as it is written, such as ``⌀0.0047`` or ``±0.001``, in millimetres.
-    datums
-        Letters of the datums, the first one first.
-    exact
-        The zone that the drawing was verified with, in words.
-    place
-        Where the zone holds if the feature does not say so, such as ``at R 0.9`` in millimetres; it stands beside the
-        frame.
-    """
-
-    characteristic: str
-    zone: str
-    datums: tuple[str, ...] = ()
-    exact: str = ""
+    characteristic: str  # One of `SYMBOLS`
+    zone: str  # The zone as it is written, such as ``⌀0.0047`` or ``±0.001``, in millimetres
+    datums: tuple[str, ...] = ()  # Letters of the datums, the first one first
+    exact: str = ""  # The zone that the drawing was verified with, in words
+    # Where the zone holds if the feature does not say so, such as ``at R 0.9`` in millimetres; it stands beside the
+    # frame
     place: str = ""
 
     @property

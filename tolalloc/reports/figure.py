@@ -90,31 +90,16 @@ class Figure:
 
 @dataclass(frozen=True, kw_only=True)
 class HeatMap:
-    """A figure of coloured cells.
+    """A figure of coloured cells."""
 
-    Parameters
-    ----------
-    name
-        File name without ending.
-    title
-        What it shows, as a sentence.
-    columns, rows
-        Names of the columns and the rows.
-    x_label
-        What the columns are.
-    label
-        What a cell says, with its unit.
-    values
-        One row of numbers per row; the darkest is the largest.
-    """
-
-    name: str
-    title: str
+    name: str  # File name without ending
+    title: str  # What it shows, as a sentence
+    # Names of the columns and the rows
     columns: Sequence[str]
     rows: Sequence[str]
-    x_label: str = ""
-    label: str
-    values: Sequence[Sequence[float]]
+    x_label: str = ""  # What the columns are
+    label: str  # What a cell says, with its unit
+    values: Sequence[Sequence[float]]  # One row of numbers per row; the darkest is the largest
 
     @property
     def largest(self) -> float:

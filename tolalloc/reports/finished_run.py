@@ -29,28 +29,15 @@ _ZONED = ("id", "unit", "plus [unit]", "minus [unit]", "cost [cost units]")
 
 @dataclass(frozen=True, kw_only=True)
 class FinishedRun:
-    """What a run folder says.
+    """What a run folder says."""
 
-    Parameters
-    ----------
-    name
-        That of its study.
-    folder
-        Its folder, as it was named.
-    summary, manifest
-        Answers of all its questions in one, and circumstances, units in the names.
-    ranking
-        Sources, largest total index first.
-    zones
-        The allocated tolerance table, or the one that was ranked.
-    """
-
-    name: str
-    folder: Path
+    name: str  # That of its study
+    folder: Path  # Its folder, as it was named
+    # Answers of all its questions in one, and circumstances, units in the names
     summary: dict[str, Any]
     manifest: dict[str, Any]
-    ranking: pd.DataFrame
-    zones: pd.DataFrame
+    ranking: pd.DataFrame  # Sources, largest total index first
+    zones: pd.DataFrame  # The allocated tolerance table, or the one that was ranked
 
     @property
     def currency(self) -> str:
@@ -126,24 +113,12 @@ class Comparison:
 
 @dataclass(frozen=True, kw_only=True)
 class Member:
-    """One study of a series and what became of it.
+    """One study of a series and what became of it."""
 
-    Parameters
-    ----------
-    name
-        Its name.
-    folder
-        Its run folder.
-    found
-        What the folder says; none if it could not be run.
-    fault
-        Why it could not be run, in a sentence.
-    """
-
-    name: str
-    folder: Path
-    found: FinishedRun | None = None
-    fault: str = ""
+    name: str  # Its name
+    folder: Path  # Its run folder
+    found: FinishedRun | None = None  # What the folder says; none if it could not be run
+    fault: str = ""  # Why it could not be run, in a sentence
 
     @property
     def met(self) -> bool | None:

@@ -10,44 +10,20 @@ from tolalloc.reading.units import COST_UNITS
 
 @dataclass(frozen=True, kw_only=True)
 class Header:
-    """What every answer says of its run.
+    """What every answer says of its run."""
 
-    Parameters
-    ----------
-    name
-        Name of the study, or of what was measured.
-    model
-        Name of the model, such as the reducer's.
-    seed
-        Seed of the random numbers; none if nothing is random [-].
-    quick
-        Whether the effort was shortened.
-    digest
-        Of what was asked and of what its files hold; empty where nothing is compared later.
-    conditions
-        Under which conditions the model answered, units in the names, such as the torque on the carrier.
-    assumptions
-        What no source of the model states.
-    statuses
-        Outcome → number of solved units [-].
-    stages
-        Seconds and units of each stage.
-    currency
-        What costs are in by the user's own files, such as EUR; empty where they are cost units.
-    title_block
-        Drawing number, revision and author, as far as the study states them.
-    """
-
-    name: str
-    model: str
-    seed: int | None = None
-    quick: bool = False
-    digest: str = ""
+    name: str  # Name of the study, or of what was measured
+    model: str  # Name of the model, such as the reducer's
+    seed: int | None = None  # Seed of the random numbers; none if nothing is random [-]
+    quick: bool = False  # Whether the effort was shortened
+    digest: str = ""  # Of what was asked and of what its files hold; empty where nothing is compared later
+    # Under which conditions the model answered, units in the names, such as the torque on the carrier
     conditions: Mapping[str, float | str] = field(default_factory=dict)
-    assumptions: tuple[str, ...] = ()
-    statuses: Mapping[str, int] = field(default_factory=dict)
-    stages: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    currency: str = ""
+    assumptions: tuple[str, ...] = ()  # What no source of the model states
+    statuses: Mapping[str, int] = field(default_factory=dict)  # Outcome → number of solved units [-]
+    stages: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # Seconds and units of each stage
+    currency: str = ""  # What costs are in by the user's own files, such as EUR; empty where they are cost units
+    # Drawing number, revision and author, as far as the study states them
     title_block: Mapping[str, str] = field(default_factory=dict)
 
     @property

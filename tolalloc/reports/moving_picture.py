@@ -321,23 +321,14 @@ def _palette() -> list[int]:
 
 @dataclass(frozen=True, kw_only=True)
 class MovingPicture(Figure):
-    """A reducer that moves in the page.
-
-    Parameters
-    ----------
-    record
-        The scene as `tolalloc.reports.scene_record.scene_record` says it.
-    shares
-        Place → how strongly it is coloured, from 0 to 1 [-].
-    pictures
-        Pictures of its PNG, one for a still one; more make one turn of the cranks as the output sees it, after which
-        it closes [-].
-    """
+    """A reducer that moves in the page."""
 
     x_label: str = ""
     series: tuple[Series, ...] = ()
-    record: Mapping[str, Any]
-    shares: Mapping[str, float] = field(default_factory=dict)
+    record: Mapping[str, Any]  # The scene as `tolalloc.reports.scene_record.scene_record` says it
+    shares: Mapping[str, float] = field(default_factory=dict)  # Place → how strongly it is coloured, from 0 to 1 [-]
+    # Pictures of its PNG, one for a still one; more make one turn of the cranks as the output sees it, after which it
+    # closes [-]
     pictures: int = 1
 
 

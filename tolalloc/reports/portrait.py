@@ -34,24 +34,12 @@ class Examination:
 
 @dataclass(frozen=True, kw_only=True)
 class SignSketch:
-    """Two positions of a grinding wheel in a groove of the part below it, whose axis lies further down.
+    """Two positions of a grinding wheel in a groove of the part below it, whose axis lies further down."""
 
-    Parameters
-    ----------
-    caption
-        What the amount is, and what its two signs do.
-    nominal
-        Height of the wheel's middle and its radius without the amount [mm of the picture].
-    changed
-        The same with the amount negative [mm of the picture].
-    arrow
-        Heights at which the arrow from one to the other begins and ends [mm of the picture].
-    """
-
-    caption: str
-    nominal: tuple[float, float]
-    changed: tuple[float, float]
-    arrow: tuple[float, float]
+    caption: str  # What the amount is, and what its two signs do
+    nominal: tuple[float, float]  # Height of the wheel's middle and its radius without the amount [mm of the picture]
+    changed: tuple[float, float]  # The same with the amount negative [mm of the picture]
+    arrow: tuple[float, float]  # Heights at which the arrow from one to the other begins and ends [mm of the picture]
 
 
 class Portrait(Generic[Own]):

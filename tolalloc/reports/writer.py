@@ -184,14 +184,10 @@ def _answers(document: Document) -> tuple[tuple[str, tuple[str, ...]], ...]:
     return document.answers or (("", document.answer),)
 
 
-def _is_shortened(document: Document) -> bool:
-    """Return whether the first page has only the first sentences, as a drawing or another answer stands there too."""
-    return bool(document.answers) or any(section.first for section in document.sections)
-
-
 def _told(document: Document) -> list[tuple[str, tuple[str, ...]]]:
     """Return what the box of the first page says."""
-    most = _SENTENCES if _is_shortened(document) else None
+    # Where a drawing or another answer stands there too, the first page has only the first sentences.
+    most = _SENTENCES if document.answers or any(section.first for section in document.sections) else None
     return [
         (title, (number and document.headlines.get(title)) or sentences[:most])
         for number, (title, sentences) in enumerate(_answers(document))

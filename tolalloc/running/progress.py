@@ -51,22 +51,13 @@ SILENT = Silent()
 
 @dataclass
 class RunRecord:
-    """What the manifest says of the run itself: statuses and times per stage.
+    """What the manifest says of the run itself: statuses and times per stage."""
 
-    Parameters
-    ----------
-    progress
-        Told of every stage and every chunk of units.
-    outcomes
-        Status → outcome in words; the model's own.
-    opening
-        What is done before the first stage, once everything that can be refused has been.
-    """
-
-    progress: Progress
-    outcomes: Mapping[int, str]
+    progress: Progress  # Told of every stage and every chunk of units
+    outcomes: Mapping[int, str]  # Status → outcome in words; the model's own
     statuses: Counter[int] = field(default_factory=Counter)
     stages: dict[str, dict[str, float]] = field(default_factory=dict)
+    # What is done before the first stage, once everything that can be refused has been
     opening: Callable[[], None] | None = None
 
     @contextmanager

@@ -46,21 +46,11 @@ class _NotKeptError(Exception):
 
 @dataclass(frozen=True, kw_only=True)
 class ResultCache:
-    """A mapper, as `tolalloc.running.chunks.map_chunks` takes it, that solves only chunks that no file answers.
+    """A mapper, as `tolalloc.running.chunks.map_chunks` takes it, that solves only chunks that no file answers."""
 
-    Parameters
-    ----------
-    folder
-        Where the files are; made when the first is written. Several runs may share it.
-    largest
-        Size of all files above which the oldest are taken away before a run [bytes].
-    solved_by
-        Mapper that solves the other chunks: this process, or workers.
-    """
-
-    folder: Path
-    largest: int = 2 * 2**30
-    solved_by: Mapper = map
+    folder: Path  # Where the files are; made when the first is written. Several runs may share it
+    largest: int = 2 * 2**30  # Size of all files above which the oldest are taken away before a run [bytes]
+    solved_by: Mapper = map  # Mapper that solves the other chunks: this process, or workers
 
     def __call__(
         self,

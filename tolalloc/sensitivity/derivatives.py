@@ -187,7 +187,8 @@ def derivative_measures(
     errors = experiment.errors
     sample, by_column, uniform = _sampled(experiment.child("sample"), units)
     blocks = errors.block_of_column
-    squares = _squared_gradients(by_column * _zone_per_column(experiment), errors, uniform, blocks)
+    zones = np.repeat(experiment.zones, [own.stop - own.start for own in errors.columns_of_source])
+    squares = _squared_gradients(by_column * zones, errors, uniform, blocks)
     centred = sample.values - sample.values.mean()
     counts = resample_counts(centred.size, resamples, experiment.seeds.child("resamples"))
     means = counts @ np.column_stack([centred, centred**2, squares]) / centred.size
@@ -241,11 +242,6 @@ def _squared_gradients(
         change, felt = (sides[0] - sides[1]) / (2.0 * _STEP), numbers >= number
         squares += ((by_standard[:, felt] * change[:, felt]) @ members[felt]) ** 2
     return squares
-
-
-def _zone_per_column(experiment: Experiment[ResponseWithDerivatives]) -> Float[np.ndarray, " column"]:
-    """Return the zone of every column's source [m]."""
-    return np.repeat(experiment.zones, [own.stop - own.start for own in experiment.errors.columns_of_source])
 
 
 DIRECTIONS = 16

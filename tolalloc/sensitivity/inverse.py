@@ -17,6 +17,8 @@ _LEAST_OUTSIDE = 5.0
 """Units that must lie beyond the quantile on average, so that order statistics bound it from above [-]."""
 _SAME = 1e-3
 """Distance from the limit, over the limit, at which the quantile counts as equal to it [-]."""
+_LARGEST_FACTOR = 10.0
+"""Factor up to which a zone is opened [-]."""
 _FAR_BELOW = 0.9
 """Part of the limit that a quantile must leave free by its squares, not to be tried at the largest factor [-]."""
 _MOST_STEPS = 30
@@ -58,7 +60,6 @@ def inverse_sensitivity(
     limit: float,
     target: float,
     units: int = 2048,
-    largest_factor: float = 10.0,
 ) -> InverseSensitivity:
     """Return how far each zone may open, or must close, alone.
 
@@ -72,8 +73,6 @@ def inverse_sensitivity(
         Share of the units that must keep it [-].
     units
         Units of every trial [-].
-    largest_factor
-        Factor up to which a zone is opened [-].
 
     Raises
     ------
@@ -110,8 +109,6 @@ def inverse_sensitivity(
     needed = fewest_units(target)
     if units < needed:
         raise InputError.at("inverse sensitivity", "units", units, f"{needed} or more for a yield of {target:.4%}")
-    if largest_factor <= 1.0:
-        raise InputError.at("inverse sensitivity", "largest factor", largest_factor, "a number above 1")
     errors = experiment.errors
     openings = _Openings(experiment, errors.standard_values(experiment.uniform(units)), target)
     now, *ends = openings.quantile(*openings.present)
@@ -119,7 +116,7 @@ def inverse_sensitivity(
     decided = not ends[0] <= limit <= ends[1]
     factor = np.full(count, np.inf if meets and decided else np.nan)
     low, high = np.full((2, count), np.nan)
-    own, bracket = _bracket(openings, now, limit, largest_factor) if decided else (np.empty(0, int), np.empty((4, 0)))
+    own, bracket = _bracket(openings, now, limit) if decided else (np.empty(0, int), np.empty((4, 0)))
     if own.size:
         factor[own], quantiles = _crossings(openings, own, bracket, limit)
         low[own], high[own] = _interval(factor[own], quantiles, bracket, limit)
@@ -236,13 +233,13 @@ class _Openings:
 
 
 def _bracket(
-    openings: _Openings, now: float, limit: float, largest_factor: float
+    openings: _Openings, now: float, limit: float
 ) -> tuple[Int[np.ndarray, " found"], Float[np.ndarray, "4 found"]]:
     """Return the sources whose quantile crosses the limit between factor 1 and the farthest, and what brackets it.
 
     These are two factors per source with the limit between their quantiles, then quantile less limit at both.
     """
-    trials = sorted({min(2.0, largest_factor), largest_factor}) if now <= limit else [0.0]
+    trials = [2.0, _LARGEST_FACTOR] if now <= limit else [0.0]
     left = np.arange(len(openings.errors.active))
     if now > limit:
         left = left[openings.may_repair(left, limit)]
@@ -258,7 +255,7 @@ def _bracket(
         if now <= limit and limit > 0.0:
             # What adds in quadrature is far from the limit at the largest factor too.
             rise = (_squared(near_excess, limit) - _squared(np.array([now - limit]), limit)) / (far**2 - 1.0)
-            farthest = max(now, 0.0) ** 2 + rise * (largest_factor**2 - 1.0)
+            farthest = max(now, 0.0) ** 2 + rise * (_LARGEST_FACTOR**2 - 1.0)
             may = farthest > (_FAR_BELOW * limit) ** 2
             left, near_excess = left[may], near_excess[may]
     sources, bracket = np.split(np.concatenate([np.empty((5, 0)), *found], axis=1), [1])

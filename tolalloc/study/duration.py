@@ -29,21 +29,11 @@ _CONFIRMATIONS = (0.3, 8.0)
 
 @dataclass(frozen=True, kw_only=True)
 class Duration:
-    """What a question will take.
+    """What a question will take."""
 
-    Parameters
-    ----------
-    kind
-        Its name.
-    units
-        About how many units it solves, at least and at most [-].
-    seconds
-        About how long that takes here, once everything is compiled [s].
-    """
-
-    kind: str
-    units: tuple[int, int]
-    seconds: tuple[float, float]
+    kind: str  # Its name
+    units: tuple[int, int]  # About how many units it solves, at least and at most [-]
+    seconds: tuple[float, float]  # About how long that takes here, once everything is compiled [s]
 
     @property
     def sentence(self) -> str:

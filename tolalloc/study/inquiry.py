@@ -22,18 +22,10 @@ Prepared = TypeVar("Prepared")
 
 @dataclass(frozen=True)
 class Word:
-    """What a command says of a field of an inquiry.
+    """What a command says of a field of an inquiry."""
 
-    Parameters
-    ----------
-    help
-        What it is, with its unit.
-    option
-        Name of its option where it is not that of the field.
-    """
-
-    help: str
-    option: str = ""
+    help: str  # What it is, with its unit
+    option: str = ""  # Name of its option where it is not that of the field
 
 
 DEFAULT_REDUCER = "rv20e"

@@ -37,18 +37,10 @@ _SHARED = "Rows without a group are one line where identical parts have the same
 
 @dataclass(frozen=True, kw_only=True)
 class Prepared:
-    """A study that may be asked.
+    """A study that may be asked."""
 
-    Parameters
-    ----------
-    study
-        What it is about.
-    mapper
-        What solves the model's chunks of samples.
-    """
-
-    study: Problem
-    mapper: Mapper = map
+    study: Problem  # What it is about
+    mapper: Mapper = map  # What solves the model's chunks of samples
 
     @property
     def place(self) -> str:

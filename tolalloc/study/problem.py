@@ -191,36 +191,7 @@ def _is_title_block(given: object) -> bool:
 
 @dataclass(frozen=True, repr=False)
 class Problem(NamedFields):
-    """A model at the zones of a drawing, what is limited, and how much may be computed.
-
-    Parameters
-    ----------
-    model
-        What answers: ``ta.reducer(...)``, ``ta.model(...)``.
-    drawing
-        The tolerance table, ``ta.drawing(...)``.
-    limits
-        Name of an output with its unit → `Limit`; the first one is the leading output, which fronts and prices follow.
-        None lifts a limit that the model has of its own: no unit of a reducer may be preloaded, `PRELOAD`.
-    joint
-        Share of units that must keep all limits at once. ``"common"``: the yield that all limits ask for, each alone
-        where they ask for different things. ``AtYield(target=…)``: that yield; a limit that says nothing else of its
-        own need only be kept by them. None: each limit alone.
-    name
-        Name of the study and of its run folder.
-    seed
-        Seed of every random number [-].
-    largest_failed_share
-        Share of units without an answer above which a question stops [-].
-    effort
-        How much may be computed.
-    title_block
-        What the title blocks of page and drawing say beside study and date: ``drawing number``, ``revision``,
-        ``author``, and ``material`` on the drawing. What is not said stays empty there, to be filled in by hand.
-    compensators
-        What is chosen at assembly, ``ta.Sorting(...)`` and ``ta.Shim(...)``: reducers are judged as they are assembled.
-        An allocation compares all numbers of classes and sizes that they state, other questions take the first.
-    """
+    """A model at the zones of a drawing, what is limited, and how much may be computed; for its fields see `Study`."""
 
     called: ClassVar[str] = "study"
     by_position: ClassVar[int] = 2

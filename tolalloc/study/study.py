@@ -37,21 +37,11 @@ def _are_questions(given: object) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """A finished study.
+    """A finished study."""
 
-    Parameters
-    ----------
-    answers
-        Kind of question → answer, in the order of the study.
-    folder
-        Where the report stands; none if nothing was written.
-    document
-        The one report.
-    """
-
-    answers: dict[str, Answer[Any]]
-    folder: Path | None
-    document: Document
+    answers: dict[str, Answer[Any]]  # Kind of question → answer, in the order of the study
+    folder: Path | None  # Where the report stands; none if nothing was written
+    document: Document  # The one report
 
     def __repr__(self) -> str:
         """Return what was answered and where it stands."""

@@ -520,24 +520,12 @@ def _linear(unit: Float[np.ndarray, " point"], costs: Float[np.ndarray, " point"
 
 @dataclass(frozen=True, kw_only=True)
 class ShopFit:
-    """The closed forms through the points of one process of a shop.
+    """The closed forms through the points of one process of a shop."""
 
-    Parameters
-    ----------
-    process
-        Its name, with the kind of callout if it is for one alone.
-    points
-        Zones [µm] and costs.
-    forms
-        Every form that the points suffice for.
-    best
-        The form that is taken.
-    """
-
-    process: str
-    points: Points
-    forms: tuple[CostFit, ...]
-    best: CostFit
+    process: str  # Its name, with the kind of callout if it is for one alone
+    points: Points  # Zones [µm] and costs
+    forms: tuple[CostFit, ...]  # Every form that the points suffice for
+    best: CostFit  # The form that is taken
 
 
 def shop_fits(shop: ShopPoints) -> tuple[ShopFit, ...]:

@@ -30,6 +30,9 @@ from tolalloc.models.checkpoint import CachedResponse
 from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2, Baseline, RegressionCandidate, gaussian_process
 from tolalloc.sensitivity.surrogate.validation import FOLDS, Score, answers_of, cross_validate
 
+_LARGEST_FAILED_SHARE = 0.05
+"""Share of the kernel's designs that may fail [-]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Front:
@@ -85,7 +88,6 @@ def pareto_front(
     ladders: Ladders | None = None,
     large: tuple[str, ...] = (),
     others: tuple[OneSidedConstraint, ...] = (),
-    largest_failed_share: float = 0.05,
 ) -> tuple[Front, Score]:
     """Return the front, improved by kernel runs along it, and what the surrogate that it was found on is worth.
 
@@ -113,13 +115,11 @@ def pareto_front(
         Settings that shall be large, further objectives.
     others
         Limits of other requirements, kept by their local models.
-    largest_failed_share
-        Share of the kernel's designs that may fail; a design fails with the first of its units [-].
 
     Raises
     ------
     SolveError
-        More designs failed, or none is allowed.
+        More than 5 % of the kernel's designs failed, each with the first of its units, or none is allowed.
     """
     from tolalloc.allocation.front.genetic import search
 
@@ -136,7 +136,7 @@ def pareto_front(
     )
     for number in range(effort.rounds):
         own = seeds.child(str(number))
-        answers = answers_of(kernel, asked, own.child("surrogate"), FOLDS, largest_failed_share)
+        answers = answers_of(kernel, asked, own.child("surrogate"), FOLDS, _LARGEST_FAILED_SHARE)
         score = cross_validate(candidate, answers)
         trusted = score.q2 >= NEEDED_Q2
         found = search(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -90,8 +90,8 @@ class Candidates:
     @property
     def unrestricted(self) -> ZoneAllocation:
         """The search that found the cheaper zones off the ladders: with the settings as they are, or with them free."""
-        cheapest = _cheapest({name: own.chosen for name, own in self._searches.items()})
-        return next((own for own in self._searches.values() if own.chosen is cheapest), self.free)
+        met = (own for own in self._searches.values() if own.chosen.met)
+        return min(met, key=lambda own: own.chosen.cost, default=self.free)
 
     @property
     def bound(self) -> float | None:
@@ -114,11 +114,6 @@ class Candidates:
     def _space(self) -> DesignSpace:
         """The design variables with every setting free."""
         return self.free.chosen.space
-
-
-def _cheapest(designs: Mapping[str, VerifiedDesign]) -> VerifiedDesign | None:
-    """Return the cheapest design that was shown to keep the limits."""
-    return min((own for own in designs.values() if own.met), key=lambda own: own.cost, default=None)
 
 
 _REACH = 1.1

@@ -29,20 +29,11 @@ def by_form(processes: Sequence[Process]) -> tuple[LeastPriced, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class LeastPriced:
-    """Processes whose costs have one form, each minimised alone with a price on its zone, all at once.
+    """Processes whose costs have one form, each minimised alone with a price on its zone, all at once."""
 
-    Parameters
-    ----------
-    places
-        Where they stand among all processes [-].
-    cost
-        Their convex costs, a row of zones for each.
-    change, low, high
-        Their fixed costs [cost units], and the ends of their ranges [unit of the zone].
-    """
-
-    places: Int[np.ndarray, " process"]
-    cost: CostModel
+    places: Int[np.ndarray, " process"]  # Where they stand among all processes [-]
+    cost: CostModel  # Their convex costs, a row of zones for each
+    # Their fixed costs [cost units], and the ends of their ranges [unit of the zone]
     change: Float[np.ndarray, " process"]
     low: Float[np.ndarray, " process"]
     high: Float[np.ndarray, " process"]

@@ -27,18 +27,10 @@ _TOKEN = re.compile(r"[A-Za-z0-9_-]{32}")
 
 @dataclass(frozen=True, kw_only=True)
 class Address:
-    """Port and token of a page.
+    """Port and token of a page."""
 
-    Parameters
-    ----------
-    port
-        Port of this machine; 0 for a free one [-].
-    token
-        What a request must know.
-    """
-
-    port: int = 0
-    token: str
+    port: int = 0  # Port of this machine; 0 for a free one [-]
+    token: str  # What a request must know
 
     @classmethod
     def of(cls, script: Path) -> Address:

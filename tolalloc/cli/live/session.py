@@ -39,20 +39,11 @@ _SMALLEST = 10.0**-_DECIMALS
 
 @dataclass(frozen=True)
 class LiveDesign:
-    """Zones that differ from the drawing's, the values of the model's settings, and under which conditions it is asked.
+    """Zones that differ from the drawing's, values of the settings, and under which conditions the model is asked."""
 
-    Parameters
-    ----------
-    zones
-        Source and its zone [m], by name.
-    settings
-        Values of all settings, in the model's order [units of their names].
-    operating
-        Operating condition and its value, by name, where it differs from the study's [units of their names].
-    """
-
-    zones: tuple[tuple[str, float], ...]
-    settings: tuple[float, ...]
+    zones: tuple[tuple[str, float], ...]  # Source and its zone [m], by name
+    settings: tuple[float, ...]  # Values of all settings, in the model's order [units of their names]
+    # Operating condition and its value, by name, where it differs from the study's [units of their names]
     operating: tuple[tuple[str, float], ...] = ()
 
     @classmethod

@@ -218,14 +218,14 @@ def _effect(removed: float, more: str, less: str) -> str:
 # What every report says
 
 
-def against_catalogue(reducer: Reducer, loop: HysteresisLoop, sample: int = -1) -> tuple[str, tuple[str, ...]]:
+def against_catalogue(reducer: Reducer, loop: HysteresisLoop) -> tuple[str, tuple[str, ...]]:
     """Return a sentence on rigidity and lost motion beside the catalogue's, and warnings where they are far apart.
 
-    The sample of the loop is the perfect reducer's. Without a catalogue the sentence is empty, and the warning is about
+    The loop's last sample is the perfect reducer's. Without a catalogue the sentence is empty, and the warning is about
     what all sizes of catalogues have in common.
     """
     stated = reducer.catalogue
-    rigidity, lost = loop.torsional_stiffness[sample] * ARCMINUTE, loop.lost_motion[sample] / ARCMINUTE
+    rigidity, lost = loop.torsional_stiffness[-1] * ARCMINUTE, loop.lost_motion[-1] / ARCMINUTE
     if stated is None:
         twist = reducer.load.rated_torque / rigidity
         if USUAL_TWIST / FACTOR**2 <= twist <= USUAL_TWIST * FACTOR**2:

@@ -90,7 +90,8 @@ def add_answer(
     rows, groups = AnswerSheet(book), len(result.drawn.groups)
     rows.across(texts.title(result, header))
     rows.sheet.cell(1, 1, bold=True, font_size=14)
-    rows.across(_say("sheet_study", study=header.name, digest=header.digest[:12], quick=_quick(header)))
+    quick = f" {_say('sheet_quick')}" if header.quick else ""
+    rows.across(_say("sheet_study", study=header.name, digest=header.digest[:12], quick=quick))
     rows.across(" ".join(texts.verdict(result)), name=_say("sheet_verdict"))
     rows.sheet.cell(3, 2, **(_GOOD if result.met and not texts.examined(result).fault else _BAD))
     _guard(rows, groups)
@@ -102,10 +103,6 @@ def add_answer(
         rows.across(text, name=_say("sheet_warnings") if at == 0 else " ")
     rows.sheet.set_up_print()
     rows.sheet.inner.print_area(f"A1:F{rows.row}")
-
-
-def _quick(header: Header) -> str:
-    return f" {_say('sheet_quick')}" if header.quick else ""
 
 
 def _guard(rows: AnswerSheet, groups: int) -> None:

@@ -164,7 +164,10 @@ class AssemblyTeller(Teller[AssemblyResult]):
             for word in ("no", "in doubt")
         )
         by = _say("by_measured" if measured else "by_expected")
-        remedy = f" {_remedy(measured)}" if measured else ""
+        remedy = ""
+        if measured:
+            keeping = measured.keeping
+            remedy = f" {_say('never_keeping') if keeping is None else _say('keeping', precision=keeping)}"
         return (
             *((_say("warn_missed", by=by, missed=missed, remedy=remedy),) if missed else ()),
             *((_say("warn_doubted", doubted=doubted),) if doubted else ()),
@@ -391,11 +394,6 @@ class AssemblyTeller(Teller[AssemblyResult]):
             "tolerances": _tolerances_record(plan, tolerances) if tolerances else None,
             "warnings": list(self.warnings),
         }
-
-
-def _remedy(measured: AdjustedParts) -> str:
-    """Return what would keep the limits."""
-    return _say("never_keeping") if measured.keeping is None else _say("keeping", precision=measured.keeping)
 
 
 def _finite(measured: AdjustedParts) -> Section:

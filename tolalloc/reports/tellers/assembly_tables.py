@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import isnan, nan
@@ -14,7 +13,7 @@ from jaxtyping import Float
 from tolalloc.assembly.adjustment import AdjustedParts, AssemblyResult
 from tolalloc.assembly.steps import AssemblyStep, adjustable
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.reports.columns import Column, Table
+from tolalloc.reports.columns import Column, Table, of_positions
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,22 +26,12 @@ PRECISION = "precision Q [-]"
 """Header of the weight of the final angles."""
 
 
-def rounded(frame: pd.DataFrame) -> pd.DataFrame:
+def rounded(table: Table[Any]) -> pd.DataFrame:
     """Return a table without digits that mean nothing, and without −0."""
-    found = frame.round(_KEPT)
+    found = table.frame().round(_KEPT)
     numbers = found.select_dtypes("float").columns
     found[numbers] = found[numbers] + 0.0
     return found
-
-
-def tabulated(name: str, columns: Sequence[Column[Any]], rows: Sequence[Any]) -> pd.DataFrame:
-    """Return a table of declared columns without digits that mean nothing."""
-    return rounded(Table(name=name, columns=tuple(columns), rows=rows).frame())
-
-
-def of_rows(header: str, values: Float[np.ndarray, " row"] | Sequence[Any]) -> Column[int]:
-    """Return a column of a table whose rows are numbered from 0."""
-    return Column(header=header, value=lambda at: values[at])
 
 
 def at_state_weight(result: AssemblyResult) -> int:
@@ -137,17 +126,17 @@ def step_table(result: AssemblyResult) -> pd.DataFrame:
 def angle_table(result: AssemblyResult, measured: AdjustedParts) -> pd.DataFrame:
     """Return every angle of measured parts: the part's error, its tolerance, and the final state."""
     part, axis = zip(*product(result.plan.chain.names, "xyz"), strict=True)
-    columns = (
-        of_rows("part", part),
-        of_rows("axis", axis),
-        of_rows("error of the part [arcsec]", measured.errors.ravel() / ARCSECOND),
-        of_rows("tolerance, ± [arcsec]", result.plan.tolerances.ravel() / ARCSECOND),
-        of_rows("unadjusted [arcsec]", measured.unadjusted.ravel() / ARCSECOND),
-        of_rows("unadjusted, finite rotations [arcsec]", measured.exact.ravel() / ARCSECOND),
-        of_rows("adjusted [arcsec]", measured.adjusted.ravel() / ARCSECOND),
-        of_rows("turns miss, 3σ [arcsec]", (3 * measured.missed).ravel() / ARCSECOND),
-    )
-    return tabulated("angles", columns, range(len(part)))
+    columns = {
+        "part": part,
+        "axis": axis,
+        "error of the part [arcsec]": measured.errors.ravel() / ARCSECOND,
+        "tolerance, ± [arcsec]": result.plan.tolerances.ravel() / ARCSECOND,
+        "unadjusted [arcsec]": measured.unadjusted.ravel() / ARCSECOND,
+        "unadjusted, finite rotations [arcsec]": measured.exact.ravel() / ARCSECOND,
+        "adjusted [arcsec]": measured.adjusted.ravel() / ARCSECOND,
+        "turns miss, 3σ [arcsec]": (3 * measured.missed).ravel() / ARCSECOND,
+    }
+    return rounded(of_positions("angles", columns, range(len(part))))
 
 
 def gain_table(result: AssemblyResult) -> pd.DataFrame:
@@ -168,26 +157,23 @@ def gain_table(result: AssemblyResult) -> pd.DataFrame:
         Column(header="turned", value=lambda row: angles[row[1]]),
         *map(gain, range(len(angles))),
     )
-    return tabulated("gains", columns, rows)
+    return rounded(Table(name="gains", columns=columns, rows=rows))
 
 
 def sweep_table(result: AssemblyResult) -> pd.DataFrame:
     """Return what is to be expected over the precision."""
     sweep, measured, names = result.sweep, result.measured, result.plan.chain.names
     norm = f"{norm_of(result)} of {measured.name} [arcsec]" if measured else ""
-    columns = (
-        of_rows(PRECISION, sweep.state_weights),
-        of_rows("all angles, rms [arcsec]", sweep.total / ARCSECOND),
-        of_rows("another unit of Q takes off [%]", sweep.next_unit * 100),
-        of_rows("effort [arcsec²]", sweep.effort / ARCSECOND**2),
-        *((of_rows(norm, measured.norms / ARCSECOND),) if measured else ()),
-        *(of_rows(f"tilt of {name}, 3σ [arcsec]", 3 * sweep.tilt[:, at] / ARCSECOND) for at, name in enumerate(names)),
-        *(
-            of_rows(f"rotation of {name}, 3σ [arcsec]", 3 * sweep.rotation[:, at] / ARCSECOND)
-            for at, name in enumerate(names)
-        ),
-    )
-    return tabulated("sweep", columns, range(sweep.state_weights.size))
+    columns = {
+        PRECISION: sweep.state_weights,
+        "all angles, rms [arcsec]": sweep.total / ARCSECOND,
+        "another unit of Q takes off [%]": sweep.next_unit * 100,
+        "effort [arcsec²]": sweep.effort / ARCSECOND**2,
+        **({norm: measured.norms / ARCSECOND} if measured else {}),
+        **{f"tilt of {name}, 3σ [arcsec]": 3 * sweep.tilt[:, at] / ARCSECOND for at, name in enumerate(names)},
+        **{f"rotation of {name}, 3σ [arcsec]": 3 * sweep.rotation[:, at] / ARCSECOND for at, name in enumerate(names)},
+    }
+    return rounded(of_positions("sweep", columns, range(sweep.state_weights.size)))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,10 +11,10 @@ from tolalloc.assembly.adjustment import AngularTolerances, AssemblyResult
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.tolerances import AngularAllocation, angular_problem
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.reports.columns import Column
+from tolalloc.reports.columns import Column, Table, of_positions
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
-from tolalloc.reports.tellers.assembly_tables import PRECISION, has_limits, of_rows, tabulated
+from tolalloc.reports.tellers.assembly_tables import PRECISION, has_limits, rounded
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import number
 
@@ -71,14 +71,14 @@ def tolerance_table(plan: AssemblyPlan, tolerances: AngularTolerances) -> pd.Dat
             for feature, tolerance in zip(features, each.tolerances.ravel() / ARCSECOND, strict=True)
         ]
 
-    columns = (
-        of_rows("part", part),
-        of_rows("axis", axis),
-        of_rows("stated, ± [arcsec]", plan.tolerances.ravel() / ARCSECOND),
-        *(of_rows(f"{name}, ± [arcsec]", each.tolerances.ravel() / ARCSECOND) for name, each in made.items()),
-        *(of_rows(f"cost {name} [{{cost}}]", cost(each)) for name, each in made.items()),
-    )
-    return tabulated("angular tolerances", columns, range(len(part)))
+    columns = {
+        "part": part,
+        "axis": axis,
+        "stated, ± [arcsec]": plan.tolerances.ravel() / ARCSECOND,
+        **{f"{name}, ± [arcsec]": each.tolerances.ravel() / ARCSECOND for name, each in made.items()},
+        **{f"cost {name} [{{cost}}]": cost(each) for name, each in made.items()},
+    }
+    return rounded(of_positions("angular tolerances", columns, range(len(part))))
 
 
 def limit_table(plan: AssemblyPlan, tolerances: AngularTolerances) -> pd.DataFrame:
@@ -86,22 +86,19 @@ def limit_table(plan: AssemblyPlan, tolerances: AngularTolerances) -> pd.DataFra
     found, verified = tolerances.verified, tolerances.verification
     limits, name = found.limits, verified_name(plan, tolerances)
     noise = 100 * (limits.noise(found.gains.errors) / limits.values) ** 2
-    columns = (
-        of_rows("limit of", limits.names),
-        of_rows("limit, 3σ [arcsec]", limits.values / ARCSECOND),
-        *(
-            of_rows(f"{made}, 3σ [arcsec]", each.spread / ARCSECOND)
-            for made, each in allocations(plan, tolerances).items()
-        ),
-        of_rows(f"noise in the limit's square, {name} [%]", noise),
-        of_rows(f"saved by a wider limit, {name} [{{cost}}/arcsec]", found.prices * ARCSECOND),
-        of_rows(f"verified, {name}, 3σ [arcsec]", verified.spread / ARCSECOND),
-        of_rows("its standard error [arcsec]", verified.standard_error / ARCSECOND),
-        of_rows("within [%]", [100 * share.estimate for share in verified.shares]),
-        of_rows("low 2.5 % [%]", [100 * share.low for share in verified.shares]),
-        of_rows("high 97.5 % [%]", [100 * share.high for share in verified.shares]),
-    )
-    return tabulated("limits", columns, range(len(limits.names)))
+    columns = {
+        "limit of": limits.names,
+        "limit, 3σ [arcsec]": limits.values / ARCSECOND,
+        **{f"{made}, 3σ [arcsec]": each.spread / ARCSECOND for made, each in allocations(plan, tolerances).items()},
+        f"noise in the limit's square, {name} [%]": noise,
+        f"saved by a wider limit, {name} [{{cost}}/arcsec]": found.prices * ARCSECOND,
+        f"verified, {name}, 3σ [arcsec]": verified.spread / ARCSECOND,
+        "its standard error [arcsec]": verified.standard_error / ARCSECOND,
+        "within [%]": [100 * share.estimate for share in verified.shares],
+        "low 2.5 % [%]": [100 * share.low for share in verified.shares],
+        "high 97.5 % [%]": [100 * share.high for share in verified.shares],
+    }
+    return rounded(of_positions("limits", columns, range(len(limits.names))))
 
 
 _CERTIFICATES: tuple[Column[tuple[str, AngularAllocation]], ...] = (
@@ -117,19 +114,19 @@ _CERTIFICATES: tuple[Column[tuple[str, AngularAllocation]], ...] = (
 
 def certificate_table(plan: AssemblyPlan, tolerances: AngularTolerances) -> pd.DataFrame:
     """Return costs and lower bounds of the allocations."""
-    return tabulated("certificates", _CERTIFICATES, list(allocations(plan, tolerances).items()))
+    return rounded(Table(name="certificates", columns=_CERTIFICATES, rows=list(allocations(plan, tolerances).items())))
 
 
 def state_weight_table(tolerances: AngularTolerances) -> pd.DataFrame:
     """Return costs over the precision."""
     found = tolerances.by_state_weight
-    columns = (
-        of_rows(PRECISION, found.state_weights),
-        of_rows("tolerances [{cost}]", found.cost),
-        of_rows("effort [{cost}]", found.effort_cost),
-        of_rows("total [{cost}]", found.total),
-    )
-    return tabulated("cost by precision", columns, range(found.state_weights.size))
+    columns = {
+        PRECISION: found.state_weights,
+        "tolerances [{cost}]": found.cost,
+        "effort [{cost}]": found.effort_cost,
+        "total [{cost}]": found.total,
+    }
+    return rounded(of_positions("cost by precision", columns, range(found.state_weights.size)))
 
 
 def cost_sentences(plan: AssemblyPlan, tolerances: AngularTolerances) -> tuple[str, ...]:

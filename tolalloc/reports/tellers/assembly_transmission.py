@@ -11,9 +11,10 @@ from jaxtyping import Float
 from tolalloc.assembly.orientations import TransmissionEffect
 from tolalloc.reading.units import ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE
 from tolalloc.reducers import PEAK_TO_PEAK
+from tolalloc.reports.columns import of_positions
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, HeatMap, Series
-from tolalloc.reports.tellers.assembly_tables import PRECISION, of_rows, tabulated
+from tolalloc.reports.tellers.assembly_tables import PRECISION, rounded
 from tolalloc.reports.templates import Sentences
 
 if TYPE_CHECKING:
@@ -70,14 +71,14 @@ def risen(effect: TransmissionEffect, precision: float) -> tuple[str, ...]:
 def value_table(effect: TransmissionEffect) -> pd.DataFrame:
     """Return every output over the precision, the median of random assemblies."""
     names = ["perfect parts", *(f"{precision:g}" for precision in effect.state_weights)]
-    columns = (
-        of_rows(PRECISION, names),
-        *(
-            of_rows(output, [perfect(effect, output), *np.median(answers(effect, output), axis=1).tolist()])
+    columns = {
+        PRECISION: names,
+        **{
+            output: [perfect(effect, output), *np.median(answers(effect, output), axis=1).tolist()]
             for output in effect.outputs
-        ),
-    )
-    return tabulated("transmission", columns, range(len(names)))
+        },
+    }
+    return rounded(of_positions("transmission", columns, range(len(names))))
 
 
 def difference_table(effect: TransmissionEffect) -> pd.DataFrame:
@@ -86,11 +87,11 @@ def difference_table(effect: TransmissionEffect) -> pd.DataFrame:
     def above(output: str) -> Float[np.ndarray, " state_weight"]:
         return np.asarray(100 * (np.median(answers(effect, output), axis=1) / perfect(effect, output) - 1))
 
-    columns = (
-        of_rows(PRECISION, effect.state_weights),
-        *(of_rows(f"{output.split(' [')[0]}, above perfect parts [%]", above(output)) for output in _counted(effect)),
-    )
-    return tabulated("above perfect parts", columns, range(effect.state_weights.size))
+    columns = {
+        PRECISION: effect.state_weights,
+        **{f"{output.split(' [')[0]}, above perfect parts [%]": above(output) for output in _counted(effect)},
+    }
+    return rounded(of_positions("above perfect parts", columns, range(effect.state_weights.size)))
 
 
 def fallen_table(effect: TransmissionEffect) -> pd.DataFrame | None:
@@ -102,14 +103,11 @@ def fallen_table(effect: TransmissionEffect) -> pd.DataFrame | None:
         values = answers(effect, output)
         return np.asarray(100 * (values[1:] < values[0]).mean(axis=1))
 
-    columns = (
-        of_rows(PRECISION, effect.state_weights[1:]),
-        *(
-            of_rows(f"{output.split(' [')[0]}, smaller than unadjusted [%]", smaller(output))
-            for output in _counted(effect)
-        ),
-    )
-    return tabulated("smaller than unadjusted", columns, range(effect.state_weights.size - 1))
+    columns = {
+        PRECISION: effect.state_weights[1:],
+        **{f"{output.split(' [')[0]}, smaller than unadjusted [%]": smaller(output) for output in _counted(effect)},
+    }
+    return rounded(of_positions("smaller than unadjusted", columns, range(effect.state_weights.size - 1)))
 
 
 def _counted(effect: TransmissionEffect) -> tuple[str, ...]:

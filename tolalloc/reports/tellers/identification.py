@@ -18,7 +18,7 @@ from tolalloc.bench.prediction import CURVE, LARGE_DRIFT, LOOP, PEAK_TO_PEAK, Re
 from tolalloc.bench.profile import ParameterChoice, ParameterEstimate
 from tolalloc.reading.units import ARCSECOND, DEGREE
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
-from tolalloc.reports.columns import Column, Table
+from tolalloc.reports.columns import Column, Table, of_positions
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.teller import Teller
@@ -43,20 +43,6 @@ _ESTIMATES: tuple[Column[ParameterEstimate], ...] = (
     Column(header="95 % interval", value=lambda row: _interval(row.interval)),
 )
 """What a person reads first of every parameter."""
-
-_WRITTEN: tuple[Column[ParameterEstimate], ...] = (
-    Column(header="95 % profile", value=lambda row: _interval(row.interval)),
-    Column(header="identified", value=lambda row: _yes(row.identified)),
-    Column(header="on a bound", value=lambda row: _yes(row.on_bound)),
-    Column(header="written", value=lambda row: f"{row.value:.4g}"),
-    Column(
-        header="standard uncertainty",
-        value=lambda row: (
-            f"{row.uncertainty:.3g} arcsec" if row.parameter.name == BIAS else f"{100 * row.uncertainty:.3g} %"
-        ),
-    ),
-)
-"""What the profile and the stiffness file say of every parameter."""
 
 
 def estimate_sentence(estimate: ParameterEstimate) -> str:
@@ -307,52 +293,42 @@ class IdentificationTeller(Teller[IdentificationResult]):
         def bounded(at: int) -> bool:
             return items[at].name == BIAS or bool(np.ptp(first_order[:, at]) < _OPEN)
 
-        def of_estimate(column: Column[ParameterEstimate]) -> Column[int]:
-            return Column(header=column.header, value=lambda at: column.value(own.estimates[at]))
+        def uncertainty(row: ParameterEstimate) -> str:
+            is_bias = row.parameter.name == BIAS
+            return f"{row.uncertainty:.3g} arcsec" if is_bias else f"{100 * row.uncertainty:.3g} %"
 
-        profile, *written = map(of_estimate, _WRITTEN)
-        columns: tuple[Column[int], ...] = (
-            Column(
-                header="parameter",
-                value=lambda at: f"{items[at].symbol} [{items[at].unit}], {items[at].name.replace('_', ' ')}",
-            ),
-            Column(header="given", value=lambda at: f"{items[at].start:.4g}"),
-            Column(header="bounds", value=lambda at: f"{items[at].low:.4g}…{items[at].high:.4g}"),
-            Column(
-                header="least objective at",
-                value=lambda at: f"{items[at].value(float(own.found.coordinates[at])):.4g}",
-            ),
-            profile,
-            Column(
-                header="95 % first order",
-                value=lambda at: _span(items[at], first_order[:, at]) if bounded(at) else "no limit",
-            ),
-            Column(
-                header="95 % bootstrap",
-                value=lambda at: "" if resampled is None else _span(items[at], resampled[:, at]),
-            ),
-            *written,
-        )
-        return Table(name="parameters", columns=columns, rows=range(len(items)))
+        columns = {
+            "parameter": [f"{item.symbol} [{item.unit}], {item.name.replace('_', ' ')}" for item in items],
+            "given": [f"{item.start:.4g}" for item in items],
+            "bounds": [f"{item.low:.4g}…{item.high:.4g}" for item in items],
+            "least objective at": lambda at: f"{items[at].value(float(own.found.coordinates[at])):.4g}",
+            "95 % profile": [_interval(row.interval) for row in own.estimates],
+            "95 % first order": lambda at: _span(items[at], first_order[:, at]) if bounded(at) else "no limit",
+            "95 % bootstrap": lambda at: "" if resampled is None else _span(items[at], resampled[:, at]),
+            "identified": [_yes(row.identified) for row in own.estimates],
+            "on a bound": [_yes(row.on_bound) for row in own.estimates],
+            "written": [f"{row.value:.4g}" for row in own.estimates],
+            "standard uncertainty": [uncertainty(row) for row in own.estimates],
+        }
+        return of_positions("parameters", columns, range(len(items)))
 
     @property
-    def _directions(self) -> Table[tuple[int, Direction]]:
+    def _directions(self) -> Table[int]:
         """The combinations that the data fix, best first."""
-        columns: tuple[Column[tuple[int, Direction]], ...] = (
-            Column(header="direction", value=lambda row: row[0]),
-            *(
-                Column(header=symbol, value=lambda row, at=at: round(float(row[1].loading[at]), 3) + 0.0)  # type: ignore[misc]
+        found = self.result.information.directions
+        columns = {
+            "direction": range(1, len(found) + 1),
+            **{
+                symbol: [round(float(own.loading[at]), 3) + 0.0 for own in found]
                 for at, symbol in enumerate(self._symbols)
-            ),
-            Column(
-                header="standard error left by the data [%]",
-                value=lambda row: 100 * row[1].deviation if row[1].deviation < row[1].half_width else "no limit",
-            ),
-            Column(header="left by the bounds alone [%]", value=lambda row: 100 * row[1].half_width),
-            Column(header="fixed", value=lambda row: _yes(row[1].is_fixed)),
-        )
-        rows = list(enumerate(self.result.information.directions, start=1))
-        return Table(name="directions", columns=columns, rows=rows)
+            },
+            "standard error left by the data [%]": [
+                100 * own.deviation if own.deviation < own.half_width else "no limit" for own in found
+            ],
+            "left by the bounds alone [%]": [100 * own.half_width for own in found],
+            "fixed": [_yes(own.is_fixed) for own in found],
+        }
+        return of_positions("directions", columns, range(len(found)))
 
     @property
     def _choices(self) -> Table[ParameterChoice]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from tolalloc.drawings.sources import Source, zone_in, zone_unit
 from tolalloc.drawings.tolerance_table import with_own_words
 from tolalloc.reading.units import MICROMETRE, unit_of
-from tolalloc.reports.columns import Column, Table, span
+from tolalloc.reports.columns import Column, Table, of_positions, span
 from tolalloc.reports.feature_frame import Frames, callout
 from tolalloc.reports.header import Header
 from tolalloc.reports.templates import Sentences
@@ -36,26 +36,6 @@ if TYPE_CHECKING:
 _say = Sentences("ranking")
 _ALIKE = 9
 """Decimals of a value over the largest one to which equal ones are alike, so that no last digit orders them [-]."""
-
-
-def of_positions(name: str, columns: Mapping[str, Any], rows: Iterable[int]) -> Table[int]:
-    """Return a table whose rows are positions in arrays.
-
-    Parameters
-    ----------
-    name
-        Name of its sheet and file.
-    columns
-        Header → what stands at every position, or what says it of one.
-    rows
-        The positions in the order of the table.
-    """
-    made = (Column(header=header, value=_reader(own)) for header, own in columns.items())
-    return Table[int](name=name, columns=tuple(made), rows=list(rows))
-
-
-def _reader(column: Any) -> Any:
-    return column if callable(column) else column.__getitem__
 
 
 def largest_first(values: Sequence[float] | np.ndarray) -> list[int]:
@@ -251,23 +231,20 @@ def orders_table(result: RankingResult, unit: str) -> pd.DataFrame:
     found = result.orders
     assert found is not None
     first, total = found.first_interval, found.total_interval
-    columns: dict[str, Column[tuple[int, int]]] = {}
-
-    def add(header: str, value: Any) -> None:
-        columns[header] = Column(header=header, value=value)
-
-    add("order of the output turn [-]", lambda row: found.orders[row[0]])
-    add(f"standard deviation of the wave [{unit}]", lambda row: found.deviation[row[0]])
-    add("source", lambda row: found.sources[row[1]])
+    rows = [(at, source) for at in range(len(found.orders)) for source in largest_first(found.total[at])]
+    columns: dict[str, list[Any]] = {
+        "order of the output turn [-]": [found.orders[at] for at, _ in rows],
+        f"standard deviation of the wave [{unit}]": [found.deviation[at] for at, _ in rows],
+        "source": [found.sources[source] for _, source in rows],
+    }
     for name, short, shares, ends in (
         ("share alone [-]", "alone", found.first, first),
         ("share with others [-]", "with others", found.total, total),
     ):
-        add(name, lambda row, shares=shares: shares[row])
-        add(f"{short} low 5 % [-]", lambda row, ends=ends: ends[row[0], 0, row[1]])
-        add(f"{short} high 95 % [-]", lambda row, ends=ends: ends[row[0], 1, row[1]])
-    rows = [(at, source) for at in range(len(found.orders)) for source in largest_first(found.total[at])]
-    return Table(name="orders", columns=tuple(columns.values()), rows=rows).frame()
+        columns[name] = [shares[row] for row in rows]
+        columns[f"{short} low 5 % [-]"] = [ends[at, 0, source] for at, source in rows]
+        columns[f"{short} high 95 % [-]"] = [ends[at, 1, source] for at, source in rows]
+    return of_positions("orders", columns, range(len(rows))).frame()
 
 
 def shapley_table(found: ShapleyEffects) -> pd.DataFrame:
