@@ -35,11 +35,15 @@ class Diagnose(Inquiry["DiagnosisRequest"]):
     stiffness: StiffnessName = ""
     correlations: Annotated[str, Word("Correlations between sources: CSV or XLSX.")] = ""
     level: Annotated[float, Word("Probability that the named sources hold the dominant one.")] = 0.97
+    repair: Annotated[
+        Path | None, Word("TOML: limit, prices of scrap and new parts, gauge minutes; then also what to measure next.")
+    ] = None
     seed: Annotated[int, Word("Seed of every random number.")] = 1
 
     def prepare(self) -> DiagnosisRequest:
         """Return which unit is to be diagnosed, against which drawings."""
         from tolalloc.bench.diagnosis import DiagnosisRequest
+        from tolalloc.bench.repair import load_repair
         from tolalloc.drawings.drawing import load_drawing
         from tolalloc.reducers.choice import ReducerChoice
         from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
@@ -60,6 +64,7 @@ class Diagnose(Inquiry["DiagnosisRequest"]):
             angle_offset_deg=self.angle_offset,
             level=self.level,
             seed=self.seed,
+            repair=load_repair(self.repair, drawing.errors) if self.repair else None,
         )
 
     def solve(self, prepared: DiagnosisRequest, progress: Progress) -> Answer[DiagnosisResult]:
@@ -76,6 +81,7 @@ class Diagnose(Inquiry["DiagnosisRequest"]):
             assumptions=result.assumed,
             statuses=record.counts,
             stages=record.stages,
+            currency=prepared.repair.currency if prepared.repair else "",
         )
         return Answer(kind="diagnosis", header=header, result=result)
 
