@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -69,7 +69,7 @@ _NEXT: tuple[Column[NextReading], ...] = (
     Column(header="source", value=lambda row: row.source, terminal=1),
     Column(header="gauge minutes [min]", value=lambda row: row.minutes, terminal=1),
     Column(header="standard deviation of the gauge [µm]", value=lambda row: row.gauge / MICROMETRE),
-    Column(header="expected cost before [{cost}]", value=lambda row: row.before, terminal=1),
+    Column(header="expected cost before [{cost}]", value=lambda row: row.before),
     Column(header="expected cost after [{cost}]", value=lambda row: row.after, terminal=1),
     Column(header="standard error of what it saves [{cost}]", value=lambda row: row.error),
     Column(header="saved per minute [{cost}]", value=lambda row: row.gain_per_minute, terminal=1),
@@ -253,9 +253,11 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
     def terminal(self) -> tuple[tuple[pd.DataFrame, str], ...]:
         """The sources that are likeliest to dominate."""
         sources = self._sources.frame().head(_SHOWN), _say("terminal", unit=self.header.name)
-        if not self._next.rows:
+        saving = [own for own in self._next.rows if own.gain > 0.0]
+        if not saving:
             return (sources,)
-        return sources, (self._next.terminal(self.header.cost_unit).head(_SHOWN), _say("terminal_next"))
+        table = replace(self._next, rows=saving[:_SHOWN])
+        return sources, (table.terminal(self.header.cost_unit), _say("terminal_next"))
 
     @cached_property
     def sections(self) -> tuple[Section, ...]:
