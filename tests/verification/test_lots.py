@@ -365,6 +365,21 @@ def test_coordinates_radius_and_diameter_are_read_alike(tmp_path):
     assert read("bore.diameter [mm]", radius[:, np.newaxis] * 2e-3)[0] == pytest.approx(radius * MICROMETRE)
 
 
+def test_coordinates_of_which_one_gauge_is_stated_stay_with_their_part(tmp_path):
+    """Names of parts out of the alphabet's order, one of them read again."""
+    points = np.random.default_rng(6).normal(size=(8, 2))
+    points[3] = points[1] + 0.1
+    names = ["P9", "P2", "P7", "P2", "", "P1", "P5", ""]
+    rows = [f"{name},{x:.12g},{y:.12g}" for name, (x, y) in zip(names, points, strict=True)]
+    path = tmp_path / "lot.csv"
+    path.write_text("\n".join(["part,bore.x [µm],bore.y [µm]", *rows, "gauge,0.2,"]) + "\n", encoding="utf-8")
+    x, y = load_lot(path, drawing_of({"id": "bore", **ROUND}).sources)
+    assert x.error.freedom == np.inf and y.error.freedom == 1.0
+    together = np.stack([x.taken, y.taken], axis=1) / MICROMETRE
+    mean = (points[1] + points[3]) / 2
+    assert together == pytest.approx(np.array([points[0], mean, points[2], *points[4:]]))
+
+
 def test_cells_may_be_missing_and_words_stand_beside(tmp_path):
     path = tmp_path / "lot.csv"
     rows = [f"P{at},{'' if at % 3 else at / 10},{'n/a' if at == 4 else at / 5},ok" for at in range(18)]

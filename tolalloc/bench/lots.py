@@ -293,10 +293,11 @@ def _without_gauge(path: Path, column: GaugedColumn, names: Sequence[str], state
     The variance of one reading is stated, or pooled from parts that were read again, Σ(y − ȳ)²/Σ(r − 1); a mean of r of
     them has 1/r of it, and parts with different r the mean of that, to first order.
     """
-    known, single = _stated(column, stated), [name or f" {at}" for at, name in enumerate(names)]
-    if not known and len(set(single)) == len(single):
+    known, of_row = _stated(column, stated), [name or f"\n{at}" for at, name in enumerate(names)]
+    place = {name: at for at, name in enumerate(dict.fromkeys(of_row))}  # in the order of the file, for x and y alike
+    if not known and len(place) == len(of_row):
         return column
-    part = np.unique(single, return_inverse=True)[1] if single else np.arange(column.values.size)
+    part = np.array([place[name] for name in of_row]) if of_row else np.arange(column.values.size)
     taken = np.isfinite(column.values)
     times = np.bincount(part, taken)
     with np.errstate(invalid="ignore"):
