@@ -88,6 +88,33 @@ def test_a_bad_housing_is_named(bench, tmp_path):
     assert "0.5″" in page and "unit7" in page
 
 
+REPAIR = """
+limit_arcsec = 28
+scrap = 900
+minute = 1.2
+currency = "EUR"
+change = {"disc?.*" = 300, "housing.*" = 60}
+minutes = {"*" = 15}
+read = {"housing.pitch" = 10.8}
+"""
+
+
+@pytest.mark.slow
+def test_a_unit_with_prices_is_told_what_to_do_and_what_to_measure_next(bench, tmp_path):
+    """One gauge has read the housing already; the curve knows it, so nothing more is worth its time."""
+    (tmp_path / "repair.toml").write_text(REPAIR, encoding="utf-8")
+    options = ("--tolerances", bench.tolerances, "--repair", tmp_path / "repair.toml")
+    result = tolalloc("diagnose", bench.curve, *options, *REPORT, tmp_path / "report", "--json")
+    assert result.returncode == 0, result.stderr
+    answer = json.loads(result.stdout)
+    assert (answer["measure next"], answer["decision"]) == (None, "change housing.*")
+    assert answer["decisions"][0]["decision"] == "change housing.*"
+    assert {row["source"] for row in answer["readings"]} == {"pin.diameter", "disc1.pitch", "disc2.pitch"}
+    assert all(row["expected cost after [cost units]"] >= 0 for row in answer["readings"])
+    page = " ".join((tmp_path / "report" / "report.html").read_text(encoding="utf-8").split())
+    assert "Measure nothing more" in page and "EUR on average" in page and "What to measure next" in page
+
+
 @pytest.mark.slow
 def test_a_curve_that_no_such_errors_make_is_not_diagnosed(bench, tmp_path):
     frame = pd.read_csv(bench.curve)[::12]  # to be short
@@ -110,6 +137,7 @@ def test_a_curve_that_no_such_errors_make_is_not_diagnosed(bench, tmp_path):
         (["--tolerances", "nope"], ["nope", "rv20e_table4"]),
         (["--correlations", "nope.csv"], ["nope.csv"]),
         (["--seed", "-1"], ["seed", "-1"]),
+        (["--repair", "nope.toml"], ["nope.toml"]),
     ],
 )
 def test_bad_options_are_refused_in_one_sentence(bench, tmp_path, options, words):

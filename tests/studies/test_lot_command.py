@@ -58,6 +58,22 @@ def test_a_lot_of_the_drawing_s_processes_moves_nothing(tmp_path):
     assert "No process moved: all 2 columns" in done.stdout, done.stdout
 
 
+def test_a_row_of_gauges_is_taken_off_the_spread_and_said(tmp_path):
+    rows = ("part", [*map(str, range(1, 8)), "Gauge"]), ("hub [µm]", [*HUB, "0.5"]), ("bore.radius [µm]", [*BORE, ""])
+    lot, drawing = written(tmp_path, *rows)
+    done = tolalloc("lot", lot, drawing, "--json", "--out", tmp_path / "report")
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    hub, bore = summary["processes"]
+    square = pd.Series(map(float, HUB)).var()
+    assert hub["readings [-]"] == 7
+    assert hub["standard deviation [µm]"] == pytest.approx((square - 0.25) ** 0.5)
+    assert hub["variance by the gauge [%]"] == pytest.approx(25 / square)
+    assert bore["variance by the gauge [%]"] == ""
+    page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    assert "the gauge makes most of hub" in page and "all others do not err: hub" in page
+
+
 def test_an_office_s_file_is_read_with_semicolons_and_decimal_commas(tmp_path):
     lot, drawing = written(tmp_path, ("hub [µm]", HUB), ("bore.radius [µm]", BORE))
     plain = tolalloc("lot", lot, drawing).stdout
@@ -105,6 +121,19 @@ def test_readings_in_another_unit_are_doubted_and_their_row_is_cut_to_what_a_tab
         (
             [("ring.runout [µm]", HUB)],
             "systematic of ring.runout is 'stated on the drawing'; allowed is a source without",
+        ),
+        ([("part", ["1"] * 7), ("hub [µm]", HUB)], "the number of parts of 'hub [µm]' is 1; allowed is 5 or more"),
+        (
+            [("note", [*"123456", "gauge"]), ("hub [µm]", HUB)],
+            "the standard deviation by the gauge of 'hub [µm]' is '3.5 µm'; allowed is less than that of the parts",
+        ),
+        (
+            [("note", [*"12345", "gauge", "gauge"]), ("hub [µm]", HUB)],
+            "the number of rows 'gauge' is 2; allowed is 1",
+        ),
+        (
+            [("note", [*"123456", "gauge"]), ("hub [µm]", (*HUB[:6], "-1"))],
+            "row 8: the gauge of 'hub [µm]' is -1.0; allowed is above 0, or empty",
         ),
         ([("part", HUB)], "no column holds readings; allowed are heads such as 'disc1.pitch [µm]'"),
     ],

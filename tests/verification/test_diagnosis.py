@@ -9,7 +9,16 @@ import pytest
 
 from tolalloc.bench.diagnosis import Diagnosis, diagnose
 from tolalloc.bench.measurements import MeasuredCurve
-from tolalloc.bench.posterior import CurveProblem, DiagnosisEffort, Neighbourhood, Noise, bridge, climb, thinned
+from tolalloc.bench.posterior import (
+    CurveProblem,
+    DiagnosisEffort,
+    GaugeReading,
+    Neighbourhood,
+    Noise,
+    bridge,
+    climb,
+    thinned,
+)
 from tolalloc.bench.sources import (
     dominant,
     exchanged,
@@ -228,6 +237,23 @@ def test_derivatives_by_the_numbers_are_those_of_the_residuals(problem: CurvePro
     ahead, behind = problem.linearised(np.stack([numbers[0] + 1e-6 * direction, numbers[0] - 1e-6 * direction]))[0]
     found = (ahead - behind) / 2e-6
     assert np.abs(found - slope[0] @ direction).max() < 1e-2 * np.abs(found).max()
+
+
+def test_what_a_gauge_has_read_counts_as_one_more_reading(problem: CurveProblem) -> None:
+    sources = problem.errors.active
+    read = tuple(GaugeReading(source=own, value=own.zone / 3, deviation=5e-7) for own in (sources[0], sources[-1]))
+    own = replace(problem, gauged=read)
+    numbers = SeedTree(5).child("gauged").generator().standard_normal((2, problem.size))
+    owner, units = np.array(problem.errors.source_of_column), problem.deviations(numbers)
+    shown = np.array([limited_measure(one.source, units[:, owner == one.source.name]) for one in read])
+    square = (((shown.T - [one.value for one in read]) / 5e-7) ** 2).sum(axis=1)
+    assert own.misfit(numbers) - problem.misfit(numbers) == pytest.approx(0.5 * square)
+    assert own.freedom == problem.freedom + 2
+    residual, slope = own.linearised(numbers)
+    direction = SeedTree(5).child("direction").generator().standard_normal(problem.size)
+    ahead, behind = (own._off(own.deviations(numbers + step * direction)) for step in (1e-6, -1e-6))
+    assert 0.5 * (residual**2).sum(axis=1) == pytest.approx(own.misfit(numbers))
+    assert slope[:, -2:] @ direction == pytest.approx((ahead - behind) / 2e-6, rel=1e-2)
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -13,17 +14,15 @@ from scipy import stats
 import tolalloc as ta
 from tests.validation_manual import shown
 from tolalloc.bench.lots import (
-    CONFIDENCE,
-    Gauge,
     GaugedColumn,
     LotRequest,
     LotResult,
-    Lots,
-    NormalLaw,
+    _without_gauge,
     drawn_lot,
     judge_lot,
     load_lot,
 )
+from tolalloc.bench.processes import CONFIDENCE, EXACT, Gauge, GaugeError, Lots, NormalLaw
 from tolalloc.capability.indices import c4, control_limits, holm
 from tolalloc.drawings.sources import Source
 
@@ -77,6 +76,112 @@ def test_a_moved_process_is_named_in_95_of_100_lots(few, lots):
         columns[at] = replace(own, values=values)
         named += own.source.name in [found.name for found in judged(columns, few, lots).moved]
     assert named >= 190
+
+
+@cache
+def _spread(source: Source, gauge: Gauge) -> float:
+    return Lots(2, LEVEL, 1).process(source, gauge, PARTS).deviation
+
+
+def gauged(column: GaugedColumn, share: float, rng: np.random.Generator) -> GaugedColumn:
+    """Return a column read by a gauge whose standard deviation is this share of that of its parts."""
+    spread = share * _spread(column.source, column.gauge)
+    noise = spread * rng.standard_normal(column.values.size)
+    return replace(column, values=column.values + noise, error=GaugeError(deviation=spread))
+
+
+def test_lots_read_by_a_gauge_that_errs_have_no_more_alarms_and_a_shift_is_found():
+    drawing = drawing_of(*({"id": f"s{at}", **ROW} for at in range(3)), *({"id": f"p{at}", **ROUND} for at in range(3)))
+    lots, rng, alarms, named = Lots(12, LEVEL, 1), np.random.default_rng(21), 0, 0
+    held = np.zeros(3)
+    for _ in range(200):
+        columns = [gauged(own, 0.5, rng) for own in drawn_lot(drawing.sources, PARTS, rng)]
+        found = judged(columns, drawing, lots)
+        alarms += bool(found.moved)
+        for own, capable in zip(found.processes, found.capabilities, strict=True):
+            truth = (own.stated.mean, own.stated.deviation, 1.0)
+            ends = (own.mean_interval, own.deviation_interval, capable.cp_interval)
+            held += [low <= one <= high for one, (low, high) in zip(truth, ends, strict=True)]
+        shifted = replace(columns[0], values=columns[0].values + found.detectable * MICROMETRE)
+        named += judged([shifted, *columns[1:]], drawing, lots).processes[0].mean_moved
+    assert 1 <= alarms <= stats.binom.isf(0.001, 200, LEVEL)
+    assert stats.binom.cdf(named, 200, 0.95) > 0.001  # not refuted, and so 95 % or more by Holm's procedure
+    # Of 1200 intervals 1140 hold the truth, and with 99.9 % probability no fewer and no more than these.
+    assert (held >= stats.binom.ppf(0.0005, 1200, CONFIDENCE)).all(), held
+    assert (held <= stats.binom.ppf(0.9995, 1200, CONFIDENCE)).all(), held
+
+
+def test_a_stated_gauge_is_taken_off_as_a_textbook_has_it():
+    drawing = drawing_of({"id": "a", **ROW})
+    column = gauged(drawn_lot(drawing.sources, PARTS, np.random.default_rng(7))[0], 0.6, np.random.default_rng(8))
+    found = judged([column], drawing)
+    (own,), (capable,) = found.processes, found.capabilities
+    square, gauge = column.values.var(ddof=1), (0.6 * MICROMETRE) ** 2
+    ends = (PARTS - 1) * square / stats.chi2.isf([0.025, 0.975], PARTS - 1) - gauge
+    assert own.deviation == pytest.approx(np.sqrt(square - gauge))
+    assert own.deviation_interval == pytest.approx(np.sqrt(ends))
+    assert capable.cp == pytest.approx(MICROMETRE / own.deviation)
+    assert capable.cp_interval == pytest.approx(MICROMETRE / np.sqrt(ends[::-1]))
+    assert own.gauge_share == pytest.approx(gauge / square)
+    below = stats.chi2.cdf((PARTS - 1) * square / (MICROMETRE**2 + gauge), PARTS - 1)
+    assert own.spread_probability == pytest.approx(2 * min(below, 1 - below))
+    assert own.next.mean[1] == pytest.approx(3 * np.hypot(1, 0.6) * MICROMETRE / 5)
+
+
+def test_parts_that_are_read_again_tell_their_gauge_and_its_doubt(tmp_path):
+    """Simulated lots with a gauge known from 25 repeat readings: intervals as the generalized ones of Weerahandi."""
+    rng, drawing = np.random.default_rng(3), drawing_of({"id": "a", **ROW})
+    parts, noise = rng.standard_normal(PARTS), 0.5 * rng.standard_normal((2, PARTS))
+    rows = [f"P{at},{parts[at] + noise[time, at]:.9f}" for time in range(2) for at in range(PARTS)]
+    (tmp_path / "lot.csv").write_text("part,a [µm]\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    (column,) = load_lot(tmp_path / "lot.csv", drawing.sources)
+    within = (np.diff(noise, axis=0) ** 2 / 2).mean()
+    assert sorted(column.values) == pytest.approx(sorted((parts + noise.mean(axis=0)) * MICROMETRE), abs=1e-14)
+    assert column.error.freedom == PARTS
+    assert column.error.deviation == pytest.approx(np.sqrt(within / 2) * MICROMETRE, rel=1e-6)
+    own = judged([column], drawing).processes[0]
+    square = column.values.var(ddof=1) / MICROMETRE**2
+    total = (PARTS - 1) * square / rng.chisquare(PARTS - 1, 400_000)
+    process = total - PARTS * within / 2 / rng.chisquare(PARTS, 400_000)
+    ends = np.sqrt(np.maximum(np.quantile(process, [0.025, 0.975]), 0)) * MICROMETRE
+    assert own.deviation_interval == pytest.approx(ends, rel=0.01)
+    assert own.deviation == pytest.approx(np.sqrt(square - within / 2) * MICROMETRE, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_lots_whose_gauge_is_known_from_repeats_have_no_more_alarms():
+    drawing = drawing_of({"id": "a", **ROW}, {"id": "b", **ROUND})
+    rng, alarms, held = np.random.default_rng(23), 0, np.zeros(2)
+    names = [str(at // 2) for at in range(2 * PARTS)]
+    for _ in range(150):
+        columns = []
+        for own in drawn_lot(drawing.sources, PARTS, rng):
+            read = gauged(replace(own, values=np.repeat(own.values, 2)), 0.5, rng)
+            columns.append(_without_gauge(Path("lot.csv"), replace(read, error=EXACT), names, None))
+        found = judged(columns, drawing)
+        alarms += bool(found.moved)
+        for own, capable in zip(found.processes, found.capabilities, strict=True):
+            low, high = own.deviation_interval
+            held += [low <= own.stated.deviation <= high, capable.cp_interval[0] <= 1.0 <= capable.cp_interval[1]]
+    assert 1 <= alarms <= stats.binom.isf(0.001, 150, LEVEL)
+    assert (held >= stats.binom.ppf(0.0005, 300, CONFIDENCE)).all(), held
+
+
+def test_coordinates_of_a_gauge_that_errs_have_the_capability_of_their_place():
+    drawing = drawing_of({"id": "a", **ROUND})
+    (source,) = drawing.sources
+    rng, sigma = np.random.default_rng(4), source.zone_mapping.wave_deviation * source.zone
+    points = sigma * rng.standard_normal((2, 500)) + 0.7 * sigma * rng.standard_normal((2, 500))
+    columns = [
+        GaugedColumn(header=f"a.{axis}", source=source, gauge=axis, values=own, error=GaugeError(deviation=0.7 * sigma))
+        for axis, own in zip((Gauge.X, Gauge.Y), points, strict=True)
+    ]
+    (capable,) = judged(columns, drawing).capabilities
+    exact = judged([replace(own, values=own.values / np.hypot(1, 0.7), error=EXACT) for own in columns], drawing)
+    # Three standard errors of the scale of 500 points, which the gauge makes half as large again.
+    assert capable.cp == pytest.approx(1.0, rel=3 * 1.5 / np.sqrt(4 * 500))
+    assert capable.cpk == pytest.approx(exact.capabilities[0].cpk, rel=0.05)
+    assert capable.cp_interval[0] < 1.0 < capable.cp_interval[1]
 
 
 def test_what_is_detectable_is_found_as_often_as_it_says():
@@ -258,6 +363,21 @@ def test_coordinates_radius_and_diameter_are_read_alike(tmp_path):
     assert np.hypot(*both) == pytest.approx(radius * MICROMETRE)
     assert read("bore.radius [µm]", radius[:, np.newaxis])[0] == pytest.approx(radius * MICROMETRE)
     assert read("bore.diameter [mm]", radius[:, np.newaxis] * 2e-3)[0] == pytest.approx(radius * MICROMETRE)
+
+
+def test_coordinates_of_which_one_gauge_is_stated_stay_with_their_part(tmp_path):
+    """Names of parts out of the alphabet's order, one of them read again."""
+    points = np.random.default_rng(6).normal(size=(8, 2))
+    points[3] = points[1] + 0.1
+    names = ["P9", "P2", "P7", "P2", "", "P1", "P5", ""]
+    rows = [f"{name},{x:.12g},{y:.12g}" for name, (x, y) in zip(names, points, strict=True)]
+    path = tmp_path / "lot.csv"
+    path.write_text("\n".join(["part,bore.x [µm],bore.y [µm]", *rows, "gauge,0.2,"]) + "\n", encoding="utf-8")
+    x, y = load_lot(path, drawing_of({"id": "bore", **ROUND}).sources)
+    assert x.error.freedom == np.inf and y.error.freedom == 1.0
+    together = np.stack([x.taken, y.taken], axis=1) / MICROMETRE
+    mean = (points[1] + points[3]) / 2
+    assert together == pytest.approx(np.array([points[0], mean, points[2], *points[4:]]))
 
 
 def test_cells_may_be_missing_and_words_stand_beside(tmp_path):

@@ -11,8 +11,17 @@ from jaxtyping import Float, UInt8
 from scipy.stats import chi2
 
 from tolalloc.bench.measurements import MeasuredCurve
-from tolalloc.bench.posterior import CurveProblem, DiagnosisEffort, Noise, explain, posterior, thinned
+from tolalloc.bench.posterior import (
+    CurveProblem,
+    DiagnosisEffort,
+    GaugeReading,
+    Noise,
+    explain,
+    posterior,
+    thinned,
+)
 from tolalloc.bench.readings import ANGLE, TRANSMISSION_ERROR, clean_curve, load_readings
+from tolalloc.bench.repair import Advice, Repair, advised
 from tolalloc.bench.sources import (
     InseparableColumns,
     dominant,
@@ -104,12 +113,13 @@ def diagnose(
     effort: DiagnosisEffort,
     level: float = 0.97,
     progress: Progress = SILENT,
+    gauged: tuple[GaugeReading, ...] = (),
 ) -> Diagnosis:
     """Return what a measured curve tells of the errors of the unit's parts.
 
     The kernel is solved at the curve's torque and has the columns of the errors; zones are those of the sources that
     vary [m]. The named sources contain the dominant one with the probability ``level`` [-]. Each stage of the work is
-    told as it begins.
+    told as it begins. What gauges have read of its parts already narrows them too.
 
     Raises
     ------
@@ -139,6 +149,7 @@ def diagnose(
         errors=errors,
         zones=zones,
         readings=thinned(curve, noise, effort.angles),
+        gauged=gauged,
     )
     progress.begin("explanations of the curve")
     explanation = explain(problem, seeds.child("search"), effort)
@@ -194,8 +205,8 @@ def _fit(
         fitted=curves.mean(axis=0),
         band=np.quantile(curves, TAILS, axis=0),
         chi_square=square,
-        freedom=readings.freedom,
-        explained=bool(chi2.sf(square, readings.freedom) >= IMPLAUSIBLE),
+        freedom=problem.freedom,
+        explained=bool(chi2.sf(square, problem.freedom) >= IMPLAUSIBLE),
     )
 
 
@@ -219,6 +230,7 @@ class DiagnosisRequest:
     angle_offset_deg: float = 0.0  # Added to every angle of the bench [deg]
     level: float = 0.97  # Probability that the named sources must have of containing the dominant one [-]
     seed: int = 1  # Seed of every random number [-]
+    repair: Repair | None = None  # What may be done with it, at which prices; None if nothing is to be decided
     effort: DiagnosisEffort = field(default_factory=DiagnosisEffort)  # How much may be computed
 
     def __post_init__(self) -> None:
@@ -251,6 +263,10 @@ class DiagnosisResult:
     noise: Noise  # What separates a reading from the model
     level: float  # Probability that the named sources must have of containing the dominant one [-]
     diagnosis: Diagnosis  # What was found
+    # What may be done with it, and what to do; None if no prices were given, the latter also if nothing explains the
+    # curve
+    repair: Repair | None = None
+    advice: Advice | None = None
 
 
 def diagnose_unit(request: DiagnosisRequest, record: RunRecord) -> DiagnosisResult:
@@ -279,8 +295,13 @@ def diagnose_unit(request: DiagnosisRequest, record: RunRecord) -> DiagnosisResu
     )
     with one_blas_thread(), record.stage("diagnosis"):
         seeds = SeedTree(request.seed).child("diagnosis")
-        asked, progress = request.effort, record.progress
-        found = diagnose(curve, kernel, errors, errors.zones, noise, seeds, asked, request.level, progress)
+        asked, progress, repair = request.effort, record.progress, request.repair
+        gauged = repair.readings(errors.active) if repair else ()
+        found = diagnose(curve, kernel, errors, errors.zones, noise, seeds, asked, request.level, progress, gauged)
+        advice = None
+        if repair and found.fit.explained:
+            progress.begin("worth of the next reading")
+            advice = advised(kernel, errors, found.deviations, repair, seeds.child("repair").generator())
     return DiagnosisResult(
         reducer=request.reducer,
         torque=kernel.torque,
@@ -290,4 +311,6 @@ def diagnose_unit(request: DiagnosisRequest, record: RunRecord) -> DiagnosisResu
         noise=noise,
         level=request.level,
         diagnosis=found,
+        repair=repair,
+        advice=advice,
     )

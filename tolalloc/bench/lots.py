@@ -4,29 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from functools import cached_property
-from math import ceil, sqrt
+from math import hypot, inf, sqrt
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.bench.processes import (
+    CONFIDENCE,
+    EXACT,
+    Gauge,
+    GaugeError,
+    Lots,
+    NormalLaw,
+    SimulatedLaw,
+    StatedProcess,
+    gauged,
+)
 from tolalloc.bench.readings import column_readings
 from tolalloc.capability.indices import ControlLimits, control_limits, holm
-from tolalloc.drawings.distributions import RAYLEIGH, Distribution, ndtr, ndtri
+from tolalloc.drawings.distributions import Distribution, ndtri
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.fields import UNITS
 from tolalloc.drawings.measured_parts import LARGEST_DEVIATION
-from tolalloc.drawings.seeds import SamplingDesign, SeedTree, require_seed, uniform_chunks
-from tolalloc.drawings.sources import Source, known_as, limited_measure
+from tolalloc.drawings.seeds import require_seed
+from tolalloc.drawings.sources import Source, known_as
 from tolalloc.drawings.table_file import TextTable, read_table_file, read_text_table, split_header
-from tolalloc.drawings.zones import Feature, ZoneMapping
+from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.units import MICROMETRE
 
-CONFIDENCE = 0.95
-"""Of every interval [-]."""
 FOUND = 0.95
 """Probability with which a shift is found that is called detectable [-]."""
 FEWEST_READINGS = 5
@@ -37,38 +45,15 @@ MOST_NEXT = 10_000
 """Most parts of the next sample [-]."""
 WORDS = ("part", "unit", "note")
 """Columns of a file of readings that are no readings, and are not read."""
+ERROR = "gauge"
+"""What stands in such a column where a row states the standard deviations of the gauges."""
 FAR = 10.0
 """Reading over half its zone from which on a slip of its unit is likelier than a bad part [-]."""
 
-_POINTS = 2**15
-"""Parts of a process of which simulated lots are drawn [-]."""
-_LOTS = (2**14, 2**18)
-"""Fewest and most simulated lots of one process [-]."""
-_DRAWN = 2**25
-"""Readings of simulated lots of one process from which on there are fewer lots [-]."""
-_BEYOND = 20
-"""Simulated lots that are expected beyond the strictest level of a test [-]."""
 _CAPABILITY, _SHIFT = (0.1, 10.0), 1.0
 """Smallest and largest Cp, and largest shift, that a tolerance table takes [-, half zone]."""
-_CHUNK = 2**21
-"""Readings of simulated lots that are held at once [-]."""
 _WRITTEN = 4
 """Decimals of Cp and shift in the table of a lot [-]."""
-
-
-class Gauge(StrEnum):
-    """What the gauge of a column shows."""
-
-    DEVIATION = "deviation"
-    X = "x"
-    Y = "y"
-    RADIUS = "radius"
-    RANGE = "total deviation"
-
-    @property
-    def has_sign(self) -> bool:
-        """Whether its readings lie on both sides of zero."""
-        return self in (Gauge.DEVIATION, Gauge.X, Gauge.Y)
 
 
 _GAUGES = {Feature.SIZE: Gauge.DEVIATION, Feature.POSITION: Gauge.RADIUS}
@@ -88,7 +73,10 @@ class GaugedColumn:
     header: str  # As in the file
     source: Source
     gauge: Gauge
-    values: Float[np.ndarray, " row"]  # Deviation from nominal, radius or total deviation; NaN where none was taken [m]
+    # Deviation from nominal, radius or total deviation, the mean where a part was read again; NaN where none was taken
+    # [m]
+    values: Float[np.ndarray, " row"]
+    error: GaugeError = EXACT  # Of such a value by its gauge
 
     @property
     def name(self) -> str:
@@ -101,235 +89,13 @@ class GaugedColumn:
         return np.asarray(self.values[np.isfinite(self.values)])
 
 
-@dataclass(frozen=True, kw_only=True)
-class NormalLaw:
-    """Of normal readings: z = (x̄ − μ)·√n/σ is normal, t = (x̄ − μ)·√n/s Student's, (n − 1)·s²/σ² is χ².
-
-    Examples
-    --------
-    A mean of 25 parts that is 0.6 σ off is three standard errors off:
-
-    >>> law = NormalLaw(parts=25)
-    >>> round(law.shift_probability(0.6), 4), [round(end, 3) for end in (*law.t_ends, *law.s_ends)]
-    (0.0027, [-2.064, 2.064, 0.719, 1.281])
-    """
-
-    parts: int  # Of a lot [-]
-
-    @property
-    def t_ends(self) -> tuple[float, float]:
-        """Ends between which (x̄ − μ)·√n/s lies with probability `CONFIDENCE` [-]."""
-        from scipy import special
-
-        low, high = (float(special.stdtrit(self.parts - 1, end)) for end in _TAILS)
-        return low, high
-
-    @property
-    def s_ends(self) -> tuple[float, float]:
-        """Ends between which s/σ lies with probability `CONFIDENCE` [-]."""
-        from scipy import special
-
-        low, high = (sqrt(float(special.chdtri(self.parts - 1, 1.0 - end)) / (self.parts - 1)) for end in _TAILS)
-        return low, high
-
-    @property
-    def noise(self) -> tuple[float, float]:
-        """Variance of s/σ, 1/(2(n − 1)) to first order, and its covariance with (x̄ − μ)/σ, 0 [-]."""
-        return 1.0 / (2.0 * (self.parts - 1)), 0.0
-
-    def shift_probability(self, shift: float) -> float:
-        """Return the probability that (x̄ − μ)/σ lies as far out as one, twice the smaller tail [-]."""
-        return float(2.0 * ndtr(-abs(shift) * sqrt(self.parts)))
-
-    def spread_probability(self, ratio: float) -> float:
-        """Return the probability that s/σ lies as far out as one, twice the smaller tail [-]."""
-        from scipy import special
-
-        freedom = self.parts - 1
-        square = freedom * ratio**2
-        return float(min(1.0, 2.0 * min(special.chdtr(freedom, square), special.chdtrc(freedom, square))))
-
-
-@dataclass(frozen=True, kw_only=True)
-class SimulatedLaw:
-    """Of readings of any distribution, by lots that were simulated.
-
-    References
-    ----------
-    Davison & Hinkley, Bootstrap methods and their application, 1997, equation 4.11: the lot itself is one of those that
-    lie as far out, so that no p value is too small.
-    """
-
-    parts: int  # Of a lot [-]
-    centre: float  # Mean of a reading over its σ [-]
-    means: Float[np.ndarray, " lot"]  # (x̄ − μ)/σ of every lot [-]
-    deviations: Float[np.ndarray, " lot"]  # s/σ of every lot [-]
-
-    @cached_property
-    def t_ends(self) -> tuple[float, float]:
-        """Ends between which (x̄ − μ)·√n/s lies with probability `CONFIDENCE` [-]."""
-        return _ends(self.means / np.maximum(self.deviations, np.finfo(float).tiny) * sqrt(self.parts))
-
-    @cached_property
-    def s_ends(self) -> tuple[float, float]:
-        """Ends between which s/σ lies with probability `CONFIDENCE` [-]."""
-        return _ends(self.deviations)
-
-    @cached_property
-    def square_ends(self) -> tuple[float, float]:
-        """Ends between which the root mean square of a lot over that of the process lies so [-]."""
-        squares = (self.centre + self.means) ** 2 + self.deviations**2 * (self.parts - 1) / self.parts
-        return _ends(np.sqrt(squares / (1.0 + self.centre**2)))
-
-    @cached_property
-    def noise(self) -> tuple[float, float]:
-        """Variance of s/σ, and its covariance with (x̄ − μ)/σ [-]."""
-        both = np.cov(self.means, self.deviations)
-        return float(both[1, 1]), float(both[0, 1])
-
-    @cached_property
-    def _sorted(self) -> tuple[Float[np.ndarray, " lot"], Float[np.ndarray, " lot"]]:
-        return np.sort(self.means), np.sort(self.deviations)
-
-    def shift_probability(self, shift: float) -> float:
-        """Return the probability that (x̄ − μ)/σ lies as far out as one, twice the smaller tail [-]."""
-        return _tail(self._sorted[0], shift)
-
-    def spread_probability(self, ratio: float) -> float:
-        """Return the probability that s/σ lies as far out as one, twice the smaller tail [-]."""
-        return _tail(self._sorted[1], ratio)
-
-
-_TAILS = ((1.0 - CONFIDENCE) / 2.0, (1.0 + CONFIDENCE) / 2.0)
-"""Probabilities at the ends of every interval [-]."""
-
-
-def _tail(lots: Float[np.ndarray, " lot"], value: float) -> float:
-    """Return twice the smaller share of lots, ascending, as far out as a value, which counts as one of them."""
-    below = int(np.searchsorted(lots, value, side="right"))
-    above = lots.size - int(np.searchsorted(lots, value, side="left"))
-    return min(1.0, 2.0 * (min(below, above) + 1) / (lots.size + 1))
-
-
-def _ends(lots: Float[np.ndarray, " lot"]) -> tuple[float, float]:
-    """Return the quantiles between which a share `CONFIDENCE` of simulated lots lies [unit of the lots]."""
-    low, high = np.quantile(lots, _TAILS)
-    return float(low), float(high)
-
-
-@dataclass(frozen=True, kw_only=True)
-class StatedProcess:
-    """One reading of a drawing's process, and what lots of it do."""
-
-    # Of one reading [m]
-    mean: float
-    deviation: float
-    law: NormalLaw | SimulatedLaw  # Of mean and standard deviation of a lot, in units of that
-
-    @property
-    def is_normal(self) -> bool:
-        """Whether its readings are normal, so that nothing is simulated."""
-        return isinstance(self.law, NormalLaw)
-
-    def mean_interval(self, mean: float, deviation: float) -> tuple[float, float]:
-        """Return where the mean of the process lies that made a lot, x̄ − t·s/√n for both ends of t [m].
-
-        Exact for normal readings; others are taken to be distributed in the form of the drawing's process.
-        """
-        (low, high), unit = self.law.t_ends, deviation / sqrt(self.law.parts)
-        return mean - high * unit, mean - low * unit
-
-    def deviation_interval(self, deviation: float) -> tuple[float, float]:
-        """Return where the standard deviation of the process lies that made a lot [m]; as `mean_interval`."""
-        low, high = self.law.s_ends
-        return deviation / high, deviation / low
-
-
-class Lots:
-    """Simulated lots of the drawing's processes, drawn once for all sources that are distributed alike.
-
-    Parameters
-    ----------
-    tests
-        Tests that are made of the lot [-].
-    level
-        False-alarm rate of all of them together [-].
-    seed
-        Seed of the random numbers [-].
-    """
-
-    def __init__(self, tests: int, level: float, seed: int) -> None:
-        least, most = _LOTS
-        self.count = min(max(least, ceil(2 * _BEYOND * tests / level)), most)
-        self._seeds = SeedTree(seed).child("lot")
-        self._parts: dict[tuple[ZoneMapping, Gauge], Float[np.ndarray, " part"]] = {}
-        self._drawn: dict[tuple[ZoneMapping, Gauge, int], StatedProcess] = {}
-
-    def process(self, source: Source, gauge: Gauge, parts: int) -> StatedProcess:
-        """Return what the process of a source makes of lots of so many parts."""
-        mapping, gauge = source.zone_mapping, Gauge.X if gauge is Gauge.Y else gauge
-        key = (mapping, gauge, parts)
-        if key not in self._drawn:
-            own = self._normal(mapping, gauge, parts)
-            self._drawn[key] = own or self._simulated(replace(source, zone=1.0, middle=0.0, each=1), gauge, parts)
-        unit = self._drawn[key]
-        middle = source.middle if gauge is Gauge.DEVIATION else 0.0
-        return replace(unit, mean=middle + unit.mean * source.zone, deviation=unit.deviation * source.zone)
-
-    @staticmethod
-    def _normal(mapping: ZoneMapping, gauge: Gauge, parts: int) -> StatedProcess | None:
-        """Return a process of normal readings per unit of zone, nothing where they are not normal."""
-        if gauge is Gauge.DEVIATION and mapping.distribution is Distribution.NORMAL and not mapping.sorted:
-            mean, deviation = mapping.shift / 2.0, 1.0 / (2.0 * mapping.base.reach * mapping.cp)
-        elif gauge in (Gauge.X, Gauge.Y) and mapping.marginal == RAYLEIGH:
-            mean, deviation = 0.0, mapping.wave_deviation
-        else:
-            return None
-        return StatedProcess(mean=mean, deviation=deviation, law=NormalLaw(parts=parts))
-
-    def _simulated(self, source: Source, gauge: Gauge, parts: int) -> StatedProcess:
-        """Return a process per unit of zone, its lots drawn at random from its parts."""
-        key = (source.zone_mapping, gauge)
-        if key not in self._parts:
-            self._parts[key] = self._readings(source, gauge)
-        readings = self._parts[key]
-        mean, deviation = float(readings.mean()), float(readings.std())
-        generator = self._seeds.child("lots", str(parts)).generator()
-        count = max(_LOTS[0], min(self.count, _DRAWN // parts))
-        means, deviations = np.empty(count), np.empty(count)
-        step = max(1, _CHUNK // parts)
-        for start in range(0, count, step):
-            stop = min(start + step, count)
-            lots = readings[generator.integers(readings.size, size=(stop - start, parts))]
-            means[start:stop], deviations[start:stop] = lots.mean(axis=1), lots.std(axis=1, ddof=1)
-        law = SimulatedLaw(
-            parts=parts, centre=mean / deviation, means=(means - mean) / deviation, deviations=deviations / deviation
-        )
-        return StatedProcess(mean=mean, deviation=deviation, law=law)
-
-    def _readings(self, source: Source, gauge: Gauge) -> Float[np.ndarray, " part"]:
-        """Return what the gauge shows of parts of a process, per unit of zone."""
-        seeds, width = self._seeds.child("parts"), len(source.columns)
-        uniform = np.concatenate(list(uniform_chunks(SamplingDesign.SOBOL, seeds, _POINTS, width)))
-        columns = source.standard_values(uniform)
-        return columns[:, 0] * source.lever if gauge in (Gauge.X, Gauge.Y) else _gauged(source, columns)
-
-
-def _gauged(source: Source, columns: Float[np.ndarray, "part column"]) -> Float[np.ndarray, " part"]:
-    """Return what a gauge shows of a feature: deviation from nominal, radius, or total deviation over a turn [m]."""
-    shown = limited_measure(source, columns)
-    if source.feature is Feature.SIZE:
-        return shown + source.middle
-    return shown / 2.0 if source.feature is Feature.POSITION else shown
-
-
 def drawn_lot(sources: Sequence[Source], parts: int, generator: np.random.Generator) -> tuple[GaugedColumn, ...]:
     """Return gauge readings of random parts of the drawing's processes, every source by itself."""
     found = list[GaugedColumn]()
     for source in (replace(own, each=1) for own in sources):
         gauge = _GAUGES.get(source.feature, Gauge.RANGE)
         uniform = generator.random((parts, len(source.columns)))
-        values = _gauged(source, source.standard_values(uniform) * source.zone + source.middles)
+        values = gauged(source, source.standard_values(uniform) * source.zone + source.middles)
         head = f"{source.name}.radius" if gauge is Gauge.RADIUS else source.name
         found.append(GaugedColumn(header=f"{head} [µm]", source=source, gauge=gauge, values=values))
     return tuple(found)
@@ -341,7 +107,7 @@ class MeasuredProcess:
 
     column: GaugedColumn
     stated: StatedProcess
-    # Mean and sample standard deviation, and where those of the process lie with 95 % confidence [m]
+    # Mean and standard deviation without what the gauge adds; where those of the process lie with 95 % confidence [m]
     mean: float
     deviation: float
     mean_interval: tuple[float, float]
@@ -358,6 +124,11 @@ class MeasuredProcess:
     def name(self) -> str:
         """The source, and which coordinate of it."""
         return self.column.name
+
+    @property
+    def gauge_share(self) -> float:
+        """Part of the variance of its readings that the gauge makes [-]."""
+        return float(self.column.error.deviation**2 / self.column.taken.var(ddof=1))
 
     @property
     def probability(self) -> float:
@@ -441,11 +212,12 @@ class LotResult:
 
         By Bonferroni's level of m tests, (z(1 − α/(2m)) + z(0.95))/√n; NaN where no process is normal.
         """
-        parts = [own.stated.law.parts for own in self.processes if own.stated.is_normal]
-        if not parts:
+        normal = [own.stated for own in self.processes if own.stated.is_normal]
+        if not normal:
             return float("nan")
         tests = 2 * len(self.processes)
-        return float((ndtri(1.0 - self.level / (2.0 * tests)) + ndtri(FOUND)) / sqrt(min(parts)))
+        errors = ndtri(1.0 - self.level / (2.0 * tests)) + ndtri(FOUND)
+        return max(float(errors * (own.seen / own.deviation) / sqrt(own.law.parts)) for own in normal)
 
 
 def prepare_lot(path: Path, drawing: Drawing, level: float, next_parts: int | None, seed: int) -> LotRequest:
@@ -472,12 +244,15 @@ def load_lot(path: Path, sources: Sequence[Source]) -> tuple[GaugedColumn, ...]:
     A column is headed by its source and a unit, ``disc1.pitch [µm]``; that of a position says what the gauge shows, one
     of ``.x`` and ``.y``, ``.radius`` or ``.diameter``. Cells may be empty. Of like features a row has one.
 
+    Rows with one name in the column ``part`` are readings of one part. A row with the word ``gauge`` in one of the
+    columns `WORDS` states the standard deviation of each gauge.
+
     Raises
     ------
     InputError, UnknownNameError
         The file, row, column and value that are not allowed; all such of one file together.
     """
-    table, faults, columns = _table(path), Faults(), list[GaugedColumn]()
+    (table, stated), faults, columns = _apart(_table(path)), Faults(), list[GaugedColumn]()
     for header in table.headers:
         if header.lower() in WORDS:
             continue
@@ -487,7 +262,79 @@ def load_lot(path: Path, sources: Sequence[Source]) -> tuple[GaugedColumn, ...]:
     if not columns:
         raise InputError(f"{path}: no column holds readings; allowed are heads such as 'disc1.pitch [µm]'.")
     _require_together(table, columns)
+    names = next((own for own in table.headers if own.lower() == "part"), "")
+    parts = [cells[table.headers.index(names)] for cells in table.cells] if names else []
+    for at, column in enumerate(columns):
+        with faults.kept():
+            columns[at] = _without_gauge(path, column, parts, stated)
+    faults.require_none()
     return tuple(columns)
+
+
+def _apart(table: TextTable) -> tuple[TextTable, TextTable | None]:
+    """Return the readings of a table, and the row that states the gauges, if it is there."""
+    words = [at for at, header in enumerate(table.headers) if header.lower() in WORDS]
+    stated = [any(cells[at].strip().lower() == ERROR for at in words) for cells in table.cells]
+    if not any(stated):
+        return table, None
+    if sum(stated) > 1:
+        raise InputError.at(table.path, f"the number of rows {ERROR!r}", sum(stated), "1")
+    at = stated.index(True)
+    rows, cells = table.rows[at], table.cells[at]
+    rest = replace(table, rows=table.rows[:at] + table.rows[at + 1 :], cells=table.cells[:at] + table.cells[at + 1 :])
+    return rest, replace(table, rows=(rows,), cells=(cells,))
+
+
+def _without_gauge(path: Path, column: GaugedColumn, names: Sequence[str], stated: TextTable | None) -> GaugedColumn:
+    """Return a column part by part, with what its gauge adds to it; unchanged where nothing is known of the gauge.
+
+    Notes
+    -----
+    The variance of one reading is stated, or pooled from parts that were read again, Σ(y − ȳ)²/Σ(r − 1); a mean of r of
+    them has 1/r of it, and parts with different r the mean of that, to first order.
+    """
+    known, of_row = _stated(column, stated), [name or f"\n{at}" for at, name in enumerate(names)]
+    place = {name: at for at, name in enumerate(dict.fromkeys(of_row))}  # in the order of the file, for x and y alike
+    if not known and len(place) == len(of_row):
+        return column
+    part = np.array([place[name] for name in of_row]) if of_row else np.arange(column.values.size)
+    taken = np.isfinite(column.values)
+    times = np.bincount(part, taken)
+    with np.errstate(invalid="ignore"):
+        values = np.bincount(part, np.where(taken, column.values, 0.0)) / times
+    values[times == 0] = np.nan
+    freedom, apart = float((times[times > 0] - 1).sum()), (column.values - values[part])[taken]
+    if not known and not freedom:
+        return replace(column, values=values)
+    one = known or sqrt(float((apart**2).sum()) / freedom)
+    error = GaugeError(
+        deviation=one * sqrt(float((1.0 / times[times > 0]).mean())), freedom=inf if known or not one else freedom
+    )
+    column = replace(column, values=values, error=error)
+    if column.taken.size < FEWEST_READINGS:
+        what = f"the number of parts of {column.header!r}"
+        raise InputError.at(path, what, column.taken.size, f"{FEWEST_READINGS} or more")
+    spread = float(column.taken.std())
+    if error.deviation >= spread:
+        what, length = f"the standard deviation by the gauge of {column.header!r}", MICROMETRE
+        allowed = f"less than that of the parts as they were read, {spread / length:.3g} µm"
+        raise InputError.at(path, what, f"{error.deviation / length:.3g} µm", allowed)
+    return column
+
+
+def _stated(column: GaugedColumn, stated: TextTable | None) -> float:
+    """Return the standard deviation of a reading by the row that states it; 0 where none does [m]."""
+    if stated is None:
+        return 0.0
+    known = {unit: factor * MICROMETRE for unit, factor in UNITS.items()}
+    factor, (shown,) = column_readings(stated, column.header, known)
+    if not (np.isnan(shown) or 0.0 < shown <= LARGEST_DEVIATION * MICROMETRE):
+        place = f"{stated.path}, row {stated.rows[0]}"
+        raise InputError.at(
+            place, f"the gauge of {column.header!r}", float(f"{shown / factor:.9g}"), "above 0, or empty"
+        )
+    part = 0.5 if split_header(column.header)[0].endswith(".diameter") else 1.0
+    return 0.0 if np.isnan(shown) else float(shown) * part
 
 
 def _table(path: Path) -> TextTable:
@@ -604,22 +451,27 @@ def judge_lot(request: LotRequest, lots: Lots | None = None) -> LotResult:
 def _measured(column: GaugedColumn, lots: Lots, next_parts: int | None) -> MeasuredProcess:
     """Return what a column shows."""
     values = column.taken
-    stated = lots.process(column.source, column.gauge, values.size)
+    stated = lots.process(column.source, column.gauge, values.size, column.error)
     mean, deviation = float(values.mean()), float(values.std(ddof=1))
-    limits = control_limits(stated.mean, stated.deviation, next_parts or values.size)
+    limits = control_limits(stated.mean, stated.seen, next_parts or values.size)
     if not column.gauge.has_sign:  # no radius lies below zero
         limits = replace(limits, mean=(max(limits.mean[0], 0.0), limits.mean[1]))
     return MeasuredProcess(
         column=column,
         stated=stated,
         mean=mean,
-        deviation=deviation,
+        deviation=_taken_off(deviation, column.error.deviation),
         mean_interval=stated.mean_interval(mean, deviation),
         deviation_interval=stated.deviation_interval(deviation),
         shift_probability=stated.law.shift_probability((mean - stated.mean) / stated.deviation),
         spread_probability=stated.law.spread_probability(deviation / stated.deviation),
         next=limits,
     )
+
+
+def _taken_off(whole: float, error: float) -> float:
+    """Return what is left of a root mean square without what the gauge adds [m]."""
+    return sqrt(whole**2 - error**2) if error else whole
 
 
 def _plain(source: Source) -> Source:
@@ -638,7 +490,9 @@ def _capability(source: Source, columns: Sequence[GaugedColumn], lots: Lots) -> 
     Cp is that of a tolerance table: of a size the σ at Cp 1 over s, which is zone/(6·s) for normal deviations; of a
     radius or total deviation the root mean square at Cp 1 over that of the lot, so that a place that is off for all
     parts widens it too. Cpk is the distance of the mean from the nearer limit over 3·s; its interval by the spread of
-    both to first order, σ² = 1/(9n) + Cpk²·Var(s/σ) ± ⅔·Cpk·Cov, for normal readings Bissell's.
+    both to first order, σ² = 1/(9n) + Cpk²·Var(s/σ) ± ⅔·Cpk·Cov, for normal readings Bissell's. Where a gauge
+    errs the readings spread r times as much as the parts, which gives the terms r², r⁴ and r³, and what repeat readings
+    leave open of its variance e² adds Cpk²·(e/s)⁴/(2ν) (own derivation).
 
     References
     ----------
@@ -646,20 +500,23 @@ def _capability(source: Source, columns: Sequence[GaugedColumn], lots: Lots) -> 
     """
     values = columns[0].taken if len(columns) == 1 else np.hypot(columns[0].taken, columns[1].taken)
     gauge = columns[0].gauge if len(columns) == 1 else Gauge.RADIUS
-    plain, half = _plain(source), source.zone / 2.0
-    unit = lots.process(plain, gauge, values.size)
-    mean, deviation = float(values.mean()), float(values.std(ddof=1))
+    plain, half, error = _plain(source), source.zone / 2.0, _error_of(columns)
+    unit = lots.process(plain, gauge, values.size, error)
+    mean, deviation = _of_parts(values, error, together=len(columns) > 1)
+    ratio = float(values.std(ddof=1)) / deviation  # 1 unless the gauge errs
     if gauge is Gauge.DEVIATION:
         cp, ends = unit.deviation / deviation, unit.law.s_ends
         upper, lower = source.middle + half - mean, mean - source.middle + half
     else:
         ends = unit.law.square_ends if isinstance(unit.law, SimulatedLaw) else unit.law.s_ends
-        cp = sqrt((unit.mean**2 + unit.deviation**2) / float((values**2).mean()))
+        cp = sqrt((unit.mean**2 + unit.deviation**2) / (float((values**2).mean()) - error.deviation**2))
         upper, lower = (half if gauge is Gauge.RADIUS else source.zone) - mean, float("inf")
     cpk = min(upper, lower) / (3.0 * deviation)
     spread, common = unit.law.noise
     sign = 1.0 if upper <= lower else -1.0
-    variance = 1.0 / (9.0 * values.size) + cpk**2 * spread + sign * 2.0 / 3.0 * cpk * common
+    variance = ratio**2 / (9.0 * values.size) + cpk**2 * spread * ratio**4
+    variance += sign * 2.0 / 3.0 * cpk * common * ratio**3
+    variance += cpk**2 * (error.deviation / deviation) ** 4 / (2.0 * error.freedom)
     off = float(ndtri(0.5 + CONFIDENCE / 2.0)) * sqrt(max(variance, 0.0))
     row, clipped = _row(plain, cp, mean)
     limit = source.zone if gauge is Gauge.RANGE else half
@@ -669,13 +526,45 @@ def _capability(source: Source, columns: Sequence[GaugedColumn], lots: Lots) -> 
         row=row,
         parts=values.size,
         cp=cp,
-        cp_interval=(cp * ends[0], cp * ends[1]),
+        cp_interval=_cp_interval(unit, values, gauge) if error != EXACT else (cp * ends[0], cp * ends[1]),
         cpk=cpk,
         cpk_interval=(cpk - off, cpk + off),
         outside=int((from_middle > limit * (1.0 + 1e-9)).sum()),
         far=int((from_middle > FAR * limit).sum()),
         clipped=clipped,
     )
+
+
+def _error_of(columns: Sequence[GaugedColumn]) -> GaugeError:
+    """Return how values of a source err: of radii from two coordinates, what their mean square gains."""
+    if len(columns) == 1:
+        return columns[0].error
+    both = [own.error for own in columns]
+    return GaugeError(deviation=hypot(*(own.deviation for own in both)), freedom=min(own.freedom for own in both))
+
+
+def _of_parts(values: Float[np.ndarray, " part"], error: GaugeError, *, together: bool) -> tuple[float, float]:
+    """Return mean and standard deviation of the parts behind their readings [m].
+
+    Radii from two coordinates are all too wide by the share of their root mean square, which is exact for Rayleigh's
+    distribution; all else errs about its true value.
+    """
+    mean, deviation = float(values.mean()), float(values.std(ddof=1))
+    if not together:
+        return mean, _taken_off(deviation, error.deviation)
+    root = sqrt(float((values**2).mean()))
+    share = _taken_off(root, error.deviation) / root
+    return mean * share, deviation * share
+
+
+def _cp_interval(unit: StatedProcess, values: Float[np.ndarray, " part"], gauge: Gauge) -> tuple[float, float]:
+    """Return the interval of Cp without what the gauge adds; infinite where it may be all that was seen [-]."""
+    if gauge is Gauge.DEVIATION or isinstance(unit.law, NormalLaw):
+        whole, (least, most) = 1.0, unit.law.process_ends(float(values.std(ddof=1)) / unit.deviation)
+    else:
+        whole = hypot(1.0, unit.law.centre)
+        least, most = unit.law.root_ends(sqrt(float((values**2).mean())) / unit.deviation)
+    return whole / most if most else inf, whole / least if least else inf
 
 
 def _row(plain: Source, cp: float, mean: float) -> tuple[Source, bool]:

@@ -16,6 +16,7 @@ from tolalloc.bench.measurements import MeasuredCurve
 from tolalloc.bench.readings import TURN
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import Source, limited_measure
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND, DEGREE
 from tolalloc.reducers.equivalent.model import Equilibria
@@ -100,13 +101,28 @@ def thinned(curve: MeasuredCurve, noise: Noise, most: int) -> ThinnedCurve:
 
 
 @dataclass(frozen=True, kw_only=True)
+class GaugeReading:
+    """What a gauge has shown of one source of the unit."""
+
+    source: Source
+    value: float  # As `limited_measure` says it [m]
+    deviation: float  # Standard deviation of the reading [m]
+
+
+@dataclass(frozen=True, kw_only=True)
 class CurveProblem:
-    """Errors of one unit as standard normal numbers, and how badly they explain its curve."""
+    """Errors of one unit as standard normal numbers, and how badly they explain its curve and what gauges read."""
 
     kernel: KernelResponse  # The real model; its columns are those of the errors
     errors: ErrorModel  # What is known of the errors before the curve is read
     zones: Float[np.ndarray, " source"]  # Zones of the sources that vary [m]
     readings: ThinnedCurve  # The curve
+    gauged: tuple[GaugeReading, ...] = ()  # What gauges have read of this unit's parts
+
+    @property
+    def freedom(self) -> int:
+        """Independent numbers that were read [-]."""
+        return self.readings.freedom + len(self.gauged)
 
     @property
     def size(self) -> int:
@@ -133,7 +149,17 @@ class CurveProblem:
         """Return half the sum of squared residuals, each in standard deviations; infinite where a curve failed [-]."""
         residual = (self.curves(deviations) - self.readings.values) @ self.readings.whitening.T
         half = 0.5 * np.einsum("sa,sa->s", residual, residual)
+        if self.gauged:
+            half += 0.5 * (self._off(deviations) ** 2).sum(axis=1)
         return np.where(np.isfinite(half), half, np.inf)
+
+    def _off(self, deviations: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample gauge"]:
+        """Return how far the gauges would be from what they read, in standard deviations [-]."""
+        owner = np.array(self.errors.source_of_column)
+        shown = [limited_measure(own.source, deviations[:, owner == own.source.name]) for own in self.gauged]
+        return np.stack(
+            [(one - own.value) / own.deviation for one, own in zip(shown, self.gauged, strict=True)], axis=1
+        )
 
     def misfit(self, numbers: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, " sample"]:
         """Return the same for standard normal numbers [-]."""
@@ -154,7 +180,12 @@ class CurveProblem:
         moved = self.deviations((numbers[:, np.newaxis] + _STEP * np.eye(size)).reshape(-1, size))
         by_number = (moved.reshape(samples, size, size) - deviations[:, np.newaxis]).transpose(0, 2, 1) / _STEP
         kernel.observe(derivatives.status.reshape(samples, -1).max(axis=1))
-        return (curve - readings.values) @ readings.whitening.T, readings.whitening @ by_column @ by_number
+        residual, slope = (curve - readings.values) @ readings.whitening.T, readings.whitening @ by_column @ by_number
+        if not self.gauged:
+            return residual, slope
+        off = self._off(deviations)
+        steps = (self._off(moved).reshape(samples, size, -1) - off[:, np.newaxis]).transpose(0, 2, 1) / _STEP
+        return np.concatenate([residual, off], axis=1), np.concatenate([slope, steps], axis=1)
 
 
 _CORRELATION = 0.4
@@ -389,7 +420,7 @@ def _search(
     _, slope = problem.linearised(best[first : first + 1])
     information = slope[0].T @ slope[0]
     fitted = float(np.trace(np.linalg.solve(information + np.eye(problem.size), information)))
-    freedom = max(problem.readings.freedom - fitted, 1.0)
+    freedom = max(problem.freedom - fitted, 1.0)
     return Explanation(
         numbers=best[first],
         information=information,

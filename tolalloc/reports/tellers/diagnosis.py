@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tolalloc.bench.diagnosis import DiagnosisResult
+from tolalloc.bench.repair import REDRAWN, Advice, NextReading
 from tolalloc.bench.sources import InseparableColumns
 from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE
 from tolalloc.reports.columns import Column, Table
@@ -64,6 +65,22 @@ _GROUPS: tuple[Column[tuple[int, InseparableColumns, int]], ...] = (
     Column(header="known sum over the drawing's spread [-]", value=lambda row: row[1].value),
     Column(header="its spread over the drawing's [-]", value=lambda row: row[1].together),
 )
+_NEXT: tuple[Column[NextReading], ...] = (
+    Column(header="source", value=lambda row: row.source, terminal=1),
+    Column(header="gauge minutes [min]", value=lambda row: row.minutes, terminal=1),
+    Column(header="standard deviation of the gauge [µm]", value=lambda row: row.gauge / MICROMETRE),
+    Column(header="expected cost before [{cost}]", value=lambda row: row.before),
+    Column(header="expected cost after [{cost}]", value=lambda row: row.after, terminal=1),
+    Column(header="standard error of what it saves [{cost}]", value=lambda row: row.error),
+    Column(header="saved per minute [{cost}]", value=lambda row: row.gain_per_minute, terminal=1),
+    Column(header="saved beyond its minutes [{cost}]", value=lambda row: row.worth, terminal=1),
+    Column(header="pays", value=lambda row: "yes" if row.pays else "no", terminal=1),
+)
+_DECISIONS: tuple[Column[tuple[str, float, float]], ...] = (
+    Column(header="decision", value=lambda row: row[0]),
+    Column(header="expected cost [{cost}]", value=lambda row: row[1]),
+    Column(header="standard error [{cost}]", value=lambda row: row[2]),
+)
 
 
 class DiagnosisTeller(Teller[DiagnosisResult]):
@@ -114,6 +131,30 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
         rows = [(number, group, at) for number, group in groups for at in range(len(group.columns))]
         return Table(name="groups", columns=_GROUPS, rows=rows)
 
+    @cached_property
+    def _next(self) -> Table[NextReading]:
+        return Table(name="next", columns=_NEXT, rows=self.result.advice.readings if self.result.advice else ())
+
+    @cached_property
+    def _decisions(self) -> Table[tuple[str, float, float]]:
+        found = self.result.advice
+        rows = zip(found.decisions, found.cost.tolist(), found.error.tolist(), strict=True) if found else ()
+        return Table(name="decisions", columns=_DECISIONS, rows=sorted(rows, key=lambda row: row[1]))
+
+    def _advised(self, found: Advice) -> str:
+        """Return what to measure next, or that nothing is worth its time, and what to do without it."""
+        unit, own = self.header.cost_unit, found.next
+        now = _say("decide", decision=found.best, cost=float(found.cost.min()), unit=unit)
+        if own is None:
+            return _say("stop", now=now)
+        costs = {
+            "before": own.before,
+            "after": own.after,
+            "rate": own.price / own.minutes,
+            "saved": own.gain_per_minute,
+        }
+        return _say("next", source=own.source, minutes=own.minutes, unit=unit, now=now, **costs)
+
     @property
     def title(self) -> str:
         """Which unit it is."""
@@ -146,6 +187,7 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
                 _say("groups", sources=", ".join(sources))
                 for sources in dict.fromkeys(group.sources for group in found.groups)
             ),
+            *((self._advised(self.result.advice),) if self.result.advice else ()),
         )
 
     @cached_property
@@ -171,6 +213,7 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
             ),
             _say("assume_prior"),
             _say("assume_angle"),
+            *((_say("assume_repair", redrawn=REDRAWN), _say("assume_gauge")) if self.result.advice else ()),
             *self.header.assumptions,
         )
 
@@ -193,19 +236,35 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
             "not told apart": [list(group.sources) for group in found.groups],
             "curves solved [-]": found.evaluations,
             "curves failed [-]": found.failed,
+            **self._advice_summary,
             "warnings": list(self.warnings),
         }
 
     @property
+    def _advice_summary(self) -> dict[str, Any]:
+        advice = self.result.advice
+        if not advice:
+            return {}
+        measure = advice.next.source if advice.next else None
+        tables = {"readings": self._next.records(), "decisions": self._decisions.records()}
+        return {"measure next": measure, "decision": advice.best, **tables}
+
+    @property
     def terminal(self) -> tuple[tuple[pd.DataFrame, str], ...]:
         """The sources that are likeliest to dominate."""
-        return ((self._sources.frame().head(_SHOWN), _say("terminal", unit=self.header.name)),)
+        sources = self._sources.frame().head(_SHOWN), _say("terminal", unit=self.header.name)
+        saving = [own for own in self._next.rows if own.gain > 0.0]
+        if not saving:
+            return (sources,)
+        table = replace(self._next, rows=saving[:_SHOWN])
+        return sources, (table.terminal(self.header.cost_unit), _say("terminal_next"))
 
     @cached_property
     def sections(self) -> tuple[Section, ...]:
         """Sections in the order of the questions that a reader has."""
         groups = self._groups
         return (
+            *self._advice_section,
             Section(
                 heading=_say("dominant_heading"),
                 paragraphs=(_say("dominant"),),
@@ -221,6 +280,14 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
             Section(heading=_say("curve_heading"), figures=self._curve_figures()),
             Section(heading=_say("columns_heading"), tables=(("columns", self._columns.frame()),)),
         )
+
+    @property
+    def _advice_section(self) -> tuple[Section, ...]:
+        if not self.result.advice:
+            return ()
+        unit = self.header.cost_unit
+        tables = (("next", self._next.frame(unit)), ("decisions", self._decisions.frame(unit)))
+        return (Section(heading=_say("next_heading"), paragraphs=(_say("next_meaning"),), tables=tables),)
 
     def _dominant_figure(self) -> Figure:
         names, shares = [row.name for row in self._gauged], [row.probability * 100 for row in self._gauged]

@@ -48,6 +48,11 @@ _PROCESSES: tuple[Column[MeasuredProcess], ...] = (
     Column(header="standard deviation, low 2.5 % [µm]", value=lambda row: row.deviation_interval[0] / MICROMETRE),
     Column(header="standard deviation, high 97.5 % [µm]", value=lambda row: row.deviation_interval[1] / MICROMETRE),
     Column(header="drawing's standard deviation [µm]", value=lambda row: row.stated.deviation / MICROMETRE),
+    Column(
+        header="variance by the gauge [%]",
+        value=lambda row: row.gauge_share * 100.0 if row.column.error.deviation else "",
+        nothing="",
+    ),
     Column(header="shift [drawing's σ]", value=lambda row: row.shift[0], terminal=1),
     Column(header="spread over the drawing's [-]", value=lambda row: row.spread[0], terminal=1),
     Column(header="p value of the mean [-]", value=lambda row: row.shift_probability),
@@ -101,18 +106,25 @@ class LotTeller(Teller[LotResult]):
         """What moved, what could have been seen, and which zone is kept least."""
         found, moved, level = self.result, self.result.moved, self.result.level * 100.0
         if not moved:
-            return (_say("unmoved", columns=len(found.processes), level=level), *self._seen, self._least_capable)
+            unmoved = _say("unmoved", columns=len(found.processes), level=level)
+            return (unmoved, *self._seen, *self._gauges, self._least_capable)
         named = "; ".join(map(_what, moved[:_NAMED]))
         more = f"; and {len(moved) - _NAMED} more" if len(moved) > _NAMED else ""
         left = len(found.processes) - len(moved)
         rest = (_say("rest", count=left),) if left else ()
-        return (_say("moved", what=named + more, level=level), *rest, *self._seen, self._least_capable)
+        return (_say("moved", what=named + more, level=level), *rest, *self._seen, *self._gauges, self._least_capable)
 
     @property
     def _seen(self) -> tuple[str, ...]:
         """What shift of a size this lot could have shown."""
         normal = [own.stated.law.parts for own in self.result.processes if own.stated.is_normal]
         return (_say("detectable", shift=self.result.detectable, found=FOUND, parts=min(normal)),) if normal else ()
+
+    @property
+    def _gauges(self) -> tuple[str, ...]:
+        """How much of what was read is the gauge, where it makes most."""
+        most = max(self.result.processes, key=lambda own: own.gauge_share)
+        return (_say("gauges", name=most.name, share=most.gauge_share),) if most.gauge_share else ()
 
     @property
     def _least_capable(self) -> str:
@@ -143,9 +155,16 @@ class LotTeller(Teller[LotResult]):
             *((_say("assume_fit"),) if any(normal) else ()),
             *(() if all(normal) else (_say("assume_simulated", lots=self.result.lots),)),
             _say("assume_holm", level=self.result.level * 100.0),
-            _say("assume_gauge"),
+            *self._assumed_of_gauges,
             *self.header.assumptions,
         )
+
+    @property
+    def _assumed_of_gauges(self) -> tuple[str, ...]:
+        erring = [own.name for own in self.result.processes if own.column.error.deviation]
+        if not erring:
+            return (_say("assume_gauge"),)
+        return (_say("assume_gauge_errs", names=", ".join(erring)),)
 
     @cached_property
     def _processes(self) -> Table[MeasuredProcess]:

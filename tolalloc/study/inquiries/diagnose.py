@@ -36,11 +36,15 @@ class Diagnose(Inquiry["DiagnosisRequest"]):
     form: Annotated[str, Word("Unit file of measured discs and pins, whose form is then known.")] = ""
     correlations: Annotated[str, Word("Correlations between sources: CSV or XLSX.")] = ""
     level: Annotated[float, Word("Probability that the named sources hold the dominant one.")] = 0.97
+    repair: Annotated[
+        Path | None, Word("TOML: limit, prices of scrap and new parts, gauge minutes; then also what to measure next.")
+    ] = None
     seed: Annotated[int, Word("Seed of every random number.")] = 1
 
     def prepare(self) -> DiagnosisRequest:
         """Return which unit is to be diagnosed, against which drawings."""
         from tolalloc.bench.diagnosis import DiagnosisRequest
+        from tolalloc.bench.repair import load_repair
         from tolalloc.drawings.drawing import load_drawing
         from tolalloc.reducers.choice import ReducerChoice
         from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
@@ -67,6 +71,7 @@ class Diagnose(Inquiry["DiagnosisRequest"]):
             angle_offset_deg=self.angle_offset,
             level=self.level,
             seed=self.seed,
+            repair=load_repair(self.repair, drawing.errors) if self.repair else None,
         )
 
     def solve(self, prepared: DiagnosisRequest, progress: Progress) -> Answer[DiagnosisResult]:
@@ -84,6 +89,7 @@ class Diagnose(Inquiry["DiagnosisRequest"]):
             assumptions=(*result.assumed, *known),
             statuses=record.counts,
             stages=record.stages,
+            currency=prepared.repair.currency if prepared.repair else "",
         )
         return Answer(kind="diagnosis", header=header, result=result)
 
