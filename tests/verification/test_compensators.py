@@ -127,6 +127,35 @@ def test_a_gap_beyond_the_last_size_keeps_what_no_size_takes():
     np.testing.assert_array_equal(x[:, :2], plain[:, :2])
 
 
+PINS = tuple(source(name, zone=6e-6, each=8) for name in ("pins", "grooves"))
+
+
+def test_every_like_feature_is_shimmed_on_its_own_as_a_batch_that_is_chosen_exactly_would_be():
+    shim = ta.Shim("pins", step=1.5, sizes=5, against={"grooves": -1.0, "hole": 0.5})
+    x = units_of(errors_of(shim, sources=(*SIZES, *PINS)), 4000)
+    plain = units_of(ErrorModel((*SIZES, *PINS)), 4000)
+    gaps = plain[:, 3:11] - plain[:, 11:] + 0.5 * plain[:, :1]
+    sizes = 1.5e-6 * np.arange(-2, 3)
+    best = np.abs(gaps[..., np.newaxis] + sizes).argmin(axis=2)  # every size tried at every pin
+    np.testing.assert_allclose(x[:, 3:11], plain[:, 3:11] + sizes[best], rtol=0, atol=1e-18)
+    np.testing.assert_array_equal(x[:, 11:], plain[:, 11:])
+
+
+def test_sources_of_a_pattern_are_shimmed_each_against_its_own():
+    names = ("b2.roller", "b10.roller", "b1.roller", "b10.gap", "b1.gap", "b2.gap")
+    sources = tuple(source(name, zone=6e-6) for name in names)
+    errors = errors_of(ta.Shim("b*.roller", step=0.5, sizes=41, against={"b*.gap": -1.0}), sources=sources)
+    [shim] = errors.compensators
+    assert shim.of_each == tuple((f"b{at}.roller", ((f"b{at}.gap", -1.0),)) for at in (1, 2, 10))
+    assert shim.label == "41 sizes of b1.roller and 2 more"
+    x, at = units_of(errors, 2000), {name: number for number, name in enumerate(names)}
+    for number in (1, 2, 10):
+        gap = x[:, at[f"b{number}.roller"]] - x[:, at[f"b{number}.gap"]]
+        assert np.abs(gap).max() <= 0.25e-6 + 1e-15
+    named = ta.Shim(("b1.roller", "b2.roller"), step=0.5, sizes=41, against={("b10.gap", "b1.gap"): -1.0})
+    assert named.resolved(sources, "test") == named
+
+
 def test_costs_are_of_classes_sizes_and_what_is_left_over():
     sorting = ta.Sorting("shaft", "hole", classes=4, batch=100, class_cost=0.2, leftover_cost=3.0)
     shim = ta.Shim("washer", step=1.0, sizes=5, size_cost=0.1)
@@ -159,6 +188,9 @@ REFUSED = [
     (lambda: errors_of(ta.Sorting("shaft", "hole", classes=2), ta.Sorting("shaft", "washer", classes=2)), "2 times"),
     (lambda: errors_of(ta.Sorting("shaft", "hole", classes=2), ta.Sorting("washer", "shaft", classes=2)), "mates"),
     (lambda: errors_of(ta.Shim("washer", step=1.0), ta.Shim("washer", step=2.0)), "2 times"),
+    (lambda: errors_of(ta.Shim("s*", step=1.0, against={"[hw]*": 1.0})), "one source for all parts"),
+    (lambda: errors_of(ta.Shim("hole", step=1.0, against={"pins": 1.0}), sources=(*SIZES, *PINS)), "like features"),
+    (lambda: errors_of(ta.Shim(("hole", "h*"), step=1.0)), "every source once"),
     (lambda: all_choices((ta.Sorting("a", "b", classes=tuple(range(1, 18))),), "test"), "16 or less"),
 ]
 

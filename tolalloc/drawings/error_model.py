@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawings.compensators import Compensator, Shim, Sorting, sorted_together
+from tolalloc.drawings.compensators import Compensator, Standing, sorted_together
 from tolalloc.drawings.correlation import CorrelatedSource, Correlation
 from tolalloc.drawings.distributions import ABOVE_ZERO, BELOW_ONE, ndtr, ndtri
 from tolalloc.drawings.sources import Source
@@ -42,10 +42,10 @@ class ErrorModel:
     def __post_init__(self) -> None:
         self.correlation.require_sound(self.sources)
         correlated = {name for pair in self.correlation.among(self.sources) for name in (pair.one, pair.other)}
-        for own in self._sortings:
-            if own.parts in correlated:
-                allowed = "a source that is correlated with no other; its mates may be"
-                raise InputError.at(own.called, "parts", own.parts, allowed)
+        for own in self.compensators:
+            for name in own.independent:
+                if name in correlated:
+                    raise InputError.at(own.called, "source", name, "one that is correlated with no other")
 
     @cached_property
     def active(self) -> tuple[Source, ...]:
@@ -109,10 +109,6 @@ class ErrorModel:
         """Whether some sources of the table are correlated."""
         return bool(self._correlated_blocks)
 
-    @property
-    def _sortings(self) -> tuple[Sorting, ...]:
-        return tuple(own for own in self.compensators if isinstance(own, Sorting))
-
     @cached_property
     def _correlated_blocks(self) -> tuple[tuple[int, ...], ...]:
         """Positions of the sources that are correlated with each other."""
@@ -148,9 +144,9 @@ class ErrorModel:
         return tuple(slice(start, end) for start, end in zip([0, *ends], ends, strict=False))
 
     @cached_property
-    def _places(self) -> dict[str, slice]:
-        """Where the columns of each source stand, by its name."""
-        return {own.name: at for own, at in zip(self._varying, self.columns_of_source, strict=True)}
+    def _known(self) -> dict[str, Standing]:
+        """Where the columns of each source of the table stand, by its name."""
+        return {own.name: Standing(own, at) for own, at in zip(self.active, self.columns_of_source, strict=False)}
 
     @cached_property
     def zones(self) -> Float[np.ndarray, " source"]:
@@ -167,8 +163,8 @@ class ErrorModel:
         By their correlation, and then by parts that are sorted into classes and mated.
         """
         found = self.mixed(uniform, self._factor)
-        for own in self._sortings:
-            own.sorted(found, self._places)
+        for own in self.compensators:
+            own.sorted(found, self._known)
         return found
 
     def mixed(
@@ -214,8 +210,7 @@ class ErrorModel:
         )
         found = np.asarray(standard * np.repeat(zones, counts) + middle)
         for own in self.compensators:
-            if isinstance(own, Shim):
-                own.shimmed(found, self._places)
+            own.fitted(found, self._known)
         return found
 
     def deviations_of_normal(

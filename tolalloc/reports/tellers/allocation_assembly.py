@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -187,10 +188,13 @@ def _bins(result: AllocationResult, acting: Compensator) -> list[_Bin]:
     none = float("nan")
     if isinstance(acting, Shim):
         return [
-            _Bin(source=acting.part, what="size", number=at + 1, low=none, high=none, middle=acting.step * steps)
+            _Bin(source=part, what="size", number=at + 1, low=none, high=none, middle=acting.step * steps)
+            for part in acting.chosen
             for at, steps in enumerate(range(-acting.reach, acting.reach + 1))
         ]
-    found = []
+    found = list[_Bin]()
+    if not isinstance(acting, Sorting):
+        return found
     for name in acting.named:
         ends = [none, *(acting.limits(_source(result, name)) / MICROMETRE).tolist(), none]
         pairs = enumerate(pairwise(ends), start=1)
@@ -201,8 +205,16 @@ def _bins(result: AllocationResult, acting: Compensator) -> list[_Bin]:
 def _note(result: AllocationResult, acting: Compensator) -> str:
     """Return what the drawing says of a sorting or of sizes."""
     if isinstance(acting, Shim):
-        measured = " and ".join(acting.named)
-        return _say("note_shim", part=acting.part, sizes=acting.count, step=acting.step, measured=measured)
+        gaps = " and ".join(_gap(part, others) for part, others in acting.of_each)
+        each = any(_source(result, part).each > 1 for part in acting.chosen)
+        parts = " and ".join(acting.chosen)
+        key = "note_shim_each" if each else "note_shim"
+        return _say(key, part=parts, sizes=acting.count, step=acting.step, gaps=gaps)
+    return _sorting_note(result, acting) if isinstance(acting, Sorting) else ""
+
+
+def _sorting_note(result: AllocationResult, acting: Sorting) -> str:
+    """Return what the drawing says of a sorting."""
     ends = {
         name: "/".join(number(end, ".2f") for end in acting.limits(_source(result, name)) / MICROMETRE)
         for name in acting.named
@@ -210,3 +222,12 @@ def _note(result: AllocationResult, acting: Compensator) -> str:
     key = "note_opposite" if acting.opposite else "note_sorting"
     gaps = {"parts_ends": ends[acting.parts], "mates_ends": ends[acting.mates]}
     return _say(key, parts=acting.parts, mates=acting.mates, classes=acting.count, **gaps)
+
+
+def _gap(part: str, others: Sequence[tuple[str, float]]) -> str:
+    """Return the gap of a part as a formula without commas, such as ``washer − 2·hole``."""
+    said = [part]
+    for name, weight in others:
+        times = "" if abs(weight) == 1.0 else f"{abs(weight):g}·"
+        said.append(f"{'−' if weight < 0 else '+'} {times}{name}")
+    return " ".join(said)
