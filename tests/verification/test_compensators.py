@@ -127,6 +127,74 @@ def test_a_gap_beyond_the_last_size_keeps_what_no_size_takes():
     np.testing.assert_array_equal(x[:, :2], plain[:, :2])
 
 
+VECTORS = tuple(source(name, feature=Feature.POSITION, zone=6e-6) for name in ("one", "other"))
+RUNOUTS = [own for own in baseline_errors().sources if own.name in ("disc1.runout", "disc2.runout")]
+
+
+def vectors_of(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the vectors of both sources of a sample, those of order 1 where there are waves, as complex numbers."""
+    half = x.shape[1] // 2
+    return x[:, 0] + 1j * x[:, 1], x[:, half] + 1j * x[:, half + 1]
+
+
+def classes_of(vectors: np.ndarray, sigma: float, by: str, classes: int) -> np.ndarray:
+    """Return the classes in which a shop puts vectors, numbered through."""
+    sector = np.floor(classes * (np.angle(vectors) / (2 * np.pi) % 1))
+    size = np.floor(classes * -np.expm1(-(np.abs(vectors / sigma) ** 2) / 2))
+    return {"direction": sector, "size": size}.get(by, classes * sector + size)
+
+
+@pytest.mark.parametrize(
+    ("by", "classes", "sources"),
+    [
+        ("direction", 4, VECTORS),
+        ("direction", 3, RUNOUTS),
+        ("size", 4, VECTORS),
+        ("direction and size", 2, RUNOUTS),
+    ],
+)
+def test_vectors_are_paired_as_in_batches_that_are_assigned_exactly(by, classes, sources):
+    plain = ErrorModel(tuple(sources))
+    one, other = vectors_of(units_of(plain))
+    sigma, batch, differences, left = one.real.std(), 100, [], []
+    for start in range(0, 20_000, batch):
+        lots = [own[start : start + batch] for own in (one, other)]
+        number = [classes_of(own, sigma, by, classes) for own in lots]
+        rows, columns = linear_sum_assignment(number[0][:, np.newaxis] != number[1])
+        fits = number[0][rows] == number[1][columns]
+        differences.append(np.abs(lots[0][rows] - lots[1][columns])[fits])
+        left.append(1 - fits.mean())
+    first, second = (own.name for own in sources)
+    sorting = ta.Sorting(second, first, by=by, classes=classes, batch=batch)
+    assert abs(np.mean(left) - sorting.leftover_of(sources[0])) < 4.5 * np.std(left) / np.sqrt(len(left))
+    x, before = units_of(errors_of(sorting, sources=tuple(sources)), seed=2), units_of(plain, seed=2)
+    mated = vectors_of(x)
+    assert stats.ks_2samp(np.concatenate(differences), np.abs(mated[0] - mated[1])).pvalue > 1e-3
+    for column, own in zip(x.T, before.T, strict=True):  # every part keeps its law, and every other order its numbers
+        assert stats.kstest(column, stats.norm(scale=own.std()).cdf).pvalue > 1e-4
+    np.testing.assert_array_equal(x[:, : x.shape[1] // 2], before[:, : x.shape[1] // 2])
+    np.testing.assert_array_equal(x[:, x.shape[1] // 2 + 2 :], before[:, x.shape[1] // 2 + 2 :])
+
+
+def test_opposite_vectors_lie_in_opposite_sectors_and_the_smallest_with_the_largest():
+    for by in ("direction", "size"):
+        sorting = ta.Sorting("other", "one", by=by, opposite=True, classes=2)
+        one, other = vectors_of(units_of(errors_of(sorting, sources=VECTORS), 4000))
+        number = [classes_of(own, one.real.std(), by, 2) for own in (one, other)]
+        assert (number[0] + number[1] == 1).mean() > (0.999 if by == "direction" else 0.97)
+    np.testing.assert_array_equal(sorting.sectors("one"), [])
+    directed = replace(sorting, by="direction")
+    np.testing.assert_array_equal(directed.sectors("one"), [-180, 0, 180])
+    np.testing.assert_array_equal(directed.sectors("other"), [0, 180, 360])
+
+
+def test_sizes_of_vectors_end_where_the_quantiles_of_their_radius_lie():
+    sorting = ta.Sorting("other", "one", by="size", classes=4)
+    one, _ = vectors_of(units_of(errors_of(sorting, sources=VECTORS)))
+    counts = np.bincount(np.searchsorted(sorting.limits(VECTORS[0]), np.abs(one)), minlength=4)
+    assert abs(counts - UNITS / 4).max() < 4.5 * np.sqrt(UNITS * 3 / 16)
+
+
 PINS = tuple(source(name, zone=6e-6, each=8) for name in ("pins", "grooves"))
 
 
@@ -170,6 +238,8 @@ def test_sorted_sources_are_one_block_of_a_ranking():
     assert not errors.is_correlated
 
 
+WAVES = replace(source("waves", feature=Feature.RUNOUT, zone=6e-6), spectrum=((2, 1.0),))
+GROWN = replace(WAVES, name="grown", spectrum=((1, 1.0),), systematic=((1, 1e-6, 0.0),))
 REFUSED = [
     (lambda: ta.Sorting("shaft", "hole", classes=0), "classes is 0"),
     (lambda: ta.Sorting("shaft", "hole", classes=(2, 2)), "classes is"),
@@ -191,6 +261,10 @@ REFUSED = [
     (lambda: errors_of(ta.Shim("s*", step=1.0, against={"[hw]*": 1.0})), "one source for all parts"),
     (lambda: errors_of(ta.Shim("hole", step=1.0, against={"pins": 1.0}), sources=(*SIZES, *PINS)), "like features"),
     (lambda: errors_of(ta.Shim(("hole", "h*"), step=1.0)), "every source once"),
+    (lambda: errors_of(ta.Sorting("shaft", "hole", by="direction")), "a position, or a pitch or run-out"),
+    (lambda: ta.Sorting("shaft", "hole", by="colour"), "by is 'colour'"),
+    (lambda: errors_of(ta.Sorting("one", "waves", by="size"), sources=(*VECTORS, WAVES)), "with a wave of order 1"),
+    (lambda: errors_of(ta.Sorting("one", "grown", by="size"), sources=(*VECTORS, GROWN)), "systematic"),
     (lambda: all_choices((ta.Sorting("a", "b", classes=tuple(range(1, 18))),), "test"), "16 or less"),
 ]
 

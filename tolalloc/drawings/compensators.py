@@ -17,11 +17,10 @@ from typing import Annotated, ClassVar, Self
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawings.distributions import ABOVE_ZERO, BELOW_ONE
 from tolalloc.drawings.sources import Source, known_as, meant
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.reading.named_fields import NamedFields, Rule, flag, is_number, number, whole
+from tolalloc.reading.named_fields import NamedFields, Rule, is_number, number
 from tolalloc.reading.units import MICROMETRE
 
 _MOST = 64
@@ -40,12 +39,12 @@ def _are_counts(given: object) -> bool:
     return _is_count(given)
 
 
-_CLASSES = Rule(f"a whole number from 1 to {_MOST}, or several different ones to choose from", _are_counts)
+COUNTS = Rule(f"a whole number from 1 to {_MOST}, or several different ones to choose from", _are_counts)
 _SIZES = Rule(
     f"an odd whole number from 1 to {_MOST}, or several different ones to choose from",
     lambda given: _are_counts(given) and all(own % 2 for own in (given if isinstance(given, Sequence) else (given,))),
 )
-_COST = number("a cost of 0 or above", least=0.0)
+COST = number("a cost of 0 or above", least=0.0)
 
 
 def _is_text(given: object) -> bool:
@@ -56,7 +55,7 @@ def _are_texts(given: object) -> bool:
     return _is_text(given) or (isinstance(given, tuple) and bool(given) and all(map(_is_text, given)))
 
 
-_TEXT = Rule("the name of a source in quotation marks", _is_text)
+TEXT = Rule("the name of a source in quotation marks", _is_text)
 _TEXTS = Rule("the name or pattern of sources in quotation marks, or several names in brackets", _are_texts)
 _AGAINST = Rule(
     "source names with their weights, such as {'housing.groove.radius': -1.0}",
@@ -73,6 +72,28 @@ class Standing:
 
     source: Source
     columns: slice
+
+    @property
+    def vector(self) -> slice:
+        """Where the vectors of a position stand, or the one of the wave of order 1; of a size, its deviations."""
+        if not self.source.spectrum:
+            return self.columns
+        start = self.columns.start + 2 * [order for order, _ in self.source.spectrum].index(1)
+        return slice(start, start + 2)
+
+    @property
+    def width(self) -> int:
+        """Columns of one deviation or vector [-]."""
+        return 1 if self.source.feature is Feature.SIZE else 2
+
+    def of(self, numbers: Float[np.ndarray, "*sample column"]) -> Float[np.ndarray, "*sample copy width"]:
+        """Return the deviations or vectors of every like feature among the numbers of units, a copy."""
+        own = numbers[..., self.vector]
+        return own.reshape(*own.shape[:-1], -1, self.width).copy()
+
+    def put(self, numbers: Float[np.ndarray, "*sample column"], own: Float[np.ndarray, "*sample copy width"]) -> None:
+        """Put them back in place."""
+        numbers[..., self.vector] = own.reshape(*own.shape[:-2], -1)
 
 
 Known = Mapping[str, Standing]
@@ -125,7 +146,7 @@ class Compensator(NamedFields):
 
     @property
     def tied(self) -> tuple[tuple[str, str], ...]:
-        """Pairs of sources whose numbers depend on each other by it."""
+        """Pairs of sources whose numbers depend on each other by it, parts first and then their mates."""
         return ()
 
     @property
@@ -158,155 +179,6 @@ class Compensator(NamedFields):
 
     def fitted(self, deviations: Float[np.ndarray, "*sample column"], known: Known) -> None:
         """Put what is chosen into deviations of units, in place [m]; unless it fits for measured ones, nothing."""
-
-
-@dataclass(frozen=True)
-class Sorting(Compensator):
-    """Selective assembly: two parts are measured, sorted into classes, and mated class by class.
-
-    Parameters
-    ----------
-    parts, mates
-        Sources of the tolerance table whose deviations are sorted: sizes, or positions, which are sorted on each axis.
-        The parts of one unit, such as all its pins, come from one class.
-    classes
-        Number of classes of equally many parts, on each axis; several numbers are compared by an allocation, and other
-        questions take the first [-].
-    opposite
-        Whether the smallest parts go with the largest mates rather than with the smallest.
-    batch
-        Parts that are sorted at a time, from which follows how many are left over [-].
-    class_cost
-        What sorting costs per unit for every class beyond the first [cost units].
-    leftover_cost
-        What a part and a mate that are left over cost together [cost units].
-
-    Notes
-    -----
-    The classes end at the quantiles i/n of each process, so all hold equally many parts on average. A unit's parts then
-    lie in class ⌊n·F(mate)⌋, and inside it as they come: F(part) → (⌊n·F(mate)⌋ + frac(n·F(part)))/n. Both processes
-    keep their own distribution, and units need no batch to be drawn (own derivation; tests compare with batches that
-    are assigned exactly). What is left over does, `leftover`.
-
-    References
-    ----------
-    Mease, Nair, Sudjianto, Selective assembly in manufacturing: statistical issues and optimal binning strategies,
-    Technometrics 46 (2004) 165–175.
-
-    Examples
-    --------
-    >>> sorting = Sorting("pin.diameter", "housing.groove.radius", classes=4)
-    >>> round(sorting.leftover, 4)
-    0.0975
-    """
-
-    called: ClassVar[str] = "sorting"
-    counted: ClassVar[str] = "classes"
-    done: ClassVar[str] = "sorted as parts"
-    by_position: ClassVar[int] = 2
-
-    parts: Annotated[str, _TEXT]
-    mates: Annotated[str, _TEXT]
-    classes: Annotated[int | Sequence[int], _CLASSES] = (1, 2, 4)
-    opposite: Annotated[bool, flag()] = False
-    batch: Annotated[int, whole("a whole number from 1 to 1,000,000", 1, 1_000_000)] = 100
-    class_cost: Annotated[float, _COST] = 0.0
-    leftover_cost: Annotated[float, _COST] = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.parts == self.mates:
-            raise InputError.at(self.called, "mates", self.mates, "another source than parts")
-
-    @property
-    def chosen(self) -> tuple[str, ...]:
-        """The source that is sorted as parts."""
-        return (self.parts,)
-
-    @property
-    def named(self) -> tuple[str, ...]:
-        """Parts and mates."""
-        return (self.parts, self.mates)
-
-    @property
-    def tied(self) -> tuple[tuple[str, str], ...]:
-        """Parts and mates, whose deviations depend on each other."""
-        return ((self.parts, self.mates),)
-
-    @property
-    def independent(self) -> tuple[str, ...]:
-        """The parts; their mates may be correlated with others."""
-        return (self.parts,)
-
-    def resolved(self, sources: Sequence[Source], place: str) -> Sorting:
-        """Return the same with the names that the table itself uses.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            No such source, or one that cannot be sorted so.
-        """
-        parts = _source("parts", self.parts, sources, place)
-        mates = _source("mates", self.mates, sources, place)
-        for name, own in (("parts", parts), ("mates", mates)):
-            if own.feature not in (Feature.SIZE, Feature.POSITION):
-                allowed = "a size or a position; parts ground together are correlated instead, by correlations="
-                raise InputError.at(f"{place}, {self.called}", name, own.name, allowed)
-        axes = [_axes(own) for own in (parts, mates)]
-        if axes[0] != axes[1] or mates.each > 1:
-            allowed = "a source of the same feature with one deviation in each unit"
-            raise InputError.at(f"{place}, {self.called} of {parts.name}", "mates", mates.name, allowed)
-        return replace(self, parts=parts.name, mates=mates.name)
-
-    @property
-    def leftover(self) -> float:
-        """Share of the parts that find no mate in a batch, on average [-].
-
-        1 − (n/B)·E[min(N, M)] with E[min(N, M)] = Σₖ P(N ≥ k)² for two independent binomial numbers of B parts in one
-        of n classes (own derivation).
-
-        Examples
-        --------
-        >>> round(Sorting("a", "b", classes=2, batch=2).leftover, 6)  # 1 − P(N ≥ 1)² − P(N = 2)² with 3/4 and 1/4
-        0.375
-        """
-        return self._leftover(self.count)
-
-    def _leftover(self, classes: int) -> float:
-        from scipy.stats import binom
-
-        if classes == 1:
-            return 0.0
-        at_least = binom.sf(np.arange(self.batch), self.batch, 1.0 / classes)
-        return float(1.0 - classes / self.batch * np.sum(at_least**2))
-
-    def leftover_of(self, parts: Source) -> float:
-        """Return the same of a source, whose classes of a position are those of both axes together [-]."""
-        return self._leftover(self.count ** _axes(parts))
-
-    def cost(self, sources: Mapping[str, Source]) -> float:
-        """Return what it costs per unit that is built [cost units]."""
-        parts = sources[self.parts]
-        lost = self.leftover_of(parts)
-        return float(self.class_cost * (self.count ** _axes(parts) - 1) + self.leftover_cost * lost / (1.0 - lost))
-
-    def sorted(self, uniform: Float[np.ndarray, "*sample column"], known: Known) -> None:
-        """Put the parts of units into the class of their mates, uniform numbers in place [-]."""
-        number, parts = uniform[..., known[self.mates].columns], known[self.parts].columns
-        least = np.floor(self.count * (1.0 - number if self.opposite else number))
-        own = uniform[..., parts]
-        copies = np.tile(np.minimum(least, self.count - 1), own.shape[-1] // number.shape[-1])
-        inside = np.modf(self.count * own)[0]
-        uniform[..., parts] = np.clip((copies + inside) / self.count, ABOVE_ZERO, BELOW_ONE)
-
-    def limits(self, source: Source) -> Float[np.ndarray, " limit"]:
-        """Return where the classes of one of its sources end, as deviations from the nominal size [m].
-
-        The outer classes are open: what the zone allows beyond belongs to them. Of a position, those of each axis.
-        """
-        shares = np.arange(1, self.count) / self.count
-        columns = np.repeat(shares[:, np.newaxis], len(source.columns), axis=1)
-        return np.asarray(source.standard_values(columns)[:, 0] * source.zone + source.middles[0])
 
 
 class _Fitting(Compensator):
@@ -408,7 +280,7 @@ class Shim(_Fitting):
     step: Annotated[float, number("a step above 0 up to 1,000 µm", above=0.0, most=1000.0)]
     sizes: Annotated[int | Sequence[int], _SIZES] = (1, 3, 5)
     against: Annotated[Mapping[Names, float], _AGAINST] = field(default_factory=dict)
-    size_cost: Annotated[float, _COST] = 0.0
+    size_cost: Annotated[float, COST] = 0.0
 
     def __hash__(self) -> int:
         return hash((self.part, self.step, self.sizes, tuple(self.against.items()), self.size_cost))
@@ -459,8 +331,19 @@ def _together(sources: Sequence[Source]) -> Names:
     return sources[0].name if len(sources) == 1 else tuple(map(_name, sources))
 
 
-def _axes(source: Source) -> int:
-    return 2 if source.feature is Feature.POSITION else 1
+def require_vector(source: Source, place: str, named: str) -> None:
+    """Raise unless a source is a vector whose direction is as likely as any other.
+
+    Raises
+    ------
+    InputError
+        It is a size, has no wave of order 1, or systematic waves that all parts share.
+    """
+    orders = [order for order, _ in source.spectrum]
+    if source.feature is Feature.SIZE or (orders and 1 not in orders):
+        raise InputError.at(place, named, source.name, "a position, or a pitch or run-out with a wave of order 1")
+    if source.systematic:
+        raise InputError.at(place, named, source.name, "a source without systematic waves, all directions alike")
 
 
 def _sources(field_name: str, given: Names, sources: Sequence[Source], place: str) -> tuple[Source, ...]:
@@ -479,7 +362,7 @@ def _sources(field_name: str, given: Names, sources: Sequence[Source], place: st
     return tuple(found)
 
 
-def _source(field_name: str, name: str, sources: Sequence[Source], place: str) -> Source:
+def one_source(field_name: str, name: str, sources: Sequence[Source], place: str) -> Source:
     """Return the one source that a name means, which must vary."""
     found = _sources(field_name, name, sources, place)
     if len(found) > 1:
@@ -500,13 +383,12 @@ def in_force(compensators: Sequence[Compensator], sources: Sequence[Source], pla
     for (name, what), times in done.items():
         if times > 1:
             raise InputError(f"{place}: {name} is {what} {times} times; allowed is once.")
-    sorted_parts = [own.parts for own in found if isinstance(own, Sorting)]
-    for own in (own for own in found if isinstance(own, Sorting)):
-        if own.mates in sorted_parts:
-            raise InputError(
-                f"{place}: the mates {own.mates} are sorted as parts too; name the mates of both, so that one choice "
-                "follows from one measurement."
-            )
+    pairs = sorted_together(found)
+    for mates in (mates for _, mates in pairs if mates in dict(pairs)):
+        raise InputError(
+            f"{place}: the mates {mates} are sorted as parts too; name the mates of both, so that one choice follows "
+            "from one measurement."
+        )
     return tuple(own for own in found if own.acts)
 
 
@@ -536,5 +418,5 @@ def choice_label(compensators: Sequence[Compensator]) -> str:
 
 
 def sorted_together(compensators: Sequence[Compensator]) -> tuple[tuple[str, str], ...]:
-    """Return the pairs of sources whose numbers depend on each other by sorting."""
+    """Return the pairs of sources whose numbers depend on each other, parts first and then their mates."""
     return tuple(pair for own in compensators for pair in own.tied)

@@ -8,7 +8,8 @@ from itertools import pairwise
 from typing import Any
 
 from tolalloc.allocation.result import AllocationResult, AssemblyChoice
-from tolalloc.drawings.compensators import Compensator, Shim, Sorting
+from tolalloc.drawings.compensators import Compensator, Shim
+from tolalloc.drawings.sorting import Sorting
 from tolalloc.drawings.sources import Source
 from tolalloc.reading.units import MICROMETRE
 from tolalloc.reports.columns import Column, Table
@@ -21,16 +22,21 @@ from tolalloc.reports.wording import number
 _say = Sentences("allocation")
 
 
+_NONE = float("nan")
+
+
 @dataclass(frozen=True, kw_only=True)
 class _Bin:
-    """One class of a sorted source, or one size."""
+    """One class or sector of a sorted source, or one size; what it does not have is not a number."""
 
     source: str
     what: str
     number: int
-    low: float  # Where it begins, as a deviation from the nominal size; not a number where it is open [µm]
-    high: float
-    middle: float  # Of a size, how far it is from the nominal one [µm]
+    low: float = _NONE  # Where it begins, as a deviation from the nominal size; nothing where it is open [µm]
+    high: float = _NONE
+    begin: float = _NONE  # Of a sector, where it begins, counted from the x axis [°]
+    end: float = _NONE
+    middle: float = _NONE  # Of a size, how far it is from the nominal one [µm]
 
 
 def assembly_cost_sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
@@ -127,10 +133,14 @@ def bins_table(result: AllocationResult) -> Table[_Bin] | None:
         Column(header="what", value=lambda row: row.what),
         Column(header="number [-]", value=lambda row: row.number),
     ]
-    if any(isinstance(own, Sorting) for own in _acting(result)):
+    kinds = {row.what for row in rows}
+    if "class" in kinds:
         columns.append(Column(header="from [µm]", value=lambda row: row.low, nothing="open"))
         columns.append(Column(header="to [µm]", value=lambda row: row.high, nothing="open"))
-    if any(isinstance(own, Shim) for own in _acting(result)):
+    if "sector" in kinds:
+        columns.append(Column(header="from [°]", value=lambda row: row.begin, nothing=""))
+        columns.append(Column(header="to [°]", value=lambda row: row.end, nothing=""))
+    if "size" in kinds:
         columns.append(Column(header="off nominal [µm]", value=lambda row: row.middle, nothing=""))
     return Table(name="classes and sizes", columns=columns, rows=rows)
 
@@ -184,11 +194,10 @@ def _left_over(result: AllocationResult, choice: AssemblyChoice) -> float:
 
 
 def _bins(result: AllocationResult, acting: Compensator) -> list[_Bin]:
-    """Return the classes of both sources of a sorting, or the sizes of a shim."""
-    none = float("nan")
+    """Return the classes and sectors of both sources of a sorting, or the sizes of a shim."""
     if isinstance(acting, Shim):
         return [
-            _Bin(source=part, what="size", number=at + 1, low=none, high=none, middle=acting.step * steps)
+            _Bin(source=part, what="size", number=at + 1, middle=acting.step * steps)
             for part in acting.chosen
             for at, steps in enumerate(range(-acting.reach, acting.reach + 1))
         ]
@@ -196,9 +205,11 @@ def _bins(result: AllocationResult, acting: Compensator) -> list[_Bin]:
     if not isinstance(acting, Sorting):
         return found
     for name in acting.named:
-        ends = [none, *(acting.limits(_source(result, name)) / MICROMETRE).tolist(), none]
-        pairs = enumerate(pairwise(ends), start=1)
-        found += [_Bin(source=name, what="class", number=at, low=a, high=b, middle=none) for at, (a, b) in pairs]
+        limits = acting.limits(_source(result, name)) / MICROMETRE
+        lengths = pairwise([_NONE, *limits.tolist(), _NONE] if limits.size else [])
+        found += [_Bin(source=name, what="class", number=at, low=a, high=b) for at, (a, b) in enumerate(lengths, 1)]
+        angles = pairwise(acting.sectors(name).tolist())
+        found += [_Bin(source=name, what="sector", number=at, begin=a, end=b) for at, (a, b) in enumerate(angles, 1)]
     return found
 
 
@@ -214,14 +225,21 @@ def _note(result: AllocationResult, acting: Compensator) -> str:
 
 
 def _sorting_note(result: AllocationResult, acting: Sorting) -> str:
-    """Return what the drawing says of a sorting."""
-    ends = {
-        name: "/".join(number(end, ".2f") for end in acting.limits(_source(result, name)) / MICROMETRE)
+    """Return what the drawing says of a sorting: of classes, of sectors, or of both."""
+    gaps = {"parts": acting.parts, "mates": acting.mates, "classes": acting.count}
+    said = []
+    if 1 in acting.measured:
+        key = "note_directions_opposite" if acting.opposite else "note_directions"
+        said.append(_say(key, width=360.0 / acting.count, **gaps))
+    if acting.by == "direction":
+        return said[0]
+    ends = [
+        "/".join(number(end, ".2f") for end in acting.limits(_source(result, name)) / MICROMETRE)
         for name in acting.named
-    }
+    ]
     key = "note_opposite" if acting.opposite else "note_sorting"
-    gaps = {"parts_ends": ends[acting.parts], "mates_ends": ends[acting.mates]}
-    return _say(key, parts=acting.parts, mates=acting.mates, classes=acting.count, **gaps)
+    what = _say("of_vector" if 0 in acting.measured else "of_deviation")
+    return " ".join([*said, _say(key, parts_ends=ends[0], mates_ends=ends[1], what=what, **gaps)])
 
 
 def _gap(part: str, others: Sequence[tuple[str, float]]) -> str:
