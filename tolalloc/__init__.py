@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from tolalloc.cli.main import run_script as run_script
     from tolalloc.cli.start import new as new
     from tolalloc.cli.start import schema as schema
+    from tolalloc.drawings.compensators import Indexing as Indexing
     from tolalloc.drawings.compensators import Shim as Shim
     from tolalloc.drawings.drawing import Drawing as Drawing
     from tolalloc.drawings.drawing import load_drawing as drawing  # noqa: F401
@@ -116,6 +117,7 @@ _WHERE = {
     "SeedTree": "drawings.seeds",
     "Series": "reports.figure",
     "Setting": "models.settings",
+    "Indexing": "drawings.compensators",
     "Shim": "drawings.compensators",
     "SobolEffort": "sensitivity.effort",
     "SolveError": "exceptions",

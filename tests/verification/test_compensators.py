@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import openpyxl
@@ -14,12 +15,14 @@ from scipy.optimize import linear_sum_assignment
 import tolalloc as ta
 from tests.builders import baseline_errors, source
 from tolalloc.allocation.result import AllocationResult
+from tolalloc.capability.linear_function import LinearFunction, LinearLaw
 from tolalloc.drawings.compensators import Compensator, all_choices, assembly_cost, in_force
 from tolalloc.drawings.correlation import Correlation, Pair
 from tolalloc.drawings.distributions import Distribution
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
+from tolalloc.reports.tellers.allocation_assembly import assembly_notes, bins_table
 from tolalloc.study.prepared import Prepared
 
 UNITS = 40_000
@@ -74,9 +77,15 @@ def test_units_have_the_law_of_batches_that_are_assigned_exactly_and_leave_as_ma
 
 def test_one_class_and_one_size_choose_nothing():
     plain = ErrorModel(SIZES)
-    chosen = errors_of(ta.Sorting("shaft", "hole", classes=1), ta.Shim("washer", step=1.0, sizes=1))
+    wide = ta.Sorting("shaft", "hole", classes=1, width=2.0)
+    chosen = errors_of(wide, ta.Shim("washer", step=1.0, sizes=1))
     assert chosen == plain
     np.testing.assert_array_equal(units_of(chosen), units_of(plain))
+    turned = ta.Indexing("two", positions=1, against={"one": 1.0})
+    paired = ta.Sorting("other", "one", by="direction", classes=1)
+    sources = (*VECTORS, replace(VECTORS[0], name="two"))
+    assert errors_of(turned, paired, sources=sources) == ErrorModel(sources)
+    assert wide.leftover_of({own.name: own for own in SIZES}) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_all_pins_of_a_unit_come_from_the_class_of_its_grooves():
@@ -96,9 +105,8 @@ def test_positions_are_sorted_on_each_axis():
     deviation = x[:, 0].std()
     expected = 2 * deviation**2 * (1 - np.mean(class_means(3) ** 2))
     assert np.var(difference, axis=0) == pytest.approx(expected, rel=0.04)
-    assert (
-        ta.Sorting("one", "other", classes=3).leftover_of(sources[0]) > ta.Sorting("one", "other", classes=3).leftover
-    )
+    sorting = ta.Sorting("one", "other", classes=3)
+    assert sorting.leftover_of({own.name: own for own in sources}) > sorting.leftover
 
 
 @pytest.mark.parametrize("kind", [Distribution.UNIFORM, Distribution.TRIANGULAR])
@@ -166,7 +174,9 @@ def test_vectors_are_paired_as_in_batches_that_are_assigned_exactly(by, classes,
         left.append(1 - fits.mean())
     first, second = (own.name for own in sources)
     sorting = ta.Sorting(second, first, by=by, classes=classes, batch=batch)
-    assert abs(np.mean(left) - sorting.leftover_of(sources[0])) < 4.5 * np.std(left) / np.sqrt(len(left))
+    assert abs(np.mean(left) - sorting.leftover_of({own.name: own for own in sources})) < 4.5 * np.std(left) / np.sqrt(
+        len(left)
+    )
     x, before = units_of(errors_of(sorting, sources=tuple(sources)), seed=2), units_of(plain, seed=2)
     mated = vectors_of(x)
     assert stats.ks_2samp(np.concatenate(differences), np.abs(mated[0] - mated[1])).pvalue > 1e-3
@@ -193,6 +203,81 @@ def test_sizes_of_vectors_end_where_the_quantiles_of_their_radius_lie():
     one, _ = vectors_of(units_of(errors_of(sorting, sources=VECTORS)))
     counts = np.bincount(np.searchsorted(sorting.limits(VECTORS[0]), np.abs(one)), minlength=4)
     assert abs(counts - UNITS / 4).max() < 4.5 * np.sqrt(UNITS * 3 / 16)
+
+
+@pytest.mark.parametrize("positions", [2, 3, 8])
+def test_a_part_is_turned_to_the_position_that_the_enumeration_of_all_finds(positions):
+    indexing = ta.Indexing("other", positions=positions, against={"one": 0.7})
+    x, plain = (units_of(own) for own in (errors_of(indexing, sources=VECTORS), ErrorModel(VECTORS)))
+    one, other = vectors_of(plain)
+    turns = np.exp(2j * np.pi * np.arange(positions) / positions)
+    np.testing.assert_allclose(
+        np.abs(0.7 * one + vectors_of(x)[1]),
+        np.abs(0.7 * one[:, np.newaxis] + other[:, np.newaxis] * turns).min(axis=1),
+        rtol=0,
+        atol=1e-18,
+    )
+    np.testing.assert_array_equal(x[:, :2], plain[:, :2])
+    np.testing.assert_allclose(np.abs(vectors_of(x)[1]), np.abs(other), rtol=1e-12)
+
+
+@pytest.mark.parametrize("positions", [2, 5])
+def test_the_mean_square_of_a_closed_sum_has_its_closed_form(positions):
+    x = units_of(errors_of(ta.Indexing("other", positions=positions, against={"one": 1.0}), sources=VECTORS))
+    square = np.abs(sum(vectors_of(x))) ** 2
+    sigma2 = np.var(x[:, 0])
+    # E|v + s|² = 4σ² − 2·E|v|·E|s|·E cos δ, E|v| = σ√(π/2), δ uniform within ± π/n
+    expected = 4 * sigma2 - np.pi * sigma2 * np.sinc(1 / positions)
+    assert abs(square.mean() - expected) < 4.5 * square.std() / np.sqrt(UNITS)
+
+
+def test_a_run_out_turns_its_wave_of_order_one_and_keeps_the_others():
+    errors = errors_of(ta.Indexing("disc2.runout", positions=4, against={"disc1.runout": 1.0}), sources=tuple(RUNOUTS))
+    x, plain = units_of(errors, 2000), units_of(ErrorModel(tuple(RUNOUTS)), 2000)
+    np.testing.assert_array_equal(x[:, [*range(6), 8, 9, 10, 11]], plain[:, [*range(6), 8, 9, 10, 11]])
+    assert (x[:, 6:8] != plain[:, 6:8]).any(axis=1).mean() == pytest.approx(0.75, abs=0.05)
+    standard = errors.standard_values(np.random.default_rng(1).random((2000, 12)))
+    grown = errors.deviations(standard, errors.zones * 1.5)  # both alike, so that every position stays
+    np.testing.assert_allclose(errors.by_zone(standard, errors.zones), (grown - x) / (0.5 * errors.zones.repeat(6)))
+
+
+UNLIKE = (source("hole", zone=9e-6), source("shaft", zone=6e-6, distribution=Distribution.UNIFORM), SIZES[2])
+
+
+@pytest.mark.parametrize("opposite", [False, True])
+@pytest.mark.parametrize(("classes", "batch", "sources"), [(3, 60, SIZES), (4, 50, UNLIKE), (5, 20, UNLIKE)])
+def test_classes_of_equal_width_have_the_law_of_batches_that_are_assigned_exactly(classes, batch, sources, opposite):
+    sorting = ta.Sorting("shaft", "hole", classes=classes, width=1.5, batch=batch, opposite=opposite)
+    plain = units_of(ErrorModel(sources), 30_000)
+    ends = [sorting.limits(own) for own in sources[:2]]
+    np.testing.assert_allclose(np.diff(ends[0]), 1.5e-6)
+    gaps, built, left = [], [], []
+    for start in range(0, 30_000, batch):
+        hole, shaft = plain[start : start + batch, :2].T
+        number = [np.searchsorted(own_ends, own) for own_ends, own in zip(ends, (hole, shaft), strict=True)]
+        wanted = classes - 1 - number[0] if opposite else number[0]
+        one, other = linear_sum_assignment(wanted[:, np.newaxis] != number[1])
+        fits = wanted[one] == number[1][other]
+        gaps.append((hole[one] - shaft[other])[fits])
+        built.append(hole[one][fits])
+        left.append(1 - fits.mean())
+    share = sorting.leftover_of({own.name: own for own in sources})
+    assert abs(np.mean(left) - share) < 4.5 * np.std(left) / np.sqrt(len(left))
+    x = units_of(errors_of(sorting, sources=sources), seed=2)
+    assert stats.ks_2samp(np.concatenate(gaps), x[:, 0] - x[:, 1]).pvalue > 1e-3
+    assert stats.ks_2samp(np.concatenate(built), x[:, 0]).pvalue > 1e-3
+    number = [np.searchsorted(own, x[:, at]) for at, own in enumerate(ends)]
+    assert (number[1] == (classes - 1 - number[0] if opposite else number[0])).all()
+
+
+def test_a_nominal_unit_stays_exact_and_derivatives_are_those_of_classes_that_grow():
+    errors = errors_of(ta.Sorting("shaft", "hole", classes=4, width=1.0))
+    np.testing.assert_array_equal(errors.deviations(np.zeros((1, 3)), errors.zones), 0.0)
+    standard = errors.standard_values(np.random.default_rng(1).random((100, 3)))
+    x = errors.deviations(standard, errors.zones)
+    np.testing.assert_allclose(errors.by_zone(standard, errors.zones), x / errors.zones)
+    plain = ErrorModel(SIZES)
+    assert plain.by_zone(standard, plain.zones) is standard
 
 
 PINS = tuple(source(name, zone=6e-6, each=8) for name in ("pins", "grooves"))
@@ -240,6 +325,7 @@ def test_sorted_sources_are_one_block_of_a_ranking():
 
 WAVES = replace(source("waves", feature=Feature.RUNOUT, zone=6e-6), spectrum=((2, 1.0),))
 GROWN = replace(WAVES, name="grown", spectrum=((1, 1.0),), systematic=((1, 1e-6, 0.0),))
+TILT = replace(VECTORS[0], name="tilt", over=0.03)
 REFUSED = [
     (lambda: ta.Sorting("shaft", "hole", classes=0), "classes is 0"),
     (lambda: ta.Sorting("shaft", "hole", classes=(2, 2)), "classes is"),
@@ -265,6 +351,18 @@ REFUSED = [
     (lambda: ta.Sorting("shaft", "hole", by="colour"), "by is 'colour'"),
     (lambda: errors_of(ta.Sorting("one", "waves", by="size"), sources=(*VECTORS, WAVES)), "with a wave of order 1"),
     (lambda: errors_of(ta.Sorting("one", "grown", by="size"), sources=(*VECTORS, GROWN)), "systematic"),
+    (lambda: ta.Sorting("one", "other", by="size", width=1.0), "where a width is given"),
+    (lambda: ta.Sorting("one", "other", width=0.0), "width is 0"),
+    (lambda: errors_of(ta.Sorting("one", "other", width=1.0), sources=VECTORS), "a size where a width"),
+    (
+        lambda: errors_of(ta.Sorting("shaft", "hole", classes=2, width=1.0), ta.Sorting("washer", "hole", classes=2)),
+        "equal width and once more",
+    ),
+    (lambda: ta.Indexing("one"), "against is 'empty'"),
+    (lambda: ta.Indexing("one", positions=0, against={"other": 1.0}), "positions is 0"),
+    (lambda: errors_of(ta.Indexing("one", against={"hole": 1.0}), sources=(*VECTORS, *SIZES)), "a position, or a"),
+    (lambda: errors_of(ta.Indexing("one", against={"tilt": 1.0}), sources=(*VECTORS, TILT)), "angles with angles"),
+    (lambda: errors_of(*2 * [ta.Indexing("one", against={"other": 1.0})], sources=VECTORS), "turned 2 times"),
     (lambda: all_choices((ta.Sorting("a", "b", classes=tuple(range(1, 18))),), "test"), "16 or less"),
 ]
 
@@ -285,6 +383,9 @@ def test_waves_and_correlated_parts_are_refused():
     pair = Correlation(pairs=(Pair(one="shaft", other="washer", correlation=0.5),))
     with pytest.raises(InputError, match="correlated with no other"):
         errors_of(ta.Sorting("shaft", "hole", classes=2), correlation=pair)
+    with pytest.raises(InputError, match="correlated with no other"):
+        errors_of(ta.Sorting("hole", "shaft", classes=2, width=1.0), correlation=pair)
+    errors_of(ta.Sorting("hole", "shaft", classes=2), correlation=pair)
     with pytest.raises(UnknownNameError, match="hole"):
         in_force((ta.Sorting("pin.diameter", "hole", classes=2),), baseline_errors().sources, "test")
 
@@ -389,6 +490,70 @@ def test_a_shim_is_chosen_with_the_zones():
     assert result.assembled.best.label == "5 sizes of hole"
     assert result.assembled.best.assembly_cost == pytest.approx(0.4)
     assert result.assembled.best.cost < 0.6 * result.assembled.choices[0].cost
+
+
+@pytest.mark.parametrize(
+    "compensator",
+    [
+        ta.Sorting("shaft", "hole", classes=4, width=2.0),
+        ta.Shim("shaft", step=1.0, sizes=3, against={"hole": -1.0}),
+    ],
+)
+def test_no_law_of_a_linear_output_and_no_shapley_shares_are_claimed_where_parts_are_chosen(compensator):
+    errors = errors_of(compensator)
+    function = LinearFunction(offset=0.0, slopes=np.ones(3), rounding=0.0)
+    assert LinearLaw.of(function, ErrorModel(SIZES), errors.zones) is not None
+    assert LinearLaw.of(function, errors, errors.zones) is None
+
+
+def test_classes_of_equal_width_are_chosen_with_the_zones():
+    sorting = ta.Sorting("shaft", "hole", classes=(1, 4), width=2.0, batch=100, class_cost=0.1, leftover_cost=1.0)
+    result = gap_study(compensators=sorting).allocate().result
+    alone, four = result.assembled.choices
+    assert result.met
+    assert result.assembled.best is four
+    assert four.cost < alone.cost
+    [acting], drawn = four.compensators, {own.name: own for own in result.drawn_sources}
+    assert four.left_over == acting.leftover_of(drawn) > 0
+    assert four.assembly_cost == pytest.approx(0.3 + four.left_over / (1 - four.left_over))
+    errors = ErrorModel(tuple(result.drawn_sources), compensators=(acting,))
+    gap = units_of(errors, 100_000) @ [1.0, -1.0]
+    assert (np.abs(gap) <= 8e-6).mean() > 0.9973 - 4 * np.sqrt(0.0027 / 100_000)
+
+
+SHOP = [
+    (ta.Sorting("other", "one", by="direction", classes=4), "sort both into 4 sectors of 90°", "to [°]"),
+    (
+        ta.Sorting("other", "one", by="direction", classes=2, opposite=True),
+        "each sector with the opposite one",
+        "to [°]",
+    ),
+    (ta.Sorting("other", "one", by="size", classes=2), "classes that end at 1.03 µm of its radius", "to [µm]"),
+    (ta.Sorting("other", "one", by="direction and size", classes=2), "sectors of 180° from the x axis", "from [µm]"),
+    (ta.Sorting("shaft", "hole", width=2.0, classes=3), "3 classes that end at −1.00/1.00 µm from nominal", "to [µm]"),
+    (
+        ta.Indexing("other", positions=6, against={"one": -1.0}),
+        "mount other at the one of 6 positions 60° apart",
+        "turned",
+    ),
+    (
+        ta.Shim("pins", step=0.5, sizes=3, against={"grooves": -2.0}),
+        "the measured pins − 2·grooves comes",
+        "off nominal",
+    ),
+]
+
+
+@pytest.mark.parametrize(("compensator", "said", "head"), SHOP)
+def test_the_shop_is_told_in_one_line_without_commas_what_to_do(compensator, said, head):
+    sources = (*VECTORS, *SIZES, *PINS)
+    best = SimpleNamespace(compensators=in_force((compensator,), sources, "test"))
+    result = SimpleNamespace(assembled=SimpleNamespace(best=best), drawn_sources=sources)
+    [note] = assembly_notes(result)
+    assert said in note
+    assert "," not in note
+    assert "\n" not in note
+    assert any(column.startswith(head) or head in column for column in bins_table(result).frame("€").columns)
 
 
 def test_a_ranking_of_one_block_draws_its_index_within_what_is_possible(tmp_path):

@@ -15,7 +15,7 @@ from itertools import product
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Complex, Float
 
 from tolalloc.drawings.sources import Source, known_as, meant
 from tolalloc.drawings.zones import Feature
@@ -155,6 +155,11 @@ class Compensator(NamedFields):
         return ()
 
     @property
+    def arranges(self) -> bool:
+        """Whether it puts deviations in the place of those that the zones give, which then grow with the zones."""
+        return False
+
+    @property
     def label(self) -> str:
         """What is chosen, in words, such as ``4 classes of pin.diameter``."""
         more = f" and {len(self.chosen) - 1} more" if len(self.chosen) > 1 else ""
@@ -174,8 +179,17 @@ class Compensator(NamedFields):
         """Return what it costs per unit that is built, at the zones of sources by their names [cost units]."""
         raise NotImplementedError
 
+    def leftover_of(self, sources: Mapping[str, Source]) -> float:  # noqa: ARG002
+        """Return the share of parts that find no mate, at the zones of sources by their names [-]."""
+        return 0.0
+
     def sorted(self, uniform: Float[np.ndarray, "*sample column"], known: Known) -> None:
         """Put the parts of units where their mates are, uniform numbers in place [-]; unless it sorts, nothing."""
+
+    def arranged(
+        self, deviations: Float[np.ndarray, "*sample column"], zones: Mapping[str, float], known: Known
+    ) -> None:
+        """Put deviations of units at these zones [m] where it `arranges` them, in place [m]."""
 
     def fitted(self, deviations: Float[np.ndarray, "*sample column"], known: Known) -> None:
         """Put what is chosen into deviations of units, in place [m]; unless it fits for measured ones, nothing."""
@@ -319,6 +333,103 @@ class Shim(_Fitting):
             deviations[..., part] -= step * np.clip(np.rint(gap / step), -self.reach, self.reach)
 
 
+@dataclass(frozen=True)
+class Indexing(_Fitting):
+    """A part that is mounted at the one of several angular positions where its vector best closes those it sits with.
+
+    Parameters
+    ----------
+    part
+        Source of the tolerance table whose part is turned: a position, or a pitch or run-out with a wave of order 1.
+        Sources of a pattern or of several names are turned each on its own.
+    positions
+        Number of positions around a turn; several are compared by an allocation, and other questions take the first
+        [-].
+    against
+        Measured source → how much of the sum its vector makes, for the part's own 1 [-], as `Shim` says.
+    position_cost
+        What every position beyond the first costs per unit, for all parts together [cost units].
+
+    Notes
+    -----
+    Of the vectors v of the part and s = Σ w·vₛ of the others, v turns by k·360°/n with the k that leaves the least of
+    |v + s|: the one that is nearest to the direction of −s. Other vectors of the part turn too and keep their law, as
+    all directions are alike (own derivation). Measuring errs by nothing (an assumption). Derivatives with respect to
+    zones are those of the positions chosen, with the vector as it is turned.
+
+    Examples
+    --------
+    >>> Indexing("sun.eccentricity", positions=6, against={"sun.assembly": 1.0}).label
+    '6 positions of sun.eccentricity'
+    """
+
+    called: ClassVar[str] = "indexing"
+    counted: ClassVar[str] = "positions"
+    done: ClassVar[str] = "turned"
+    by_position: ClassVar[int] = 1
+
+    part: Annotated[Names, _TEXTS]
+    positions: Annotated[int | Sequence[int], COUNTS] = (1, 2, 4)
+    against: Annotated[Mapping[Names, float], _AGAINST] = field(default_factory=dict)
+    position_cost: Annotated[float, COST] = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.against:
+            raise InputError.at(self.called, "against", "empty", "one measured source or several")
+
+    def __hash__(self) -> int:
+        return hash((self.part, self.positions, tuple(self.against.items()), self.position_cost))
+
+    @property
+    def independent(self) -> tuple[str, ...]:
+        """The parts; those they sit with may be correlated with others."""
+        return self.chosen
+
+    def resolved(self, sources: Sequence[Source], place: str) -> Self:
+        """Return the same with the names that the table itself uses.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            No such source, one that is no vector, angles with lengths, or not one for each part.
+        """
+        found, named = super().resolved(sources, place), f"{place}, {self.called}"
+        own = [source for source in sources if source.name in found.named]
+        for source in own:
+            require_vector(source, named, "source")
+        if len({source.over > 0.0 for source in own}) > 1:
+            raise InputError.at(named, "against", " and ".join(found.named), "angles with angles, lengths with lengths")
+        return found
+
+    def cost(self, sources: Mapping[str, Source]) -> float:  # noqa: ARG002
+        """Return what it costs per unit [cost units]."""
+        return self.position_cost * (self.count - 1)
+
+    @property
+    def arranges(self) -> bool:
+        """Yes: a vector that is turned grows with its zone as it is turned."""
+        return True
+
+    def arranged(
+        self,
+        deviations: Float[np.ndarray, "*sample column"],
+        zones: Mapping[str, float],  # noqa: ARG002
+        known: Known,
+    ) -> None:
+        """Turn the parts of units to the position that is chosen, deviations in place [m]."""
+        for name, others in self.of_each:
+            part = _complex(known[name].of(deviations))
+            rest = sum((weight * _complex(known[other].of(deviations)) for other, weight in others), np.zeros(1))
+            steps = np.rint(self.count * np.angle(-rest * part.conj()) / (2.0 * np.pi)) % self.count
+            turned = part * np.exp(2j * np.pi * steps / self.count)
+            known[name].put(deviations, np.stack([turned.real, turned.imag], axis=-1))
+
+
+def _complex(pairs: Float[np.ndarray, "*sample copy 2"]) -> Complex[np.ndarray, "*sample copy"]:
+    return np.asarray(pairs[..., 0] + 1j * pairs[..., 1])
+
+
 def _listed(given: Names) -> tuple[str, ...]:
     return (given,) if isinstance(given, str) else given
 
@@ -389,11 +500,14 @@ def in_force(compensators: Sequence[Compensator], sources: Sequence[Source], pla
             f"{place}: the mates {mates} are sorted as parts too; name the mates of both, so that one choice follows "
             "from one measurement."
         )
+    sorted_by = Counter(name for own in found for pair in own.tied for name in pair)
+    for name in (name for own in found if own.tied and own.arranges for name in own.named if sorted_by[name] > 1):
+        raise InputError(f"{place}: {name} is sorted into classes of equal width and once more; allowed is once.")
     return tuple(own for own in found if own.acts)
 
 
 def all_choices(compensators: Sequence[Compensator], place: str) -> tuple[tuple[Compensator, ...], ...]:
-    """Return every combination of classes and sizes, the first numbers first.
+    """Return every combination of classes, sizes and positions, the first numbers first.
 
     Raises
     ------
@@ -402,7 +516,7 @@ def all_choices(compensators: Sequence[Compensator], place: str) -> tuple[tuple[
     """
     found: tuple[tuple[Compensator, ...], ...] = tuple(product(*(own.choices for own in compensators)))
     if len(found) > MOST_CHOICES:
-        raise InputError.at(place, "combinations of classes and sizes", len(found), f"{MOST_CHOICES} or less")
+        raise InputError.at(place, "combinations at assembly", len(found), f"{MOST_CHOICES} or less")
     return found
 
 

@@ -204,14 +204,43 @@ class ErrorModel:
         self, standard: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]
     ) -> Float[np.ndarray, "sample column"]:
         """Return the columns [m, angles rad] that the standard values give at the zones [m], sizes chosen for them."""
-        counts = [len(source.columns) for source in self._varying]
-        middle = np.concatenate(
-            [*(source.middles for source in self.active), *(np.zeros(len(source.columns)) for source in self.joint), []]
-        )
-        found = np.asarray(standard * np.repeat(zones, counts) + middle)
+        found = self._arranged(standard, zones)
         for own in self.compensators:
             own.fitted(found, self._known)
         return found
+
+    def by_zone(
+        self, standard: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]
+    ) -> Float[np.ndarray, "sample column"]:
+        """Return the derivatives of the columns by the zones of their sources, with what is chosen in force [-].
+
+        They are the standard values, unless parts are turned or in classes of equal width: then the deviations as
+        arranged, over the zones.
+        """
+        if not any(own.arranges for own in self.compensators):
+            return standard
+        return np.asarray((self._arranged(standard, zones) - self._middle) / np.repeat(zones, self._counts))
+
+    def _arranged(
+        self, standard: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]
+    ) -> Float[np.ndarray, "sample column"]:
+        """Return the columns that the standard values give before sizes are chosen [m, rad]."""
+        found = np.asarray(standard * np.repeat(zones, self._counts) + self._middle)
+        of_sources = {own.name: float(zone) for own, zone in zip(self.active, zones, strict=False)}
+        for own in self.compensators:
+            own.arranged(found, of_sources, self._known)
+        return found
+
+    @property
+    def _counts(self) -> list[int]:
+        return [len(source.columns) for source in self._varying]
+
+    @property
+    def _middle(self) -> Float[np.ndarray, " column"]:
+        """Where the columns stand without what is random [m, rad]."""
+        return np.concatenate(
+            [*(source.middles for source in self.active), *(np.zeros(len(source.columns)) for source in self.joint), []]
+        )
 
     def deviations_of_normal(
         self, numbers: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -23,7 +24,8 @@ from tolalloc.drawings.distributions import ABOVE_ZERO, BELOW_ONE, RAYLEIGH, ndt
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError
-from tolalloc.reading.named_fields import Rule, flag, whole
+from tolalloc.reading.named_fields import Rule, flag, number, or_none, whole
+from tolalloc.reading.units import MICROMETRE
 
 _MEASURED = ("deviation", "direction", "size", "direction and size")
 """What may be measured of parts that are sorted."""
@@ -39,14 +41,17 @@ class Sorting(Compensator):
         Sources of the tolerance table that are sorted, also of two like parts of one unit, such as its discs. The parts
         of one unit, such as all its pins, come from one class.
     classes
-        Number of classes of equally many parts, on each axis; several numbers are compared by an allocation, and other
-        questions take the first [-].
+        Number of classes, on each axis; of equally many parts unless a width is given. Several numbers are compared by
+        an allocation, and other questions take the first [-].
     opposite
         Whether the smallest parts go with the largest mates rather than with the smallest, and directions with opposite
         ones.
     by
         What is measured of them: their ``deviation``, of positions on each axis; of a position, or of the wave of order
         1 of a pitch or run-out, its ``direction`` in the axes of its columns, its ``size``, or ``direction and size``.
+    width
+        Width of every class but the outer ones, which are open, of sizes alone; the classes then lie about the middle
+        of each zone and hold as many parts as they come. Equally many in each unless given [µm].
     batch
         Parts that are sorted at a time, from which follows how many are left over [-].
     class_cost
@@ -64,6 +69,11 @@ class Sorting(Compensator):
     The same map takes the share of all directions below that of a vector, φ/2π, and the probability of one no longer.
     The normal numbers behind a vector give both, independently of each other, so that every order of a wave but the
     first stays as it comes.
+
+    Classes of equal width hold shares p of the parts and q of the mates. A batch builds E[min(N, M)] units of each, so
+    its units lie in a class with a probability in proportion, and inside it both parts have their own law cut to the
+    class: what is left over is no longer as likely of any class, and built parts are no longer all parts (own
+    derivation). Derivatives with respect to zones are those of classes that grow with the zones.
 
     References
     ----------
@@ -87,6 +97,9 @@ class Sorting(Compensator):
     classes: Annotated[int | Sequence[int], COUNTS] = (1, 2, 4)
     opposite: Annotated[bool, flag()] = False
     by: Annotated[str, Rule(f"one of {', '.join(map(repr, _MEASURED))}", _MEASURED.__contains__)] = _MEASURED[0]
+    width: Annotated[
+        float | None, or_none(number("a width above 0 up to 1,000 µm, or None", above=0.0, most=1000.0))
+    ] = None
     batch: Annotated[int, whole("a whole number from 1 to 1,000,000", 1, 1_000_000)] = 100
     class_cost: Annotated[float, COST] = 0.0
     leftover_cost: Annotated[float, COST] = 0.0
@@ -95,6 +108,8 @@ class Sorting(Compensator):
         super().__post_init__()
         if self.parts == self.mates:
             raise InputError.at(self.called, "mates", self.mates, "another source than parts")
+        if self.width is not None and self.by != _MEASURED[0]:
+            raise InputError.at(self.called, "by", self.by, f"{_MEASURED[0]!r} where a width is given")
 
     @property
     def chosen(self) -> tuple[str, ...]:
@@ -113,8 +128,13 @@ class Sorting(Compensator):
 
     @property
     def independent(self) -> tuple[str, ...]:
-        """The parts; their mates may be correlated with others."""
-        return (self.parts,)
+        """The parts; their mates may be correlated with others, unless classes of equal width select among them."""
+        return (self.parts,) if self.width is None else self.named
+
+    @property
+    def arranges(self) -> bool:
+        """Whether classes have a width, and so depend on the zones."""
+        return self.width is not None
 
     def resolved(self, sources: Sequence[Source], place: str) -> Sorting:
         """Return the same with the names that the table itself uses.
@@ -134,6 +154,8 @@ class Sorting(Compensator):
         return replace(self, parts=parts.name, mates=mates.name)
 
     def _require_sortable(self, source: Source, place: str, named: str) -> None:
+        if self.width is not None and source.feature is not Feature.SIZE:
+            raise InputError.at(place, named, source.name, "a size where a width is given")
         if self.by != _MEASURED[0]:
             require_vector(source, place, named)
         elif source.feature not in (Feature.SIZE, Feature.POSITION):
@@ -160,7 +182,7 @@ class Sorting(Compensator):
 
     @property
     def leftover(self) -> float:
-        """Share of the parts that find no mate in a batch, on average [-].
+        """Share of the parts that find no mate in a batch where all classes hold equally many, on average [-].
 
         1 − (n/B)·E[min(N, M)] with E[min(N, M)] = Σₖ P(N ≥ k)² for two independent binomial numbers of B parts in one
         of n classes (own derivation).
@@ -173,27 +195,39 @@ class Sorting(Compensator):
         return self._leftover(self.count)
 
     def _leftover(self, classes: int) -> float:
-        from scipy.stats import binom
+        return 0.0 if classes == 1 else float(1.0 - classes * _mated(1.0 / classes, 1.0 / classes, self.batch))
 
-        if classes == 1:
-            return 0.0
-        at_least = binom.sf(np.arange(self.batch), self.batch, 1.0 / classes)
-        return float(1.0 - classes / self.batch * np.sum(at_least**2))
+    def leftover_of(self, sources: Mapping[str, Source]) -> float:
+        """Return the same at the zones of sources, by their names [-].
 
-    def leftover_of(self, parts: Source) -> float:
-        """Return the same of a source, whose classes of a position are those of both axes together [-]."""
-        return self._leftover(self.count ** self._numbers(parts))
+        Classes of a position are those of both axes together; of equal width it is 1 − Σ E[min(N, M)]/B over all.
+        """
+        if self.width is None:
+            return self._leftover(self.count ** self._numbers(sources[self.parts]))
+        ends = [self._ends(sources[name], sources[name].zone) for name in self.named]
+        return float(1.0 - self._built(np.diff(ends[0]), np.diff(ends[1])).sum())
+
+    def _ends(self, source: Source, zone: float) -> Float[np.ndarray, " end"]:
+        """Return the share of parts of a source below each end of the classes of equal width, 0 and 1 included [-]."""
+        middles = (np.arange(1, self.count) - self.count / 2.0) * (self.width or 0.0) * MICROMETRE
+        return np.array([0.0, *source.zone_mapping.marginal.probability(middles / (zone / 2.0)), 1.0])
+
+    def _built(
+        self, parts: Float[np.ndarray, " class"], mates: Float[np.ndarray, " class"]
+    ) -> Float[np.ndarray, " class"]:
+        """Return the units that a batch builds of each class of the mates, over its parts [-]."""
+        parts = parts[::-1] if self.opposite else parts
+        return np.array([_mated(float(p), float(q), self.batch) for p, q in zip(parts, mates, strict=True)])
 
     def cost(self, sources: Mapping[str, Source]) -> float:
         """Return what it costs per unit that is built [cost units]."""
-        parts = sources[self.parts]
-        lost = self.leftover_of(parts)
-        return float(
-            self.class_cost * (self.count ** self._numbers(parts) - 1) + self.leftover_cost * lost / (1.0 - lost)
-        )
+        lost, further = self.leftover_of(sources), self.count ** self._numbers(sources[self.parts]) - 1
+        return float(self.class_cost * further + self.leftover_cost * lost / (1.0 - lost))
 
     def sorted(self, uniform: Float[np.ndarray, "*sample column"], known: Known) -> None:
         """Put the parts of units into the class of their mates, uniform numbers in place [-]."""
+        if self.width is not None:
+            return
         parts, mates = (known[name].of(uniform) for name in self.named)
         if self.by == _MEASURED[0]:
             known[self.parts].put(uniform, self._placed(parts, 1.0 - mates if self.opposite else mates))
@@ -211,12 +245,46 @@ class Sorting(Compensator):
         least = np.minimum(np.floor(self.count * mates), self.count - 1)
         return np.asarray(np.clip((least + np.modf(self.count * parts)[0]) / self.count, ABOVE_ZERO, BELOW_ONE))
 
+    def arranged(
+        self, deviations: Float[np.ndarray, "*sample column"], zones: Mapping[str, float], known: Known
+    ) -> None:
+        """Put parts and mates into the classes of equal width that a batch builds units of, deviations in place [m].
+
+        Where either is exact, as in the nominal unit, both stay.
+        """
+        if self.width is None:
+            return
+        sources = [known[name].source for name in self.named]
+        scales = [zones[own.name] / 2.0 / own.lever for own in sources]
+        offs = [known[own.name].of(deviations)[..., 0] - own.middle / own.lever for own in sources]
+        ends = [self._ends(own, zones[own.name]) for own in sources]
+        ranks = [
+            own.zone_mapping.marginal.probability(off / scale)
+            for own, off, scale in zip(sources, offs, scales, strict=True)
+        ]
+        shares = [np.diff(own) for own in ends]
+        built = self._built(*shares)
+        reached = np.cumsum(built) / built.sum()
+        number = np.searchsorted(reached[:-1], ranks[1], side="right")
+        inside = (ranks[1] - (reached - built / built.sum())[number]) / (built / built.sum())[number]
+        of_parts = self.count - 1 - number if self.opposite else number
+        placed = (
+            ends[0][of_parts] + ranks[0] * shares[0][of_parts],
+            ends[1][number] + np.clip(inside, 0.0, 1.0) * shares[1][number],
+        )
+        exact = (offs[1] == 0.0) | (offs[0] == 0.0).all(axis=-1, keepdims=True)
+        for own, off, scale, rank in zip(sources, offs, scales, placed, strict=True):
+            value = own.zone_mapping.marginal.quantile(np.clip(rank, ABOVE_ZERO, BELOW_ONE)) * scale
+            known[own.name].put(deviations, (np.where(exact, off, value) + own.middle / own.lever)[..., np.newaxis])
+
     def limits(self, source: Source) -> Float[np.ndarray, " limit"]:
         """Return where the classes of one of its sources end: deviations from nominal, or sizes of its vector [m].
 
         The outer classes are open: what the zone allows beyond belongs to them. Of a position, those of each axis.
         Where directions alone are sorted, nothing.
         """
+        if self.width is not None:
+            return np.asarray((np.arange(1, self.count) - self.count / 2.0) * self.width * MICROMETRE + source.middle)
         shares = np.arange(1, self.count) / self.count
         vector = Standing(source, slice(0, len(source.columns))).vector.start
         if self.by == _MEASURED[0]:
@@ -240,6 +308,27 @@ class Sorting(Compensator):
             return np.empty(0)
         turned = 180.0 if self.opposite and source == self.mates else 0.0
         return np.asarray(360.0 * np.arange(self.count + 1) / self.count - turned)
+
+
+@lru_cache(maxsize=4096)
+def _mated(parts: float, mates: float, batch: int) -> float:
+    """Return E[min(N, M)]/B of binomial numbers of B parts and B mates that lie in a class with these shares [-].
+
+    Σ P(N > k)·P(M > k) over all k, of which those further than nine standard deviations from B times the smaller share
+    are 1 or 0.
+
+    Examples
+    --------
+    >>> _mated(0.5, 0.5, 2), round(_mated(0.3, 0.9, 10_000), 4)
+    (0.3125, 0.3)
+    """
+    from scipy.special import bdtrc
+
+    mean = batch * min(parts, mates)
+    reach = 9.0 * np.sqrt(mean) + 9.0
+    first, last = max(0, int(mean - reach)), min(batch, int(mean + reach) + 1)
+    number = np.arange(first, last, dtype=float)
+    return float((first + np.sum(bdtrc(number, batch, parts) * bdtrc(number, batch, mates))) / batch)
 
 
 def _polar(pairs: Float[np.ndarray, "*sample 2"]) -> Float[np.ndarray, "*sample 2"]:

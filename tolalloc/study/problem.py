@@ -218,7 +218,8 @@ class Problem(NamedFields):
         What the title blocks of page and drawing say beside study and date: ``drawing number``, ``revision``,
         ``author``, and ``material`` on the drawing. What is not said stays empty there, to be filled in by hand.
     compensators
-        What is chosen at assembly, ``ta.Sorting(...)`` and ``ta.Shim(...)``: reducers are judged as they are assembled.
+        What is chosen at assembly, ``ta.Sorting(...)``, ``ta.Shim(...)`` and ``ta.Indexing(...)``: reducers are judged
+        as they are assembled.
         An allocation compares all numbers of classes and sizes that they state, other questions take the first.
     """
 
@@ -248,7 +249,8 @@ class Problem(NamedFields):
         ),
     ] = field(default_factory=dict)
     compensators: Annotated[
-        "Sequence[Compensator]", Rule("several of ta.Sorting(...) and ta.Shim(...)", _are_compensators)
+        "Sequence[Compensator]",
+        Rule("several of ta.Sorting(...), ta.Shim(...) and ta.Indexing(...)", _are_compensators),
     ] = ()
 
     def __post_init__(self) -> None:

@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Any
 
 from tolalloc.allocation.result import AllocationResult, AssemblyChoice
-from tolalloc.drawings.compensators import Compensator, Shim
+from tolalloc.drawings.compensators import Compensator, Indexing, Shim
 from tolalloc.drawings.sorting import Sorting
 from tolalloc.drawings.sources import Source
 from tolalloc.reading.units import MICROMETRE
@@ -37,6 +37,7 @@ class _Bin:
     begin: float = _NONE  # Of a sector, where it begins, counted from the x axis [°]
     end: float = _NONE
     middle: float = _NONE  # Of a size, how far it is from the nominal one [µm]
+    turned: float = _NONE  # Of an angular position, how far the part is turned [°]
 
 
 def assembly_cost_sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
@@ -75,7 +76,7 @@ def assembly_sentences(result: AllocationResult) -> tuple[str, ...]:
     ]
     for own in assembled.best.compensators:
         if isinstance(own, Sorting):
-            left = own.leftover_of(_source(result, own.parts))
+            left = own.leftover_of({name: _source(result, name) for name in own.named})
             said.append(_say("assembly_left", share=left, parts=own.parts, mates=own.mates, batch=own.batch))
     return tuple(said)
 
@@ -96,12 +97,19 @@ def assembly_section(result: AllocationResult, cost_unit: str) -> tuple[Section,
     return (
         Section(
             heading=_say("heading_assembly"),
-            paragraphs=(*assembly_sentences(result), *assembly_notes(result), _say("assembly_method")),
+            paragraphs=(*assembly_sentences(result), *assembly_notes(result), *_methods(result)),
             figures=choices_figure(result, cost_unit),
             tables=tuple(tables),
             unfolded=True,
         ),
     )
+
+
+def _methods(result: AllocationResult) -> tuple[str, ...]:
+    """Return where classes end and what is assumed of measuring."""
+    widths = {own.width is None for own in _acting(result) if isinstance(own, Sorting)}
+    keys = [key for key, equal in (("method_equal", True), ("method_width", False)) if equal in widths]
+    return tuple(map(_say, [*keys, "assembly_method"]))
 
 
 def choices_table(result: AllocationResult) -> Table[AssemblyChoice]:
@@ -117,7 +125,7 @@ def choices_table(result: AllocationResult) -> Table[AssemblyChoice]:
             value=lambda row: float("nan") if row.bound is None else row.bound,
         ),
         Column(header="all limits at once [%]", value=lambda row: 100 * row.joint.estimate),
-        Column(header="left over [%]", value=lambda row: 100 * _left_over(result, row)),
+        Column(header="left over [%]", value=lambda row: 100 * row.left_over),
     ]
     choices = result.assembled.choices if result.assembled else ()
     return Table(name="parts at assembly", columns=columns, rows=list(choices))
@@ -142,6 +150,8 @@ def bins_table(result: AllocationResult) -> Table[_Bin] | None:
         columns.append(Column(header="to [°]", value=lambda row: row.end, nothing=""))
     if "size" in kinds:
         columns.append(Column(header="off nominal [µm]", value=lambda row: row.middle, nothing=""))
+    if "position" in kinds:
+        columns.append(Column(header="turned by [°]", value=lambda row: row.turned, nothing=""))
     return Table(name="classes and sizes", columns=columns, rows=rows)
 
 
@@ -187,12 +197,6 @@ def _source(result: AllocationResult, name: str) -> Source:
     return next(own for own in result.drawn_sources if own.name == name)
 
 
-def _left_over(result: AllocationResult, choice: AssemblyChoice) -> float:
-    """Return the largest share of parts that find no mate, of all that are sorted [-]."""
-    sortings = (own for own in choice.compensators if isinstance(own, Sorting))
-    return max((own.leftover_of(_source(result, own.parts)) for own in sortings), default=0.0)
-
-
 def _bins(result: AllocationResult, acting: Compensator) -> list[_Bin]:
     """Return the classes and sectors of both sources of a sorting, or the sizes of a shim."""
     if isinstance(acting, Shim):
@@ -200,6 +204,12 @@ def _bins(result: AllocationResult, acting: Compensator) -> list[_Bin]:
             _Bin(source=part, what="size", number=at + 1, middle=acting.step * steps)
             for part in acting.chosen
             for at, steps in enumerate(range(-acting.reach, acting.reach + 1))
+        ]
+    if isinstance(acting, Indexing):
+        return [
+            _Bin(source=part, what="position", number=at + 1, turned=360.0 * at / acting.count)
+            for part in acting.chosen
+            for at in range(acting.count)
         ]
     found = list[_Bin]()
     if not isinstance(acting, Sorting):
@@ -215,13 +225,15 @@ def _bins(result: AllocationResult, acting: Compensator) -> list[_Bin]:
 
 def _note(result: AllocationResult, acting: Compensator) -> str:
     """Return what the drawing says of a sorting or of sizes."""
-    if isinstance(acting, Shim):
-        gaps = " and ".join(_gap(part, others) for part, others in acting.of_each)
-        each = any(_source(result, part).each > 1 for part in acting.chosen)
-        parts = " and ".join(acting.chosen)
-        key = "note_shim_each" if each else "note_shim"
-        return _say(key, part=parts, sizes=acting.count, step=acting.step, gaps=gaps)
-    return _sorting_note(result, acting) if isinstance(acting, Sorting) else ""
+    if isinstance(acting, Sorting):
+        return _sorting_note(result, acting)
+    if not isinstance(acting, Shim | Indexing):
+        return ""
+    gaps, parts = " and ".join(_gap(part, others) for part, others in acting.of_each), " and ".join(acting.chosen)
+    if isinstance(acting, Indexing):
+        return _say("note_indexing", part=parts, positions=acting.count, width=360.0 / acting.count, gaps=gaps)
+    key = "note_shim_each" if any(_source(result, part).each > 1 for part in acting.chosen) else "note_shim"
+    return _say(key, part=parts, sizes=acting.count, step=acting.step, gaps=gaps)
 
 
 def _sorting_note(result: AllocationResult, acting: Sorting) -> str:
