@@ -217,6 +217,11 @@ class _Fitting(Compensator):
         """Parts, then what is measured besides."""
         return (*self.chosen, *(name for own in self.against for name in _listed(own)))
 
+    def cost(self, sources: Mapping[str, Source]) -> float:  # noqa: ARG002
+        """Return what it costs per unit [cost units]."""
+        price: float = getattr(self, f"{self.counted[:-1]}_cost")
+        return price * (self.count - 1)
+
     @property
     def of_each(self) -> tuple[tuple[str, tuple[tuple[str, float], ...]], ...]:
         """Every part, and what is measured for it of the others with its weight [-]."""
@@ -293,11 +298,8 @@ class Shim(_Fitting):
     part: Annotated[Names, _TEXTS]
     step: Annotated[float, number("a step above 0 up to 1,000 µm", above=0.0, most=1000.0)]
     sizes: Annotated[int | Sequence[int], _SIZES] = (1, 3, 5)
-    against: Annotated[Mapping[Names, float], _AGAINST] = field(default_factory=dict)
+    against: Annotated[Mapping[Names, float], _AGAINST] = field(default_factory=dict, hash=False)
     size_cost: Annotated[float, COST] = 0.0
-
-    def __hash__(self) -> int:
-        return hash((self.part, self.step, self.sizes, tuple(self.against.items()), self.size_cost))
 
     @property
     def reach(self) -> int:
@@ -305,22 +307,12 @@ class Shim(_Fitting):
         return (self.count - 1) // 2
 
     def resolved(self, sources: Sequence[Source], place: str) -> Self:
-        """Return the same with the names that the table itself uses.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            No such source, one that is no length, or not one for each part.
-        """
+        """Return the same with the names of the table; raise for a source that is no length or not one for each."""
         found = super().resolved(sources, place)
         for own in (own for own in sources if own.name in found.named):
             if own.feature is not Feature.SIZE or own.lever != 1.0:
                 raise InputError.at(f"{place}, {self.called}", "source", own.name, "a size, which is a length")
         return found
-
-    def cost(self, sources: Mapping[str, Source]) -> float:  # noqa: ARG002
-        """Return what it costs per unit [cost units]."""
-        return self.size_cost * (self.count - 1)
 
     def fitted(self, deviations: Float[np.ndarray, "*sample column"], known: Known) -> None:
         """Put the sizes that are chosen into deviations of units, in place [m]."""
@@ -370,7 +362,7 @@ class Indexing(_Fitting):
 
     part: Annotated[Names, _TEXTS]
     positions: Annotated[int | Sequence[int], COUNTS] = (1, 2, 4)
-    against: Annotated[Mapping[Names, float], _AGAINST] = field(default_factory=dict)
+    against: Annotated[Mapping[Names, float], _AGAINST] = field(default_factory=dict, hash=False)
     position_cost: Annotated[float, COST] = 0.0
 
     def __post_init__(self) -> None:
@@ -378,22 +370,13 @@ class Indexing(_Fitting):
         if not self.against:
             raise InputError.at(self.called, "against", "empty", "one measured source or several")
 
-    def __hash__(self) -> int:
-        return hash((self.part, self.positions, tuple(self.against.items()), self.position_cost))
-
     @property
     def independent(self) -> tuple[str, ...]:
         """The parts; those they sit with may be correlated with others."""
         return self.chosen
 
     def resolved(self, sources: Sequence[Source], place: str) -> Self:
-        """Return the same with the names that the table itself uses.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            No such source, one that is no vector, angles with lengths, or not one for each part.
-        """
+        """Return the same with the names of the table; raise for a source that is no vector or not one for each."""
         found, named = super().resolved(sources, place), f"{place}, {self.called}"
         own = [source for source in sources if source.name in found.named]
         for source in own:
@@ -401,10 +384,6 @@ class Indexing(_Fitting):
         if len({source.over > 0.0 for source in own}) > 1:
             raise InputError.at(named, "against", " and ".join(found.named), "angles with angles, lengths with lengths")
         return found
-
-    def cost(self, sources: Mapping[str, Source]) -> float:  # noqa: ARG002
-        """Return what it costs per unit [cost units]."""
-        return self.position_cost * (self.count - 1)
 
     @property
     def arranges(self) -> bool:
