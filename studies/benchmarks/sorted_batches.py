@@ -112,7 +112,8 @@ def main() -> None:
     parser.add_argument("--reducer", action="store_true", help="the RV-20E, ten minutes on two cores")
     given = parser.parse_args()
     if given.reducer:
-        return reducer()
+        reducer()
+        return
     rng = np.random.default_rng(1)
     for classes in (2, 4, 8):
         sorting = ta.Sorting("shaft", "hole", classes=classes, batch=given.batch)
