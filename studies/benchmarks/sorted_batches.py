@@ -95,8 +95,11 @@ def reducer() -> None:
         drawn, limits = result.chosen, {own: limit.limits for own, limit in study.limits.items()}
         response = result.model.at(drawn.settings).reading(tuple(limits))
         plain = replace(drawn.space, errors=replace(drawn.space.errors, compensators=()))
-        come = plain.units(drawn.design, SeedTree(78), UNITS)
-        samples = {"mapped": drawn.space.units(drawn.design, SeedTree(77), UNITS), "parts as they come": come}
+        come = plain.units(drawn.design, SeedTree(78).child("exact"), UNITS)
+        samples = {
+            "mapped": drawn.space.units(drawn.design, SeedTree(77).child("fresh"), UNITS),
+            "parts as they come": come,
+        }
         if compensator.named[0] == PIN:
             samples["assigned exactly"] = as_assigned(result, result.assembled.best.compensators[0], come)
         for name, x in samples.items():
