@@ -25,12 +25,13 @@ if TYPE_CHECKING:
     from tolalloc.cli.main import run_script as run_script
     from tolalloc.cli.start import new as new
     from tolalloc.cli.start import schema as schema
+    from tolalloc.drawings.compensators import Indexing as Indexing
     from tolalloc.drawings.compensators import Shim as Shim
-    from tolalloc.drawings.compensators import Sorting as Sorting
     from tolalloc.drawings.drawing import Drawing as Drawing
     from tolalloc.drawings.drawing import load_drawing as drawing  # noqa: F401
     from tolalloc.drawings.seeds import SamplingDesign as SamplingDesign
     from tolalloc.drawings.seeds import SeedTree as SeedTree
+    from tolalloc.drawings.sorting import Sorting as Sorting
     from tolalloc.exceptions import InputError as InputError
     from tolalloc.exceptions import RunFolderError as RunFolderError
     from tolalloc.exceptions import SolveError as SolveError
@@ -116,10 +117,11 @@ _WHERE = {
     "SeedTree": "drawings.seeds",
     "Series": "reports.figure",
     "Setting": "models.settings",
+    "Indexing": "drawings.compensators",
     "Shim": "drawings.compensators",
     "SobolEffort": "sensitivity.effort",
     "SolveError": "exceptions",
-    "Sorting": "drawings.compensators",
+    "Sorting": "drawings.sorting",
     "Study": "study.study",
     "TORSIONAL_STIFFNESS": "reducers",
     "Teller": "reports.teller",

@@ -463,14 +463,16 @@ class AssembledQuestion:
 
     def tried(self, acting: tuple[Compensator, ...], found: AllocationResult) -> AssemblyChoice:
         """Return what became of a choice."""
+        drawn = {own.name: own for own in found.drawn_sources}
         return AssemblyChoice(
             compensators=acting,
             label=choice_label(acting),
             met=found.met,
             zones_cost=found.cost,
-            assembly_cost=assembly_cost(acting, found.space.errors.sources),
+            assembly_cost=assembly_cost(acting, found.drawn_sources),
             bound=found.bound,
             joint=found.chosen.joint,
+            left_over=max((own.leftover_of(drawn) for own in acting), default=0.0),
         )
 
     def start(self, found: AllocationResult) -> Float[np.ndarray, " variable"]:

@@ -56,6 +56,7 @@ class AssemblyChoice:
     assembly_cost: float  # Of classes, sizes and parts that are left over, per unit [cost units]
     bound: float | None  # Lower bound on the cost of its zones, if there is one [cost units]
     joint: Yield  # Share of units that keep all limits at once
+    left_over: float = 0.0  # Largest share of parts that find no mate, of all that are sorted [-]
 
     @property
     def cost(self) -> float:

@@ -1,23 +1,26 @@
 """What is chosen at assembly: parts sorted into classes that fit each other, and sizes chosen for what was measured.
 
-`ErrorModel` applies them to random units, so that every question is asked of reducers as they are assembled.
+`ErrorModel` applies them to random units, so that every question is asked of reducers as they are assembled: each is
+a map of one unit's numbers, of the uniform ones that it is drawn from (`Compensator.sorted`) or of its deviations
+(`Compensator.fitted`).
 """
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Complex, Float
 
-from tolalloc.drawings.distributions import ABOVE_ZERO, BELOW_ONE
 from tolalloc.drawings.sources import Source, known_as, meant
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.reading.named_fields import NamedFields, Rule, flag, is_number, mapped, number, whole
+from tolalloc.reading.named_fields import NamedFields, Rule, is_number, number
 from tolalloc.reading.units import MICROMETRE
 
 _MOST = 64
@@ -36,82 +39,95 @@ def _are_counts(given: object) -> bool:
     return _is_count(given)
 
 
-_CLASSES = Rule(f"a whole number from 1 to {_MOST}, or several different ones to choose from", _are_counts)
+COUNTS = Rule(f"a whole number from 1 to {_MOST}, or several different ones to choose from", _are_counts)
 _SIZES = Rule(
     f"an odd whole number from 1 to {_MOST}, or several different ones to choose from",
     lambda given: _are_counts(given) and all(own % 2 for own in (given if isinstance(given, Sequence) else (given,))),
 )
-_COST = number("a cost of 0 or above", least=0.0)
-_TEXT = Rule("the name of a source in quotation marks", lambda given: isinstance(given, str) and bool(given))
+COST = number("a cost of 0 or above", least=0.0)
+
+
+def _is_text(given: object) -> bool:
+    return isinstance(given, str) and bool(given)
+
+
+def _are_texts(given: object) -> bool:
+    return _is_text(given) or (isinstance(given, tuple) and bool(given) and all(map(_is_text, given)))
+
+
+TEXT = Rule("the name of a source in quotation marks", _is_text)
+_TEXTS = Rule("the name or pattern of sources in quotation marks, or several names in brackets", _are_texts)
+_AGAINST = Rule(
+    "source names with their weights, such as {'housing.groove.radius': -1.0}",
+    lambda given: isinstance(given, Mapping) and all(_are_texts(own) and is_number(given[own]) for own in given),
+)
+
+Names = str | tuple[str, ...]
+"""One source of a tolerance table, or several that are chosen for each on their own."""
 
 
 @dataclass(frozen=True)
-class Sorting(NamedFields):
-    """Selective assembly: two parts are measured, sorted into classes, and mated class by class.
+class Standing:
+    """An active source, and where its columns stand among those of a unit."""
 
-    Parameters
-    ----------
-    parts, mates
-        Sources of the tolerance table whose deviations are sorted: sizes, or positions, which are sorted on each axis.
-        The parts of one unit, such as all its pins, come from one class.
-    classes
-        Number of classes of equally many parts, on each axis; several numbers are compared by an allocation, and other
-        questions take the first [-].
-    opposite
-        Whether the smallest parts go with the largest mates rather than with the smallest.
-    batch
-        Parts that are sorted at a time, from which follows how many are left over [-].
-    class_cost
-        What sorting costs per unit for every class beyond the first [cost units].
-    leftover_cost
-        What a part and a mate that are left over cost together [cost units].
+    source: Source
+    columns: slice
 
-    Notes
-    -----
-    The classes end at the quantiles i/n of each process, so all hold equally many parts on average. A unit's parts then
-    lie in class ⌊n·F(mate)⌋, and inside it as they come: F(part) → (⌊n·F(mate)⌋ + frac(n·F(part)))/n. Both processes
-    keep their own distribution, and units need no batch to be drawn (own derivation; tests compare with batches that
-    are assigned exactly). What is left over does, `leftover`.
+    @property
+    def vector(self) -> slice:
+        """Where the vectors of a position stand, or the one of the wave of order 1; of a size, its deviations."""
+        if not self.source.spectrum:
+            return self.columns
+        start = self.columns.start + 2 * [order for order, _ in self.source.spectrum].index(1)
+        return slice(start, start + 2)
 
-    References
-    ----------
-    Mease, Nair, Sudjianto, Selective assembly in manufacturing: statistical issues and optimal binning strategies,
-    Technometrics 46 (2004) 165–175.
+    @property
+    def width(self) -> int:
+        """Columns of one deviation or vector [-]."""
+        return 1 if self.source.feature is Feature.SIZE else 2
 
-    Examples
-    --------
-    >>> sorting = Sorting("pin.diameter", "housing.groove.radius", classes=4)
-    >>> round(sorting.leftover, 4)
-    0.0975
-    """
+    def of(self, numbers: Float[np.ndarray, "*sample column"]) -> Float[np.ndarray, "*sample copy width"]:
+        """Return the deviations or vectors of every like feature among the numbers of units, a copy."""
+        own = numbers[..., self.vector]
+        return own.reshape(*own.shape[:-1], -1, self.width).copy()
 
-    called: ClassVar[str] = "sorting"
-    by_position: ClassVar[int] = 2
+    def put(self, numbers: Float[np.ndarray, "*sample column"], own: Float[np.ndarray, "*sample copy width"]) -> None:
+        """Put them back in place."""
+        numbers[..., self.vector] = own.reshape(*own.shape[:-2], -1)
 
-    parts: Annotated[str, _TEXT]
-    mates: Annotated[str, _TEXT]
-    classes: Annotated[int | Sequence[int], _CLASSES] = (1, 2, 4)
-    opposite: Annotated[bool, flag()] = False
-    batch: Annotated[int, whole("a whole number from 1 to 1,000,000", 1, 1_000_000)] = 100
-    class_cost: Annotated[float, _COST] = 0.0
-    leftover_cost: Annotated[float, _COST] = 0.0
+
+Known = Mapping[str, Standing]
+"""Where the columns of each source stand, by its name."""
+
+
+class Compensator(NamedFields):
+    """What is chosen at assembly: how many choices there are, what they cost, and the map of one unit's numbers."""
+
+    counted: ClassVar[str]
+    """Name of the field with the number of choices, which is also their word: classes, sizes."""
+    done: ClassVar[str]
+    """What it does to its parts, in a refusal."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if isinstance(self.classes, Sequence):
-            object.__setattr__(self, "classes", tuple(self.classes))
-        if self.parts == self.mates:
-            raise InputError.at(self.called, "mates", self.mates, "another source than parts")
+        given = getattr(self, self.counted)
+        if isinstance(given, Sequence):
+            object.__setattr__(self, self.counted, tuple(given))
 
     @property
-    def choices(self) -> tuple[Sorting, ...]:
-        """The same with every number of classes that may be chosen."""
-        return tuple(replace(self, classes=own) for own in _several(self.classes))
+    def _counts(self) -> tuple[int, ...]:
+        given = getattr(self, self.counted)
+        return (given,) if isinstance(given, int) else tuple(given)
+
+    @property
+    def choices(self) -> tuple[Self, ...]:
+        """The same with every number of choices that may be taken."""
+        return tuple(replace(self, **{self.counted: own}) for own in self._counts)  # type: ignore[type-var]
 
     @property
     def count(self) -> int:
-        """Classes in force, the first number that is stated [-]."""
-        return _several(self.classes)[0]
+        """Classes or sizes in force, the first number that is stated [-]."""
+        return self._counts[0]
 
     @property
     def acts(self) -> bool:
@@ -119,88 +135,131 @@ class Sorting(NamedFields):
         return self.count > 1
 
     @property
-    def named(self) -> tuple[str, ...]:
-        """Sources that it ties to each other."""
-        return (self.parts, self.mates)
+    def chosen(self) -> tuple[str, ...]:
+        """Sources whose parts are chosen."""
+        raise NotImplementedError
 
-    def resolved(self, sources: Sequence[Source], place: str) -> Sorting:
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Sources that it names, those that are chosen first."""
+        raise NotImplementedError
+
+    @property
+    def tied(self) -> tuple[tuple[str, str], ...]:
+        """Pairs of sources whose numbers depend on each other by it, parts first and then their mates."""
+        return ()
+
+    @property
+    def independent(self) -> tuple[str, ...]:
+        """Sources that may be correlated with no other."""
+        return ()
+
+    @property
+    def arranges(self) -> bool:
+        """Whether it puts deviations in the place of those that the zones give, which then grow with the zones."""
+        return False
+
+    @property
+    def label(self) -> str:
+        """What is chosen, in words, such as ``4 classes of pin.diameter``."""
+        more = f" and {len(self.chosen) - 1} more" if len(self.chosen) > 1 else ""
+        return f"{self.count} {self.counted} of {self.chosen[0]}{more}"
+
+    def resolved(self, sources: Sequence[Source], place: str) -> Self:
         """Return the same with the names that the table itself uses.
 
         Raises
         ------
         InputError, UnknownNameError
-            No such source, or one that cannot be sorted so.
+            No such source, or one of which nothing can be chosen so.
         """
-        parts = _source("parts", self.parts, sources, place)
-        mates = _source("mates", self.mates, sources, place)
-        for name, own in (("parts", parts), ("mates", mates)):
-            if own.feature not in (Feature.SIZE, Feature.POSITION):
-                allowed = "a size or a position; parts ground together are correlated instead, by correlations="
-                raise InputError.at(f"{place}, {self.called}", name, own.name, allowed)
-        axes = [_axes(own) for own in (parts, mates)]
-        if axes[0] != axes[1] or mates.each > 1:
-            allowed = "a source of the same feature with one deviation in each unit"
-            raise InputError.at(f"{place}, {self.called} of {parts.name}", "mates", mates.name, allowed)
-        return replace(self, parts=parts.name, mates=mates.name)
+        raise NotImplementedError
+
+    def cost(self, sources: Mapping[str, Source]) -> float:
+        """Return what it costs per unit that is built, at the zones of sources by their names [cost units]."""
+        raise NotImplementedError
+
+    def leftover_of(self, sources: Mapping[str, Source]) -> float:  # noqa: ARG002
+        """Return the share of parts that find no mate, at the zones of sources by their names [-]."""
+        return 0.0
+
+    def sorted(self, uniform: Float[np.ndarray, "*sample column"], known: Known) -> None:
+        """Put the parts of units where their mates are, uniform numbers in place [-]; unless it sorts, nothing."""
+
+    def arranged(
+        self, deviations: Float[np.ndarray, "*sample column"], zones: Mapping[str, float], known: Known
+    ) -> None:
+        """Put deviations of units at these zones [m] where it `arranges` them, in place [m]."""
+
+    def fitted(self, deviations: Float[np.ndarray, "*sample column"], known: Known) -> None:
+        """Put what is chosen into deviations of units, in place [m]; unless it fits for measured ones, nothing."""
+
+
+class _Fitting(Compensator):
+    """What is chosen of a part, or of each of several parts, for what was measured of the others."""
+
+    part: Names
+    against: Mapping[Names, float]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in self.named[len(self.chosen) :]:
+            if name in self.chosen:
+                raise InputError.at(self.called, "against", name, "other sources than part")
 
     @property
-    def leftover(self) -> float:
-        """Share of the parts that find no mate in a batch, on average [-].
+    def chosen(self) -> tuple[str, ...]:
+        """Sources of the parts."""
+        return _listed(self.part)
 
-        1 − (n/B)·E[min(N, M)] with E[min(N, M)] = Σₖ P(N ≥ k)² for two independent binomial numbers of B parts in one
-        of n classes (own derivation).
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Parts, then what is measured besides."""
+        return (*self.chosen, *(name for own in self.against for name in _listed(own)))
 
-        Examples
-        --------
-        >>> round(Sorting("a", "b", classes=2, batch=2).leftover, 6)  # 1 − P(N ≥ 1)² − P(N = 2)² with 3/4 and 1/4
-        0.375
+    def cost(self, sources: Mapping[str, Source]) -> float:  # noqa: ARG002
+        """Return what it costs per unit [cost units]."""
+        price: float = getattr(self, f"{self.counted[:-1]}_cost")
+        return price * (self.count - 1)
+
+    @property
+    def of_each(self) -> tuple[tuple[str, tuple[tuple[str, float], ...]], ...]:
+        """Every part, and what is measured for it of the others with its weight [-]."""
+        others = [(_listed(own), weight) for own, weight in self.against.items()]
+        return tuple(
+            (part, tuple((names[at % len(names)], weight) for names, weight in others))
+            for at, part in enumerate(self.chosen)
+        )
+
+    def resolved(self, sources: Sequence[Source], place: str) -> Self:
+        """Return the same with the names that the table itself uses.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            No such source, one that cannot be fitted so, or not one for each part.
         """
-        return self._leftover(self.count)
-
-    def _leftover(self, classes: int) -> float:
-        from scipy.stats import binom
-
-        if classes == 1:
-            return 0.0
-        at_least = binom.sf(np.arange(self.batch), self.batch, 1.0 / classes)
-        return float(1.0 - classes / self.batch * np.sum(at_least**2))
-
-    def leftover_of(self, parts: Source) -> float:
-        """Return the same of a source, whose classes of a position are those of both axes together [-]."""
-        return self._leftover(self.count ** _axes(parts))
-
-    def cost(self, parts: Source) -> float:
-        """Return what it costs per unit that is built [cost units]."""
-        lost = self.leftover_of(parts)
-        return float(self.class_cost * (self.count ** _axes(parts) - 1) + self.leftover_cost * lost / (1.0 - lost))
-
-    def sorted(self, uniform: Float[np.ndarray, "*sample column"], columns: Mapping[str, slice]) -> None:
-        """Put the parts of units into the class of their mates, uniform numbers in place, by columns of sources [-]."""
-        number, parts = uniform[..., columns[self.mates]], columns[self.parts]
-        least = np.floor(self.count * (1.0 - number if self.opposite else number))
-        own = uniform[..., parts]
-        copies = np.tile(np.minimum(least, self.count - 1), own.shape[-1] // number.shape[-1])
-        inside = np.modf(self.count * own)[0]
-        uniform[..., parts] = np.clip((copies + inside) / self.count, ABOVE_ZERO, BELOW_ONE)
-
-    def limits(self, source: Source) -> Float[np.ndarray, " limit"]:
-        """Return where the classes of one of its sources end, as deviations from the nominal size [m].
-
-        The outer classes are open: what the zone allows beyond belongs to them. Of a position, those of each axis.
-        """
-        shares = np.arange(1, self.count) / self.count
-        columns = np.repeat(shares[:, np.newaxis], len(source.columns), axis=1)
-        return np.asarray(source.standard_values(columns)[:, 0] * source.zone + source.middles[0])
+        parts, against = _sources("part", self.part, sources, place), dict[Names, float]()
+        for given, weight in self.against.items():
+            others = _sources("against", given, sources, place)
+            copies = {own.each for own in others} - {1}
+            if len(others) not in (1, len(parts)) or (copies and copies != {own.each for own in parts}):
+                allowed = "one source for all parts or one for each of them, with as many like features or one"
+                raise InputError.at(f"{place}, {self.called}", "against", " and ".join(map(_name, others)), allowed)
+            against[_together(others)] = weight
+        return replace(self, part=_together(parts), against=against)  # type: ignore[type-var]
 
 
 @dataclass(frozen=True)
-class Shim(NamedFields):
+class Shim(_Fitting):
     """A part that is chosen from sizes in steps for what was measured of the others.
 
     Parameters
     ----------
     part
-        Source of the tolerance table whose part comes in several sizes: its own deviation is that from its size.
+        Source of the tolerance table whose part comes in several sizes: its own deviation is that from its size. Like
+        features of one source, such as 40 pins, and all sources of a pattern, of a dimension or of several names are
+        chosen each on its own.
     step
         Step between two sizes [µm].
     sizes
@@ -208,9 +267,10 @@ class Shim(NamedFields):
         questions take the first [-].
     against
         Measured source → how much of the gap a micrometre of it makes, for a gap of the part's own 1; nothing where
-        the part's own deviation alone is measured [-].
+        the part's own deviation alone is measured [-]. One source is measured for all parts; as many as there are parts
+        are measured for one each, in the order of the numbers in their names, or in that of several names.
     size_cost
-        What every size beyond the first costs per unit [cost units].
+        What every size beyond the first costs per unit, for all parts together [cost units].
 
     Notes
     -----
@@ -223,108 +283,181 @@ class Shim(NamedFields):
     --------
     >>> Shim("pin.diameter", step=0.5, sizes=5, against={"housing.groove.radius": -1.0}).reach
     2
+
+    Every pin for its own groove:
+
+    >>> Shim("each_pin.diameter", step=0.5, sizes=5, against={"each_pin.groove": -1.0}).label
+    '5 sizes of each_pin.diameter'
     """
 
     called: ClassVar[str] = "shim"
+    counted: ClassVar[str] = "sizes"
+    done: ClassVar[str] = "shimmed"
     by_position: ClassVar[int] = 1
 
-    part: Annotated[str, _TEXT]
+    part: Annotated[Names, _TEXTS]
     step: Annotated[float, number("a step above 0 up to 1,000 µm", above=0.0, most=1000.0)]
     sizes: Annotated[int | Sequence[int], _SIZES] = (1, 3, 5)
-    against: Annotated[
-        Mapping[str, float],
-        mapped("source names with their weights, such as {'housing.groove.radius': -1.0}", Rule("", is_number)),
-    ] = field(default_factory=dict)
-    size_cost: Annotated[float, _COST] = 0.0
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if isinstance(self.sizes, Sequence):
-            object.__setattr__(self, "sizes", tuple(self.sizes))
-        if self.part in self.against:
-            raise InputError.at(self.called, "against", self.part, "other sources than part")
-
-    def __hash__(self) -> int:
-        return hash((self.part, self.step, self.sizes, tuple(self.against.items()), self.size_cost))
-
-    @property
-    def choices(self) -> tuple[Shim, ...]:
-        """The same with every number of sizes that may be chosen."""
-        return tuple(replace(self, sizes=own) for own in _several(self.sizes))
-
-    @property
-    def count(self) -> int:
-        """Sizes in force, the first number that is stated [-]."""
-        return _several(self.sizes)[0]
+    against: Annotated[Mapping[Names, float], _AGAINST] = field(default_factory=dict, hash=False)
+    size_cost: Annotated[float, COST] = 0.0
 
     @property
     def reach(self) -> int:
         """Steps to either side of the nominal size [-]."""
         return (self.count - 1) // 2
 
-    @property
-    def acts(self) -> bool:
-        """Whether there is anything to choose."""
-        return self.count > 1
+    def resolved(self, sources: Sequence[Source], place: str) -> Self:
+        """Return the same with the names of the table; raise for a source that is no length or not one for each."""
+        found = super().resolved(sources, place)
+        for own in (own for own in sources if own.name in found.named):
+            if own.feature is not Feature.SIZE or own.lever != 1.0:
+                raise InputError.at(f"{place}, {self.called}", "source", own.name, "a size, which is a length")
+        return found
+
+    def fitted(self, deviations: Float[np.ndarray, "*sample column"], known: Known) -> None:
+        """Put the sizes that are chosen into deviations of units, in place [m]."""
+        step = self.step * MICROMETRE
+        for name, others in self.of_each:
+            part = known[name].columns
+            gap = deviations[..., part].copy()
+            for other, weight in others:
+                gap += weight * deviations[..., known[other].columns]
+            deviations[..., part] -= step * np.clip(np.rint(gap / step), -self.reach, self.reach)
+
+
+@dataclass(frozen=True)
+class Indexing(_Fitting):
+    """A part that is mounted at the one of several angular positions where its vector best closes those it sits with.
+
+    Parameters
+    ----------
+    part
+        Source of the tolerance table whose part is turned: a position, or a pitch or run-out with a wave of order 1.
+        Sources of a pattern or of several names are turned each on its own.
+    positions
+        Number of positions around a turn; several are compared by an allocation, and other questions take the first
+        [-].
+    against
+        Measured source → how much of the sum its vector makes, for the part's own 1 [-], as `Shim` says.
+    position_cost
+        What every position beyond the first costs per unit, for all parts together [cost units].
+
+    Notes
+    -----
+    Of the vectors v of the part and s = Σ w·vₛ of the others, v turns by k·360°/n with the k that leaves the least of
+    |v + s|: the one that is nearest to the direction of −s. Other vectors of the part turn too and keep their law, as
+    all directions are alike (own derivation). Measuring errs by nothing (an assumption). Derivatives with respect to
+    zones are those of the positions chosen, with the vector as it is turned.
+
+    Examples
+    --------
+    >>> Indexing("sun.eccentricity", positions=6, against={"sun.assembly": 1.0}).label
+    '6 positions of sun.eccentricity'
+    """
+
+    called: ClassVar[str] = "indexing"
+    counted: ClassVar[str] = "positions"
+    done: ClassVar[str] = "turned"
+    by_position: ClassVar[int] = 1
+
+    part: Annotated[Names, _TEXTS]
+    positions: Annotated[int | Sequence[int], COUNTS] = (1, 2, 4)
+    against: Annotated[Mapping[Names, float], _AGAINST] = field(default_factory=dict, hash=False)
+    position_cost: Annotated[float, COST] = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.against:
+            raise InputError.at(self.called, "against", "empty", "one measured source or several")
 
     @property
-    def named(self) -> tuple[str, ...]:
-        """Sources that it ties to each other."""
-        return (self.part, *self.against)
+    def independent(self) -> tuple[str, ...]:
+        """The parts; those they sit with may be correlated with others."""
+        return self.chosen
 
-    def resolved(self, sources: Sequence[Source], place: str) -> Shim:
-        """Return the same with the names that the table itself uses.
+    def resolved(self, sources: Sequence[Source], place: str) -> Self:
+        """Return the same with the names of the table; raise for a source that is no vector or not one for each."""
+        found, named = super().resolved(sources, place), f"{place}, {self.called}"
+        own = [source for source in sources if source.name in found.named]
+        for source in own:
+            require_vector(source, named, "source")
+        if len({source.over > 0.0 for source in own}) > 1:
+            raise InputError.at(named, "against", " and ".join(found.named), "angles with angles, lengths with lengths")
+        return found
 
-        Raises
-        ------
-        InputError, UnknownNameError
-            No such source, or one that is no single length.
-        """
-        found = [_source("part", self.part, sources, place)]
-        found += [_source("against", own, sources, place) for own in self.against]
-        for own in found:
-            if own.feature is not Feature.SIZE or len(own.columns) > 1 or own.lever != 1.0:
-                allowed = "a size with one deviation in each unit, which is a length"
-                raise InputError.at(f"{place}, {self.called}", "source", own.name, allowed)
-        part, *others = (own.name for own in found)
-        return replace(self, part=part, against=dict(zip(others, self.against.values(), strict=True)))
+    @property
+    def arranges(self) -> bool:
+        """Yes: a vector that is turned grows with its zone as it is turned."""
+        return True
 
-    def cost(self, part: Source) -> float:  # noqa: ARG002
-        """Return what it costs per unit [cost units]."""
-        return self.size_cost * (self.count - 1)
-
-    def shimmed(self, deviations: Float[np.ndarray, "*sample column"], columns: Mapping[str, slice]) -> None:
-        """Put the size that is chosen into deviations of units in place, by the columns of every source [m]."""
-        part, step = columns[self.part].start, self.step * MICROMETRE
-        gap = deviations[..., part].copy()
-        for name, weight in self.against.items():
-            gap += weight * deviations[..., columns[name].start]
-        deviations[..., part] -= step * np.clip(np.rint(gap / step), -self.reach, self.reach)
-
-
-Compensator = Sorting | Shim
-"""What is chosen at assembly."""
+    def arranged(
+        self,
+        deviations: Float[np.ndarray, "*sample column"],
+        zones: Mapping[str, float],  # noqa: ARG002
+        known: Known,
+    ) -> None:
+        """Turn the parts of units to the position that is chosen, deviations in place [m]."""
+        for name, others in self.of_each:
+            part = _complex(known[name].of(deviations))
+            rest = sum((weight * _complex(known[other].of(deviations)) for other, weight in others), np.zeros(1))
+            steps = np.rint(self.count * np.angle(-rest * part.conj()) / (2.0 * np.pi)) % self.count
+            turned = part * np.exp(2j * np.pi * steps / self.count)
+            known[name].put(deviations, np.stack([turned.real, turned.imag], axis=-1))
 
 
-def _several(given: int | Sequence[int]) -> tuple[int, ...]:
-    return (given,) if isinstance(given, int) else tuple(given)
+def _complex(pairs: Float[np.ndarray, "*sample copy 2"]) -> Complex[np.ndarray, "*sample copy"]:
+    return np.asarray(pairs[..., 0] + 1j * pairs[..., 1])
 
 
-def _axes(source: Source) -> int:
-    return 2 if source.feature is Feature.POSITION else 1
+def _listed(given: Names) -> tuple[str, ...]:
+    return (given,) if isinstance(given, str) else given
 
 
-def _source(field_name: str, name: str, sources: Sequence[Source], place: str) -> Source:
+def _name(source: Source) -> str:
+    return source.name
+
+
+def _together(sources: Sequence[Source]) -> Names:
+    return sources[0].name if len(sources) == 1 else tuple(map(_name, sources))
+
+
+def require_vector(source: Source, place: str, named: str) -> None:
+    """Raise unless a source is a vector whose direction is as likely as any other.
+
+    Raises
+    ------
+    InputError
+        It is a size, has no wave of order 1, or systematic waves that all parts share.
+    """
+    orders = [order for order, _ in source.spectrum]
+    if source.feature is Feature.SIZE or (orders and 1 not in orders):
+        raise InputError.at(place, named, source.name, "a position, or a pitch or run-out with a wave of order 1")
+    if source.systematic:
+        raise InputError.at(place, named, source.name, "a source without systematic waves, all directions alike")
+
+
+def _sources(field_name: str, given: Names, sources: Sequence[Source], place: str) -> tuple[Source, ...]:
+    """Return the sources that names mean, which must vary; those of one name in the order of the numbers in theirs."""
+    known, named = {own.name: own for own in sources}, f"{field_name} of a compensator"
+    found = list[Source]()
+    for name in _listed(given):
+        of_name = [known[own] for own in meant(name, sources)]
+        if not of_name:
+            raise UnknownNameError.among(place, named, name, known_as(sources))
+        if not all(own.zone > 0.0 for own in of_name):
+            raise InputError.at(place, named, name, "a source with a zone above 0")
+        found += sorted(of_name, key=lambda own: [int(digits) for digits in re.findall(r"\d+", own.name)])
+    if twice := next((own.name for own in found if found.count(own) > 1), None):
+        raise InputError.at(place, named, twice, "every source once")
+    return tuple(found)
+
+
+def one_source(field_name: str, name: str, sources: Sequence[Source], place: str) -> Source:
     """Return the one source that a name means, which must vary."""
-    found = meant(name, sources)
-    if not found:
-        raise UnknownNameError.among(place, f"{field_name} of a compensator", name, known_as(sources))
+    found = _sources(field_name, name, sources, place)
     if len(found) > 1:
         raise InputError.at(place, f"{field_name} of a compensator", name, f"one source and no pattern of {len(found)}")
-    source = next(own for own in sources if own.name == found[0])
-    if not source.zone > 0.0:
-        raise InputError.at(place, f"{field_name} of a compensator", name, "a source with a zone above 0")
-    return source
+    return found[0]
 
 
 def in_force(compensators: Sequence[Compensator], sources: Sequence[Source], place: str) -> tuple[Compensator, ...]:
@@ -333,26 +466,27 @@ def in_force(compensators: Sequence[Compensator], sources: Sequence[Source], pla
     Raises
     ------
     InputError, UnknownNameError
-        A source that is not there or cannot be sorted or shimmed, or that is sorted twice.
+        A source that is not there or of which nothing can be chosen so, or that is chosen twice.
     """
     found = [own.resolved(sources, place) for own in compensators]
-    sorted_parts = [own.parts for own in found if isinstance(own, Sorting)]
-    shimmed = [own.part for own in found if isinstance(own, Shim)]
-    for names, word in ((sorted_parts, "sorted as parts"), (shimmed, "shimmed")):
-        for name in names:
-            if names.count(name) > 1:
-                raise InputError(f"{place}: {name} is {word} {names.count(name)} times; allowed is once.")
-    for own in (own for own in found if isinstance(own, Sorting)):
-        if own.mates in sorted_parts:
-            raise InputError(
-                f"{place}: the mates {own.mates} are sorted as parts too; name the mates of both, so that one choice "
-                "follows from one measurement."
-            )
+    done = Counter((name, own.done) for own in found for name in own.chosen)
+    for (name, what), times in done.items():
+        if times > 1:
+            raise InputError(f"{place}: {name} is {what} {times} times; allowed is once.")
+    pairs = sorted_together(found)
+    for mates in (mates for _, mates in pairs if mates in dict(pairs)):
+        raise InputError(
+            f"{place}: the mates {mates} are sorted as parts too; name the mates of both, so that one choice follows "
+            "from one measurement."
+        )
+    sorted_by = Counter(name for own in found for pair in own.tied for name in pair)
+    for name in (name for own in found if own.tied and own.arranges for name in own.named if sorted_by[name] > 1):
+        raise InputError(f"{place}: {name} is sorted into classes of equal width and once more; allowed is once.")
     return tuple(own for own in found if own.acts)
 
 
 def all_choices(compensators: Sequence[Compensator], place: str) -> tuple[tuple[Compensator, ...], ...]:
-    """Return every combination of classes and sizes, the first numbers first.
+    """Return every combination of classes, sizes and positions, the first numbers first.
 
     Raises
     ------
@@ -361,26 +495,21 @@ def all_choices(compensators: Sequence[Compensator], place: str) -> tuple[tuple[
     """
     found: tuple[tuple[Compensator, ...], ...] = tuple(product(*(own.choices for own in compensators)))
     if len(found) > MOST_CHOICES:
-        raise InputError.at(place, "combinations of classes and sizes", len(found), f"{MOST_CHOICES} or less")
+        raise InputError.at(place, "combinations at assembly", len(found), f"{MOST_CHOICES} or less")
     return found
 
 
 def assembly_cost(compensators: Sequence[Compensator], sources: Sequence[Source]) -> float:
-    """Return what choosing parts at assembly costs per unit [cost units]."""
+    """Return what choosing parts at assembly costs per unit, at the zones of the sources [cost units]."""
     known = {source.name: source for source in sources}
-    return float(sum(own.cost(known[own.named[0]]) for own in compensators))
+    return float(sum(own.cost(known) for own in compensators))
 
 
 def choice_label(compensators: Sequence[Compensator]) -> str:
     """Return what is chosen, in words, such as ``4 classes of pin.diameter``; of nothing, ``as they come``."""
-    said = [
-        f"{own.count} {'classes' if isinstance(own, Sorting) else 'sizes'} of {own.named[0]}"
-        for own in compensators
-        if own.acts
-    ]
-    return " and ".join(said) or "as they come"
+    return " and ".join(own.label for own in compensators if own.acts) or "as they come"
 
 
 def sorted_together(compensators: Sequence[Compensator]) -> tuple[tuple[str, str], ...]:
-    """Return the parts and mates whose deviations depend on each other by sorting."""
-    return tuple((own.parts, own.mates) for own in compensators if isinstance(own, Sorting))
+    """Return the pairs of sources whose numbers depend on each other, parts first and then their mates."""
+    return tuple(pair for own in compensators for pair in own.tied)

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawings.compensators import Compensator, Shim, Sorting, sorted_together
+from tolalloc.drawings.compensators import Compensator, Standing, sorted_together
 from tolalloc.drawings.correlation import CorrelatedSource, Correlation
 from tolalloc.drawings.distributions import ABOVE_ZERO, BELOW_ONE, ndtr, ndtri
 from tolalloc.drawings.sources import Source
@@ -42,10 +42,10 @@ class ErrorModel:
     def __post_init__(self) -> None:
         self.correlation.require_sound(self.sources)
         correlated = {name for pair in self.correlation.among(self.sources) for name in (pair.one, pair.other)}
-        for own in self._sortings:
-            if own.parts in correlated:
-                allowed = "a source that is correlated with no other; its mates may be"
-                raise InputError.at(own.called, "parts", own.parts, allowed)
+        for own in self.compensators:
+            for name in own.independent:
+                if name in correlated:
+                    raise InputError.at(own.called, "source", name, "one that is correlated with no other")
 
     @cached_property
     def active(self) -> tuple[Source, ...]:
@@ -109,10 +109,6 @@ class ErrorModel:
         """Whether some sources of the table are correlated."""
         return bool(self._correlated_blocks)
 
-    @property
-    def _sortings(self) -> tuple[Sorting, ...]:
-        return tuple(own for own in self.compensators if isinstance(own, Sorting))
-
     @cached_property
     def _correlated_blocks(self) -> tuple[tuple[int, ...], ...]:
         """Positions of the sources that are correlated with each other."""
@@ -148,9 +144,9 @@ class ErrorModel:
         return tuple(slice(start, end) for start, end in zip([0, *ends], ends, strict=False))
 
     @cached_property
-    def _places(self) -> dict[str, slice]:
-        """Where the columns of each source stand, by its name."""
-        return {own.name: at for own, at in zip(self._varying, self.columns_of_source, strict=True)}
+    def _known(self) -> dict[str, Standing]:
+        """Where the columns of each source of the table stand, by its name."""
+        return {own.name: Standing(own, at) for own, at in zip(self.active, self.columns_of_source, strict=False)}
 
     @cached_property
     def zones(self) -> Float[np.ndarray, " source"]:
@@ -167,8 +163,8 @@ class ErrorModel:
         By their correlation, and then by parts that are sorted into classes and mated.
         """
         found = self.mixed(uniform, self._factor)
-        for own in self._sortings:
-            own.sorted(found, self._places)
+        for own in self.compensators:
+            own.sorted(found, self._known)
         return found
 
     def mixed(
@@ -208,15 +204,43 @@ class ErrorModel:
         self, standard: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]
     ) -> Float[np.ndarray, "sample column"]:
         """Return the columns [m, angles rad] that the standard values give at the zones [m], sizes chosen for them."""
-        counts = [len(source.columns) for source in self._varying]
-        middle = np.concatenate(
+        found = self._arranged(standard, zones)
+        for own in self.compensators:
+            own.fitted(found, self._known)
+        return found
+
+    def by_zone(
+        self, standard: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]
+    ) -> Float[np.ndarray, "sample column"]:
+        """Return the derivatives of the columns by the zones of their sources, with what is chosen in force [-].
+
+        They are the standard values, unless parts are turned or in classes of equal width: then the deviations as
+        arranged, over the zones.
+        """
+        if not any(own.arranges for own in self.compensators):
+            return standard
+        return np.asarray((self._arranged(standard, zones) - self._middle) / np.repeat(zones, self._counts))
+
+    def _arranged(
+        self, standard: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]
+    ) -> Float[np.ndarray, "sample column"]:
+        """Return the columns that the standard values give before sizes are chosen [m, rad]."""
+        found = np.asarray(standard * np.repeat(zones, self._counts) + self._middle)
+        of_sources = {own.name: float(zone) for own, zone in zip(self.active, zones, strict=False)}
+        for own in self.compensators:
+            own.arranged(found, of_sources, self._known)
+        return found
+
+    @property
+    def _counts(self) -> list[int]:
+        return [len(source.columns) for source in self._varying]
+
+    @property
+    def _middle(self) -> Float[np.ndarray, " column"]:
+        """Where the columns stand without what is random [m, rad]."""
+        return np.concatenate(
             [*(source.middles for source in self.active), *(np.zeros(len(source.columns)) for source in self.joint), []]
         )
-        found = np.asarray(standard * np.repeat(zones, counts) + middle)
-        for own in self.compensators:
-            if isinstance(own, Shim):
-                own.shimmed(found, self._places)
-        return found
 
     def deviations_of_normal(
         self, numbers: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]

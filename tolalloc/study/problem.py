@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 from tolalloc.allocation.space.effort import QUICK_ALLOCATION, AllocationEffort
 from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, Guarantee
 from tolalloc.capability.indices import Limits
-from tolalloc.drawings.compensators import Compensator, Shim, Sorting
+from tolalloc.drawings.compensators import Compensator
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.model import is_fast
 from tolalloc.reading.named_fields import NamedFields, Rule, a, mapped, number, or_none, whole
@@ -180,7 +180,7 @@ def _is_drawing(given: object) -> bool:
 
 
 def _are_compensators(given: object) -> bool:
-    return isinstance(given, Sequence) and all(isinstance(own, Sorting | Shim) for own in given)
+    return isinstance(given, Sequence) and all(isinstance(own, Compensator) for own in given)
 
 
 def _is_title_block(given: object) -> bool:
@@ -219,13 +219,14 @@ class Problem(NamedFields):
         ),
     ] = field(default_factory=dict)
     compensators: Annotated[
-        "Sequence[Compensator]", Rule("several of ta.Sorting(...) and ta.Shim(...)", _are_compensators)
+        "Sequence[Compensator]",
+        Rule("several of ta.Sorting(...), ta.Shim(...) and ta.Indexing(...)", _are_compensators),
     ] = ()
 
     def __post_init__(self) -> None:
         if isinstance(self.effort, str):
             object.__setattr__(self, "effort", effort_of(self.effort, self.place))
-        if isinstance(self.compensators, Sorting | Shim):
+        if isinstance(self.compensators, Compensator):
             object.__setattr__(self, "compensators", (self.compensators,))
         super().__post_init__()
         object.__setattr__(self, "compensators", tuple(self.compensators))

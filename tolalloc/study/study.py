@@ -86,7 +86,8 @@ class Study(Problem):
         What the title blocks of page and drawing say beside study and date: ``drawing number``, ``revision``,
         ``author``, and ``material`` on the drawing. What is not said stays empty there, to be filled in by hand.
     compensators
-        What is chosen at assembly, ``ta.Sorting(...)`` and ``ta.Shim(...)``: reducers are judged as they are assembled.
+        What is chosen at assembly, ``ta.Sorting(...)``, ``ta.Shim(...)`` and ``ta.Indexing(...)``: reducers are judged
+        as they are assembled.
         An allocation compares all numbers of classes and sizes that they state, other questions take the first.
 
     Raises

@@ -364,14 +364,16 @@ class DesignSample:
     def by_zone(self, output: str) -> Float[np.ndarray, "good source"]:
         """Return the derivative of every good unit's output by the zones; one of `exact` [unit of the output per m].
 
-        Theory page, equation (23): a deviation is its zone times a standard value, so ∂y/∂zone = Σ ∂y/∂xᵢ·standardᵢ.
+        Theory page, equation (23): a deviation is its zone times a standard value, so ∂y/∂zone = Σ ∂y/∂xᵢ·standardᵢ,
+        with the standard values as parts are arranged at assembly.
         """
         return self._by_zone(self.exact[output])
 
     def _by_zone(self, found: SettingDerivatives) -> Float[np.ndarray, "good source"]:
         good, names = found.evaluation.good, self.space.errors.source_of_column
         starts = [names.index(source.name) for source in self.space.errors.active]
-        moved = found.by_column[good] * self.standard[: good.size][good]
+        standard = self.space.errors.by_zone(self.standard[: good.size], self.space.zones(self.design))
+        moved = found.by_column[good] * standard[good]
         return np.asarray(np.add.reduceat(moved, starts, axis=1))
 
     def _slopes(self, found: SettingDerivatives) -> Float[np.ndarray, "first variable"]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 from tolalloc.allocation.result import AllocationResult, AssemblyChoice
-from tolalloc.drawings.compensators import Compensator, Shim, Sorting
+from tolalloc.drawings.compensators import Compensator, Indexing, Shim
+from tolalloc.drawings.sorting import Sorting
 from tolalloc.drawings.sources import Source
 from tolalloc.reading.units import MICROMETRE
 from tolalloc.reports.columns import Column, Table
@@ -20,16 +22,22 @@ from tolalloc.reports.wording import number
 _say = Sentences("allocation")
 
 
+_NONE = float("nan")
+
+
 @dataclass(frozen=True, kw_only=True)
 class _Bin:
-    """One class of a sorted source, or one size."""
+    """One class or sector of a sorted source, or one size; what it does not have is not a number."""
 
     source: str
     what: str
     number: int
-    low: float  # Where it begins, as a deviation from the nominal size; not a number where it is open [µm]
-    high: float
-    middle: float  # Of a size, how far it is from the nominal one [µm]
+    low: float = _NONE  # Where it begins, as a deviation from the nominal size; nothing where it is open [µm]
+    high: float = _NONE
+    begin: float = _NONE  # Of a sector, where it begins, counted from the x axis [°]
+    end: float = _NONE
+    middle: float = _NONE  # Of a size, how far it is from the nominal one [µm]
+    turned: float = _NONE  # Of an angular position, how far the part is turned [°]
 
 
 def assembly_cost_sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
@@ -68,7 +76,7 @@ def assembly_sentences(result: AllocationResult) -> tuple[str, ...]:
     ]
     for own in assembled.best.compensators:
         if isinstance(own, Sorting):
-            left = own.leftover_of(_source(result, own.parts))
+            left = own.leftover_of({name: _source(result, name) for name in own.named})
             said.append(_say("assembly_left", share=left, parts=own.parts, mates=own.mates, batch=own.batch))
     return tuple(said)
 
@@ -89,12 +97,19 @@ def assembly_section(result: AllocationResult, cost_unit: str) -> tuple[Section,
     return (
         Section(
             heading=_say("heading_assembly"),
-            paragraphs=(*assembly_sentences(result), *assembly_notes(result), _say("assembly_method")),
+            paragraphs=(*assembly_sentences(result), *assembly_notes(result), *_methods(result)),
             figures=choices_figure(result, cost_unit),
             tables=tuple(tables),
             unfolded=True,
         ),
     )
+
+
+def _methods(result: AllocationResult) -> tuple[str, ...]:
+    """Return where classes end and what is assumed of measuring."""
+    widths = {own.width is None for own in _acting(result) if isinstance(own, Sorting)}
+    keys = [key for key, equal in (("method_equal", True), ("method_width", False)) if equal in widths]
+    return tuple(map(_say, [*keys, "assembly_method"]))
 
 
 def choices_table(result: AllocationResult) -> Table[AssemblyChoice]:
@@ -110,7 +125,7 @@ def choices_table(result: AllocationResult) -> Table[AssemblyChoice]:
             value=lambda row: float("nan") if row.bound is None else row.bound,
         ),
         Column(header="all limits at once [%]", value=lambda row: 100 * row.joint.estimate),
-        Column(header="left over [%]", value=lambda row: 100 * _left_over(result, row)),
+        Column(header="left over [%]", value=lambda row: 100 * row.left_over),
     ]
     choices = result.assembled.choices if result.assembled else ()
     return Table(name="parts at assembly", columns=columns, rows=list(choices))
@@ -126,11 +141,17 @@ def bins_table(result: AllocationResult) -> Table[_Bin] | None:
         Column(header="what", value=lambda row: row.what),
         Column(header="number [-]", value=lambda row: row.number),
     ]
-    if any(isinstance(own, Sorting) for own in _acting(result)):
+    kinds = {row.what for row in rows}
+    if "class" in kinds:
         columns.append(Column(header="from [µm]", value=lambda row: row.low, nothing="open"))
         columns.append(Column(header="to [µm]", value=lambda row: row.high, nothing="open"))
-    if any(isinstance(own, Shim) for own in _acting(result)):
+    if "sector" in kinds:
+        columns.append(Column(header="from [°]", value=lambda row: row.begin, nothing=""))
+        columns.append(Column(header="to [°]", value=lambda row: row.end, nothing=""))
+    if "size" in kinds:
         columns.append(Column(header="off nominal [µm]", value=lambda row: row.middle, nothing=""))
+    if "position" in kinds:
+        columns.append(Column(header="turned by [°]", value=lambda row: row.turned, nothing=""))
     return Table(name="classes and sizes", columns=columns, rows=rows)
 
 
@@ -176,37 +197,67 @@ def _source(result: AllocationResult, name: str) -> Source:
     return next(own for own in result.drawn_sources if own.name == name)
 
 
-def _left_over(result: AllocationResult, choice: AssemblyChoice) -> float:
-    """Return the largest share of parts that find no mate, of all that are sorted [-]."""
-    sortings = (own for own in choice.compensators if isinstance(own, Sorting))
-    return max((own.leftover_of(_source(result, own.parts)) for own in sortings), default=0.0)
-
-
 def _bins(result: AllocationResult, acting: Compensator) -> list[_Bin]:
-    """Return the classes of both sources of a sorting, or the sizes of a shim."""
-    none = float("nan")
+    """Return the classes and sectors of both sources of a sorting, or the sizes of a shim."""
     if isinstance(acting, Shim):
         return [
-            _Bin(source=acting.part, what="size", number=at + 1, low=none, high=none, middle=acting.step * steps)
+            _Bin(source=part, what="size", number=at + 1, middle=acting.step * steps)
+            for part in acting.chosen
             for at, steps in enumerate(range(-acting.reach, acting.reach + 1))
         ]
-    found = []
+    if isinstance(acting, Indexing):
+        return [
+            _Bin(source=part, what="position", number=at + 1, turned=360.0 * at / acting.count)
+            for part in acting.chosen
+            for at in range(acting.count)
+        ]
+    found = list[_Bin]()
+    if not isinstance(acting, Sorting):
+        return found
     for name in acting.named:
-        ends = [none, *(acting.limits(_source(result, name)) / MICROMETRE).tolist(), none]
-        pairs = enumerate(pairwise(ends), start=1)
-        found += [_Bin(source=name, what="class", number=at, low=a, high=b, middle=none) for at, (a, b) in pairs]
+        limits = acting.limits(_source(result, name)) / MICROMETRE
+        lengths = pairwise([_NONE, *limits.tolist(), _NONE] if limits.size else [])
+        found += [_Bin(source=name, what="class", number=at, low=a, high=b) for at, (a, b) in enumerate(lengths, 1)]
+        angles = pairwise(acting.sectors(name).tolist())
+        found += [_Bin(source=name, what="sector", number=at, begin=a, end=b) for at, (a, b) in enumerate(angles, 1)]
     return found
 
 
 def _note(result: AllocationResult, acting: Compensator) -> str:
     """Return what the drawing says of a sorting or of sizes."""
-    if isinstance(acting, Shim):
-        measured = " and ".join(acting.named)
-        return _say("note_shim", part=acting.part, sizes=acting.count, step=acting.step, measured=measured)
-    ends = {
-        name: "/".join(number(end, ".2f") for end in acting.limits(_source(result, name)) / MICROMETRE)
+    if isinstance(acting, Sorting):
+        return _sorting_note(result, acting)
+    if not isinstance(acting, Shim | Indexing):
+        return ""
+    gaps, parts = " and ".join(_gap(part, others) for part, others in acting.of_each), " and ".join(acting.chosen)
+    if isinstance(acting, Indexing):
+        return _say("note_indexing", part=parts, positions=acting.count, width=360.0 / acting.count, gaps=gaps)
+    key = "note_shim_each" if any(_source(result, part).each > 1 for part in acting.chosen) else "note_shim"
+    return _say(key, part=parts, sizes=acting.count, step=acting.step, gaps=gaps)
+
+
+def _sorting_note(result: AllocationResult, acting: Sorting) -> str:
+    """Return what the drawing says of a sorting: of classes, of sectors, or of both."""
+    gaps = {"parts": acting.parts, "mates": acting.mates, "classes": acting.count}
+    said = []
+    if 1 in acting.measured:
+        key = "note_directions_opposite" if acting.opposite else "note_directions"
+        said.append(_say(key, width=360.0 / acting.count, **gaps))
+    if acting.by == "direction":
+        return said[0]
+    ends = [
+        "/".join(number(end, ".2f") for end in acting.limits(_source(result, name)) / MICROMETRE)
         for name in acting.named
-    }
+    ]
     key = "note_opposite" if acting.opposite else "note_sorting"
-    gaps = {"parts_ends": ends[acting.parts], "mates_ends": ends[acting.mates]}
-    return _say(key, parts=acting.parts, mates=acting.mates, classes=acting.count, **gaps)
+    what = _say("of_vector" if 0 in acting.measured else "of_deviation")
+    return " ".join([*said, _say(key, parts_ends=ends[0], mates_ends=ends[1], what=what, **gaps)])
+
+
+def _gap(part: str, others: Sequence[tuple[str, float]]) -> str:
+    """Return the gap of a part as a formula without commas, such as ``washer − 2·hole``."""
+    said = [part]
+    for name, weight in others:
+        times = "" if abs(weight) == 1.0 else f"{abs(weight):g}·"
+        said.append(f"{'−' if weight < 0 else '+'} {times}{name}")
+    return " ".join(said)

@@ -421,6 +421,8 @@ def measures_table(result: RankingResult) -> pd.DataFrame:
         f"Sens, root mean square [{unit}/µm]": (local.sources, local.root_mean_square),
         f"alone at its limit [{unit}]": (result.classical.sources, result.classical.alone),
     }
+    if result.errors.compensators:  # a choice makes the output jump, and the inequality of the bound needs none
+        columns = {header: own for header, own in columns.items() if "bound" not in header}
     if result.shapley:
         columns["Shapley effect [-]"] = (result.shapley.sources, result.shapley.effects[0])
     named = dict.fromkeys(sobol.sources[at] for at in sobol.order)
