@@ -23,7 +23,7 @@ _STANDS_OFF = Characteristic("coaxiality", "how far the shaft stands off is draw
 
 
 def shaft_support(at: Positions) -> SpringGroup:
-    """Return the two springs of the input shaft's bearings, theory page equation (86).
+    """Return the two springs of the input shaft's bearings, theory page equation (89).
 
     ``shaft.assembly`` is (a_x, a_y), fixed in the housing [m].
 
@@ -61,7 +61,7 @@ SHAFT_SUPPORT = Interface(
 
 
 def eccentric_bearing(at: Positions) -> SpringGroup:
-    """Return two springs per eccentric of the shaft in the bore of its disc, theory page equation (87).
+    """Return two springs per eccentric of the shaft in the bore of its disc, theory page equation (90).
 
     ``shaft.journal{j}.eccentricity`` turns with the shaft, ``disc{j}.bore.position`` with the disc [m]. The shaft's
     rotation is given, so it moves no eccentric.
@@ -114,7 +114,7 @@ ECCENTRIC_BEARING = Interface(
 
 
 def output_pins(at: Positions) -> SpringGroup:
-    """Return the contact of every output pin with the wall of its hole in every disc, theory page equation (88).
+    """Return the contact of every output pin with the wall of its hole in every disc, theory page equation (91).
 
     A pin in a hole is a bearing of clearance R_h − r_o whose pin stands off by the eccentricity, against the direction
     of the disc's centre: it touches where it lies further off than the clearance, on one side. ``output.pin.position``
