@@ -18,7 +18,7 @@ from studies.published.simulated_bench import Bench, random_units, simulated_ben
 from tests.builders import baseline_errors
 from tolalloc.bench.information import information
 from tolalloc.bench.least_squares import IdentificationProblem, gauss_newton, require_enough, starts
-from tolalloc.bench.parameters import LIU2020, Parameter, parameter
+from tolalloc.bench.parameters import Parameter, parameter
 from tolalloc.bench.prediction import (
     AllReadings,
     KernelPredictor,
@@ -35,6 +35,7 @@ from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.hysteresis import hysteresis_loop
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.springs import HARMONICS
+from tolalloc.reducers.families.rv import RV
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.reports.tellers.identification import estimate_sentence
@@ -400,7 +401,7 @@ def test_peak_to_peaks_at_one_newton_metre_leave_two_stiffnesses_open():
     only = bench(curve_torques=(), loop_angles=())
     measured = simulated_bench(RV20E, units, only).measured(SeedTree(5))
     data = data_of(measured, "test")
-    parameters = tuple(parameter(name, RV20E, limits[name]) for name in LIU2020)
+    parameters = tuple(parameter(name, RV20E, limits[name]) for name in RV.identified)
     kernel = KernelPredictor(RV20E, parameters, measured, data)
     surrogate = fit_surrogate(kernel, SeedTree(6))
     assert surrogate.polynomial.rms_error < 0.02 * ARCSECOND
@@ -424,7 +425,7 @@ def test_curves_and_loops_find_the_truth_again():
         curve_torques=(-1.0, 1.0),
     )
     exact = simulated_bench(truth, random_units(ERRORS, 3, SeedTree(8)), plan)
-    parameters = tuple(parameter(name, RV20E) for name in LIU2020)
+    parameters = tuple(parameter(name, RV20E) for name in RV.identified)
     at = np.array([item.coordinate(true[item.name]) for item in parameters])
     found = recovery(RV20E, parameters, at, exact, 12, SeedTree(9))
     assert found.recovered == 12

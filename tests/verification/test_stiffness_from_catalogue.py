@@ -8,10 +8,11 @@ from dataclasses import replace
 import pytest
 
 from tests.studies.command import refused, tolalloc
-from tolalloc.bench.catalogue import BEARINGS, identify_from_catalogue, with_bearings
+from tolalloc.bench.catalogue import identify_from_catalogue, with_bearings
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCMINUTE
 from tolalloc.reducers.equivalent.perfect import exact_loop
+from tolalloc.reducers.families.rv import RV
 from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.reports.header import Header
 from tolalloc.reports.portraits.reducer import twist_table
@@ -47,7 +48,7 @@ def test_printed_stiffnesses_are_scaled_alike():
     assert found.factor < 0.05
     answer = Answer(kind="catalogue", header=Header(name="catalogue", model=printed.name), result=found)
     assert "look for another part" in answer.warnings[0]
-    for name in BEARINGS:
+    for name in RV.identified:
         ratio = getattr(found.after.stiffness, name) / getattr(printed.stiffness, name)
         assert ratio == pytest.approx(found.factor, rel=1e-12)
 

@@ -12,13 +12,12 @@ import numpy as np
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCMINUTE
 from tolalloc.reducers.equivalent.hysteresis import HysteresisLoop
+from tolalloc.reducers.equivalent.outputs import bearings_of
 from tolalloc.reducers.equivalent.perfect import exact_loop
 from tolalloc.reducers.reducer.bearings import RollingBearing
 from tolalloc.reducers.reducer.design import Catalogue, Reducer, at_torque
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 
-BEARINGS = ("crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing")
-"""Interfaces with rolling bearings, as fields of `tolalloc.reducers.reducer.stiffness.Stiffness`."""
 RIGIDITY_UNCERTAINTY = 0.1
 """Relative standard uncertainty of a rigidity that a catalogue states without one; an assumption [-]."""
 _FARTHEST = 1000.0
@@ -35,7 +34,9 @@ def with_bearings(reducer: Reducer, factor: float) -> Reducer:
         for part in reducer.parts
     )
     own: dict[str, Any] = {
-        name: factor * getattr(reducer.stiffness, name) for name in BEARINGS if name not in with_parts
+        name: factor * getattr(reducer.stiffness, name)
+        for name in bearings_of(reducer).values()
+        if name not in with_parts
     }
     changed = replace(reducer, parts=parts, stiffness=replace(reducer.stiffness, **own))
     return at_torque(changed, reducer.load.rated_torque)
@@ -69,12 +70,12 @@ class CatalogueResult:
     @property
     def stiffness(self) -> IdentifiedStiffness:
         """The interfaces with rolling bearings at rated torque, to be reused by studies; one factor, so correlated."""
-        values = {name: float(getattr(self.after.stiffness, name)) for name in BEARINGS}
+        values = {name: float(getattr(self.after.stiffness, name)) for name in bearings_of(self.after).values()}
         return IdentifiedStiffness(
             source=f"catalogue rigidity of {self.before.name}",
             values=values,
             standard_uncertainty={name: self.uncertainty * value for name, value in values.items()},
-            correlation=np.ones((len(BEARINGS), len(BEARINGS))),
+            correlation=np.ones((len(values), len(values))),
             notes=(
                 "one datum, one factor on all rolling bearings; stiffness at rated torque, bodies in series included",
                 f"standard uncertainty of the catalogue's rigidity {RIGIDITY_UNCERTAINTY:.0%} (assumption)",

@@ -20,6 +20,9 @@ SYMBOLS = {
     "crank_disc_bearing": "K_pd",
     "crank_carrier_bearing": "K_b",
     "carrier_bearing": "K_ca",
+    "shaft_support": "K_i",
+    "eccentric_bearing": "K_e",
+    "output_pin": "K_o",
     "pin_contact": "C",
     "torque": "torque",
     "bias": "bias",
@@ -27,9 +30,6 @@ SYMBOLS = {
 """Name of each parameter → its symbol; stiffnesses are fields of `tolalloc.reducers.reducer.stiffness.Stiffness`."""
 
 BIAS, TORQUE = "bias", "torque"
-
-LIU2020 = ("crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing")
-"""The stiffnesses that liu2020 identifies."""
 
 _WIDEST = {BIAS: (-60.0, 60.0), TORQUE: (0.1, 10.0)}
 _ALLOWED = {BIAS: "two numbers from -3600 to 3600 arcsec", TORQUE: "two positive factors up to 1000"}
@@ -92,7 +92,7 @@ def parameter(
     Parameters
     ----------
     name
-        One of `SYMBOLS`.
+        One of `SYMBOLS`, of an interface that the reducer has.
     reducer
         Where a stiffness begins.
     bounds
@@ -109,8 +109,9 @@ def parameter(
     InputError
         Bounds in the wrong order or without meaning, the start outside of them, a prior that is not positive.
     """
-    if name not in SYMBOLS:
-        raise UnknownNameError.among(place, "parameter", name, SYMBOLS)
+    known = [own for own in SYMBOLS if own in (BIAS, TORQUE) or getattr(reducer.stiffness, own)]
+    if name not in known:
+        raise UnknownNameError.among(place, "parameter", name, known)
     start = {BIAS: 0.0, TORQUE: 1.0}.get(name) if name in (BIAS, TORQUE) else float(getattr(reducer.stiffness, name))
     assert start is not None
     low, high = bounds or _WIDEST.get(name) or (start / _STIFFNESS_SPAN, start * _STIFFNESS_SPAN)

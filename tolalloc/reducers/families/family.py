@@ -53,6 +53,8 @@ class ReducerFamily:
         What the contact of pins and teeth declares.
     places
         What the picture shows of a reducer, from the inside of the housing to the input.
+    identified
+        Stiffnesses that measured units tell unless others are asked for, fields of `Stiffness`.
     axes
         Place of an axis, as the picture names it, and the source whose vector moves it there.
     outlines
@@ -65,6 +67,7 @@ class ReducerFamily:
     interfaces: tuple[Interface, ...]
     contact_sources: tuple[ErrorSource, ...]
     places: Callable[[Reducer], Iterable[Place]]
+    identified: tuple[str, ...]
     axes: Callable[[Reducer], dict[str, str]]
     outlines: Callable[[Reducer], tuple[dict[str, Any], tuple[str, ...]]]
     new: NewRows

@@ -116,6 +116,7 @@ RV = ReducerFamily(
     interfaces=(SUN_SUPPORT, GEAR_MESH, CRANK_DISC, CRANK_CARRIER, CARRIER_SUPPORT),
     contact_sources=PIN_SOURCES,
     places=_places,
+    identified=("crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing"),  # as liu2020
     axes=_axes,
     outlines=_outlines,
     new=NewRows(

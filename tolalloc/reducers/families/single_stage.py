@@ -272,6 +272,7 @@ SINGLE_STAGE = ReducerFamily(
     interfaces=(SHAFT_SUPPORT, ECCENTRIC_BEARING, OUTPUT_PINS, CARRIER_SUPPORT),
     contact_sources=PIN_SOURCES,
     places=_places,
+    identified=("eccentric_bearing",),
     axes=_axes,
     outlines=_outlines,
     new=NewRows(

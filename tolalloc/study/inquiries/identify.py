@@ -22,7 +22,10 @@ if TYPE_CHECKING:
     from tolalloc.reports.tellers.catalogue import CatalogueTeller
     from tolalloc.reports.tellers.identification import IdentificationTeller
 
-NAMES = "sun_support, gear_mesh, crank_disc_bearing, crank_carrier_bearing, carrier_bearing, pin_contact, torque, bias"
+NAMES = (
+    "sun_support, gear_mesh, crank_disc_bearing, crank_carrier_bearing, carrier_bearing, shaft_support, "
+    "eccentric_bearing, output_pin, pin_contact, torque, bias"
+)
 """Names of `tolalloc.bench.parameters.SYMBOLS`, written out so that help need not import them."""
 
 
@@ -43,7 +46,8 @@ class Identify(Inquiry["tuple[Reducer, IdentificationRequest | None, Measurement
         list[str] | None,
         Word(
             f"Unknown as NAME or NAME=LOW:HIGH, again for each; NAME one of {NAMES}. Stiffness in "
-            "N/m, bias in arcsec, torque over the stated one. Unless given: liu2020's three, half to double.",
+            "N/m, bias in arcsec, torque over the stated one. Unless given: liu2020's three, of a single stage "
+            "eccentric_bearing; half to double.",
             option="--parameter",
         ),
     ] = None
@@ -97,9 +101,9 @@ class Identify(Inquiry["tuple[Reducer, IdentificationRequest | None, Measurement
         # SciPy takes half a second to import; a misspelt file need not wait for it.
         from tolalloc.bench.identification import IdentificationRequest
         from tolalloc.bench.measurements import load_measurements
-        from tolalloc.bench.parameters import LIU2020
+        from tolalloc.reducers.families.known import family_of
 
-        asked = asked_parameters(design, self.parameters or LIU2020, self.priors or ())
+        asked = asked_parameters(design, self.parameters or family_of(design).identified, self.priors or ())
         request = IdentificationRequest(parameters=asked, seed=self.seed, data=str(data))
         if self.write_to and not any(item.is_stiffness for item in asked):
             allowed = "a file only where a stiffness is identified"
