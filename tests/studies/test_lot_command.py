@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pandas as pd
 import pytest
 
 import tolalloc as ta
 from tests.studies.command import refused, tolalloc
+from tolalloc.bench import lot_orders
 
 DRAWING = """id,feature,nominal [mm],plus [unit],minus [unit],unit,min [unit],max [unit],cost,spectrum,systematic,locked
 hub,size,40,8,-4,µm,1,60,1,,,no
@@ -162,3 +164,26 @@ def test_files_that_are_missing_empty_or_there_already_are_refused(tmp_path):
     refused(tolalloc("lot", lot, drawing, "--write", drawing), "the file exists")
     (tmp_path / "empty.csv").write_text("hub [µm]\n", encoding="utf-8")
     refused(tolalloc("lot", tmp_path / "empty.csv", drawing), "the table has no rows")
+
+
+def test_curves_of_a_lot_tell_the_orders_that_moved_and_what_makes_them(tmp_path, monkeypatch):
+    monkeypatch.setattr(lot_orders, "_UNITS", 256)
+    monkeypatch.setattr(lot_orders, "_REDRAWN", 8)
+    lot, curves, angle = tmp_path / "lot.csv", tmp_path / "curves", np.arange(0.0, 360.0, 0.5)
+    lot.write_text("pin.diameter [µm]\n" + "\n".join(HUB) + "\n", encoding="utf-8")
+    curves.mkdir()
+    for unit in range(5):  # 9″ of order 2, and nothing else
+        rows = zip(angle, 9.0 * np.cos(2.0 * np.radians(angle) + unit), strict=True)
+        text = "".join(f"{one},{value:.5f}\n" for one, value in rows)
+        (curves / f"{unit}.csv").write_text(f"angle [deg],transmission error [arcsec]\n{text}", encoding="utf-8")
+    asked = ("lot", lot, "rv20e_drawing", "--curves", curves)
+    refused(tolalloc(*asked, "--out", tmp_path / "report"), "--reducer is missing: where a file is written")
+    refused(tolalloc(*asked, "--noise", "0"), "--noise is 0.0; allowed is above 0 up to 60")
+    done = tolalloc(*asked, "--reducer", "rv20e", "--out", tmp_path / "report")
+    assert done.returncode == 0, done.stderr
+    assert "the order does not say which of their processes moved" in done.stdout.replace("\n", " ")
+    summary = json.loads((tmp_path / "report" / "summary.json").read_text(encoding="utf-8"))
+    orders = {row["order"]: row for row in summary["orders of the curves"]}
+    assert orders[2]["root mean square amplitude of the lot [arcsec]"] == pytest.approx(9.0, abs=1e-4)
+    assert orders[2]["moved"] == orders[40]["moved"] == "yes"  # one too large, the other too small
+    assert "carrier.assembly" in orders[2]["sources, total effect on it"]

@@ -344,7 +344,7 @@ class LotTeller(Teller[LotResult]):
 
 def _makers(own: LotOrder, most: int) -> str:
     """Return the sources that make an order, each with its part of the variance."""
-    return ", ".join(f"{name} ({share:.0%})" for name, share in own.sources[:most])
+    return ", ".join(_say("maker", name=name, share=share) for name, share in own.sources[:most])
 
 
 def _what(own: MeasuredProcess) -> str:
