@@ -149,6 +149,7 @@ def test_readings_that_are_not_allowed_are_refused_in_one_sentence(tmp_path, col
     [
         (("--false-alarms", "0.6"), "--false-alarms is 0.6; allowed is 0.001 to 0.5"),
         (("--next-parts", "1"), "--next-parts is 1; allowed is 2 to 10000"),
+        (("--torque", "-5"), "--torque is -5.0; allowed is none without curves"),
         (("--seed", "-1"), "--seed is -1; allowed is 0 or a positive integer"),
         (("--sheet", "zones"), "sheet is 'zones'; allowed is none"),
     ],
@@ -167,8 +168,8 @@ def test_files_that_are_missing_empty_or_there_already_are_refused(tmp_path):
 
 
 def test_curves_of_a_lot_tell_the_orders_that_moved_and_what_makes_them(tmp_path, monkeypatch):
-    monkeypatch.setattr(lot_orders, "_UNITS", 256)
-    monkeypatch.setattr(lot_orders, "_REDRAWN", 8)
+    monkeypatch.setattr(lot_orders, "_UNITS", 128)
+    monkeypatch.setattr(lot_orders, "_REDRAWN", 4)
     lot, curves, angle = tmp_path / "lot.csv", tmp_path / "curves", np.arange(0.0, 360.0, 0.5)
     lot.write_text("pin.diameter [µm]\n" + "\n".join(HUB) + "\n", encoding="utf-8")
     curves.mkdir()

@@ -132,8 +132,8 @@ def test_load_lot_curves_reads_waves_and_the_noise_of_their_readings(tmp_path):
 @pytest.mark.parametrize(
     ("given", "sentence"),
     [
-        ({"readings": 14}, "gap between its angles is '25.7 deg'; allowed is up to 24 deg over a whole turn, a third"),
-        ({"span": 180.0}, "the widest gap between its angles is '182 deg'"),
+        ({"readings": 14}, "the number of readings is 14; allowed is 15 or more, 3 for each wave of order 5"),
+        ({"span": 180.0}, "its angles is '182 deg'; allowed is up to 72 deg, a wave of order 5, all round the turn"),
         ({"torque": -5}, "the mean of 'torque [N·m]' is -5.0; allowed is -10 within 5%, the torque of the prediction"),
     ],
 )

@@ -40,7 +40,7 @@ _DRAWN, _CHUNK = 2**25, 2**20
 """Waves of simulated lots of one order from which on there are fewer lots, and those held at once [-]."""
 _ENDS = (0.05, 0.95)
 """Shares of lots below the ends of a predicted range [-]."""
-_PER_WAVE = 3.0
+_PER_WAVE = 3
 """Fewest readings along a wave of the highest order [-]."""
 _OTHER_TORQUE = 0.05
 """Difference of a curve's torque from the stated one that is believed to be the brake's [-]."""
@@ -159,20 +159,22 @@ def _require_torque(file: Path, torque: float) -> None:
     if not any(split_header(header)[0].lower() == TORQUE for header in table.headers):
         return
     header, _, values = read_column(table, TORQUE)
-    mean = float(np.nanmean(values)) if np.isfinite(values).any() else torque
-    if abs(mean - torque) > _OTHER_TORQUE * abs(torque):
+    taken = values[np.isfinite(values)]
+    if taken.size and abs(taken.mean() - torque) > _OTHER_TORQUE * abs(torque):
         allowed = f"{torque:g} within {_OTHER_TORQUE:.0%}, the torque of the prediction"
-        raise InputError.at(file, f"the mean of {header!r}", float(f"{mean:.4g}"), allowed)
+        raise InputError.at(file, f"the mean of {header!r}", float(f"{taken.mean():.4g}"), allowed)
 
 
 def _require_close(file: Path, curve: Cleaned, highest: int) -> None:
     """Raise unless the readings tell the highest order all round the turn."""
-    angle = np.sort(np.mod(curve.along, TURN))
-    widest = float(np.diff(angle, append=angle[0] + TURN).max())
-    most = TURN / (_PER_WAVE * highest)
-    if widest > most * (1.0 + 1e-6):
-        allowed = f"up to {most / DEGREE:.3g} deg over a whole turn, a third of a wave of order {highest}"
-        raise InputError.at(file, "the widest gap between its angles", f"{widest / DEGREE:.3g} deg", allowed)
+    readings, angle, fewest = curve.along.size, np.sort(np.mod(curve.along, TURN)), _PER_WAVE * highest
+    if readings < fewest:
+        allowed = f"{fewest} or more, {_PER_WAVE} for each wave of order {highest}"
+        raise InputError.at(file, "the number of readings", readings, allowed)
+    widest = float(np.diff(angle, append=angle[0] + TURN).max()) / DEGREE
+    if widest > 360.0 / highest:
+        allowed = f"up to {360.0 / highest:.3g} deg, a wave of order {highest}, all round the turn"
+        raise InputError.at(file, "the widest gap between its angles", f"{widest:.3g} deg", allowed)
 
 
 def _waves(curve: Cleaned, orders: np.ndarray) -> Complex[np.ndarray, " order"]:
@@ -193,10 +195,9 @@ def predicted_orders(curves: LotCurves, lots: int, seed: int) -> tuple[Predicted
 
     Notes
     -----
-    Equation (89) of the theory page: units are drawn on the model, lots from these units. What the model leaves out is
-    one function for all units of a lot, an assumption; its cosine and sine at order k have the variance
-    √(2/π)·s²·a·exp(−(k·a)²/2) if it has the standard deviation s and the correlation angle a (own derivation). What so
-    many units leave open of their own mean square, its standard error, is added to every lot.
+    Units are drawn on the model, lots from these units. What the model leaves out is one function for all units of a
+    lot, an assumption. What so many units leave open of their own mean square, its standard error, is added to every
+    lot.
     """
     seeds = SeedTree(seed).child("lot", "curves")
     made = curves.made(curves.random_units(_UNITS, seeds.child("units")))
@@ -222,6 +223,9 @@ def predicted_orders(curves: LotCurves, lots: int, seed: int) -> tuple[Predicted
 
 def left_out_of(order: int, noise: Noise) -> float:
     """Return the standard deviation of cosine and sine of what the model leaves out of an order [arcsec].
+
+    √(√(2/π)·a)·s·exp(−(k·a)²/4) at the standard deviation s and the correlation angle a: the variance of a wave is
+    1/π·∫C(Δ)·cos(k·Δ)dΔ over the covariance C of `Noise.left_out` (own derivation).
 
     >>> round(left_out_of(2, Noise()), 4)
     0.0722

@@ -457,7 +457,7 @@ def judge_lot(request: LotRequest, lots: Lots | None = None) -> LotResult:
         level=request.level,
         lots=lots.count,
         curves=curves,
-        orders=with_sources(curves, orders, rejected[tests:], request.seed) if curves else (),
+        orders=with_sources(curves, orders, rejected[tests:].tolist(), request.seed) if curves else (),
     )
 
 

@@ -59,6 +59,9 @@ class Lot(Inquiry["LotRequest"]):
 
         if self.write_to:
             require_new(self.write_to)
+        for field in ("reducer", "torque"):
+            if getattr(self, field) is not None and not self.curves:
+                raise InputError.of_argument("lot", field, getattr(self, field), "none without curves")
         drawing = load_drawing(self.tolerances, sheet=self.sheet)
         curves = self._curves(self.curves, drawing) if self.curves else None
         return prepare_lot(self.readings, drawing, self.false_alarms, self.next_parts, self.seed, curves)
