@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pandas as pd
 import pytest
 
 import tolalloc as ta
 from tests.studies.command import refused, tolalloc
+from tolalloc.bench import lot_orders
 
 DRAWING = """id,feature,nominal [mm],plus [unit],minus [unit],unit,min [unit],max [unit],cost,spectrum,systematic,locked
 hub,size,40,8,-4,µm,1,60,1,,,no
@@ -147,6 +149,7 @@ def test_readings_that_are_not_allowed_are_refused_in_one_sentence(tmp_path, col
     [
         (("--false-alarms", "0.6"), "--false-alarms is 0.6; allowed is 0.001 to 0.5"),
         (("--next-parts", "1"), "--next-parts is 1; allowed is 2 to 10000"),
+        (("--torque", "-5"), "--torque is -5.0; allowed is none without curves"),
         (("--seed", "-1"), "--seed is -1; allowed is 0 or a positive integer"),
         (("--sheet", "zones"), "sheet is 'zones'; allowed is none"),
     ],
@@ -162,3 +165,26 @@ def test_files_that_are_missing_empty_or_there_already_are_refused(tmp_path):
     refused(tolalloc("lot", lot, drawing, "--write", drawing), "the file exists")
     (tmp_path / "empty.csv").write_text("hub [µm]\n", encoding="utf-8")
     refused(tolalloc("lot", tmp_path / "empty.csv", drawing), "the table has no rows")
+
+
+def test_curves_of_a_lot_tell_the_orders_that_moved_and_what_makes_them(tmp_path, monkeypatch):
+    monkeypatch.setattr(lot_orders, "_UNITS", 128)
+    monkeypatch.setattr(lot_orders, "_REDRAWN", 4)
+    lot, curves, angle = tmp_path / "lot.csv", tmp_path / "curves", np.arange(0.0, 360.0, 0.5)
+    lot.write_text("pin.diameter [µm]\n" + "\n".join(HUB) + "\n", encoding="utf-8")
+    curves.mkdir()
+    for unit in range(5):  # 9″ of order 2, and nothing else
+        rows = zip(angle, 9.0 * np.cos(2.0 * np.radians(angle) + unit), strict=True)
+        text = "".join(f"{one},{value:.5f}\n" for one, value in rows)
+        (curves / f"{unit}.csv").write_text(f"angle [deg],transmission error [arcsec]\n{text}", encoding="utf-8")
+    asked = ("lot", lot, "rv20e_drawing", "--curves", curves)
+    refused(tolalloc(*asked, "--out", tmp_path / "report"), "--reducer is missing: where a file is written")
+    refused(tolalloc(*asked, "--noise", "0"), "--noise is 0.0; allowed is above 0 up to 60")
+    teller = ta.lot(lot, "rv20e_drawing", curves=curves, reducer="rv20e").teller
+    assert any("the order does not say which of their processes moved" in said for said in teller.sentences)
+    assert "Orders of the curves" in [section.heading for section in teller.sections]
+    summary = json.loads(json.dumps(teller.summary))
+    orders = {row["order"]: row for row in summary["orders of the curves"]}
+    assert orders[2]["root mean square amplitude of the lot [arcsec]"] == pytest.approx(9.0, abs=1e-4)
+    assert orders[2]["moved"] == orders[40]["moved"] == "yes"  # one too large, the other too small
+    assert "carrier.assembly" in orders[2]["sources, total effect on it"]

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.bench.lot_orders import LotCurves, LotOrder, judged_orders, predicted_orders, with_sources
 from tolalloc.bench.processes import (
     CONFIDENCE,
     EXACT,
@@ -186,6 +187,7 @@ class LotRequest:
     level: float  # False-alarm rate over all columns [-]
     next_parts: int | None  # Of the next sample; as many as were measured now if None [-]
     seed: int  # Of simulated lots [-]
+    curves: LotCurves | None = None  # Of units of the lot; None where none were measured
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,8 +199,10 @@ class LotResult:
     processes: tuple[MeasuredProcess, ...]  # One per column, in the order of the file
     capabilities: tuple[LotCapability, ...]  # One per source
     rows: int  # Measured parts or units [-]
-    level: float  # False-alarm rate over all columns [-]
+    level: float  # False-alarm rate over all columns and orders [-]
     lots: int  # Simulated lots of a process that is not normal, fewer where lots are very large [-]
+    curves: LotCurves | None = None  # Of units of the lot; None where none were measured
+    orders: tuple[LotOrder, ...] = ()  # Of the curves
 
     @property
     def moved(self) -> tuple[MeasuredProcess, ...]:
@@ -215,12 +219,14 @@ class LotResult:
         normal = [own.stated for own in self.processes if own.stated.is_normal]
         if not normal:
             return float("nan")
-        tests = 2 * len(self.processes)
+        tests = 2 * len(self.processes) + len(self.orders)
         errors = ndtri(1.0 - self.level / (2.0 * tests)) + ndtri(FOUND)
         return max(float(errors * (own.seen / own.deviation) / sqrt(own.law.parts)) for own in normal)
 
 
-def prepare_lot(path: Path, drawing: Drawing, level: float, next_parts: int | None, seed: int) -> LotRequest:
+def prepare_lot(
+    path: Path, drawing: Drawing, level: float, next_parts: int | None, seed: int, curves: LotCurves | None = None
+) -> LotRequest:
     """Return the lot of a file, everything checked.
 
     Raises
@@ -235,7 +241,9 @@ def prepare_lot(path: Path, drawing: Drawing, level: float, next_parts: int | No
         raise InputError.of_argument("lot", "next_parts", next_parts, f"2 to {MOST_NEXT}")
     require_seed("lot", seed)
     columns = load_lot(path, drawing.sources)
-    return LotRequest(path=path, drawing=drawing, columns=columns, level=level, next_parts=next_parts, seed=seed)
+    return LotRequest(
+        path=path, drawing=drawing, columns=columns, level=level, next_parts=next_parts, seed=seed, curves=curves
+    )
 
 
 def load_lot(path: Path, sources: Sequence[Source]) -> tuple[GaugedColumn, ...]:
@@ -426,12 +434,15 @@ def judge_lot(request: LotRequest, lots: Lots | None = None) -> LotResult:
     """Return which processes moved, how the parts keep their zones, and the drawing of the lot.
 
     Every column is tested for its mean and for its spread against the process that the drawing states, all tests
-    together at one false-alarm rate by Holm's procedure. Lots that were simulated for the same drawing may be given.
+    together at one false-alarm rate by Holm's procedure; so are the orders of curves. Lots that were simulated for the
+    same drawing may be given.
     """
-    tests = 2 * len(request.columns)
-    lots = lots or Lots(tests, request.level, request.seed)
+    curves, tests = request.curves, 2 * len(request.columns)
+    lots = lots or Lots(tests + len(curves.orders if curves else ()), request.level, request.seed)
     found = [_measured(column, lots, request.next_parts) for column in request.columns]
-    rejected = holm([p for own in found for p in (own.shift_probability, own.spread_probability)], request.level)
+    orders = judged_orders(curves, predicted_orders(curves, lots.count, request.seed)) if curves else ()
+    probabilities = [p for own in found for p in (own.shift_probability, own.spread_probability)]
+    rejected = holm([*probabilities, *(own.probability for own in orders)], request.level)
     processes = tuple(
         replace(own, mean_moved=bool(rejected[2 * at]), spread_moved=bool(rejected[2 * at + 1]))
         for at, own in enumerate(found)
@@ -445,6 +456,8 @@ def judge_lot(request: LotRequest, lots: Lots | None = None) -> LotResult:
         rows=max(column.values.size for column in request.columns),
         level=request.level,
         lots=lots.count,
+        curves=curves,
+        orders=with_sources(curves, orders, rejected[tests:].tolist(), request.seed) if curves else (),
     )
 
 

@@ -8,8 +8,9 @@ from math import sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tolalloc.bench.lot_orders import LotOrder
 from tolalloc.bench.lots import FOUND, LotCapability, LotResult, MeasuredProcess
-from tolalloc.reading.units import MICROMETRE
+from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE
 from tolalloc.reports.columns import Column, Table, own_words
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
@@ -86,6 +87,15 @@ _LIMITS: tuple[Column[MeasuredProcess], ...] = (
     Column(header="s, lower limit [µm]", value=lambda row: row.next.deviation[0] / MICROMETRE),
     Column(header="s, upper limit [µm]", value=lambda row: row.next.deviation[1] / MICROMETRE),
 )
+_ORDERS: tuple[Column[LotOrder], ...] = (
+    Column(header="order", value=lambda row: row.order, terminal=1),
+    Column(header="root mean square amplitude of the lot [arcsec]", value=lambda row: row.amplitude, terminal=1),
+    Column(header="predicted, low 5 % [arcsec]", value=lambda row: row.predicted[0], terminal=1),
+    Column(header="predicted, high 95 % [arcsec]", value=lambda row: row.predicted[1], terminal=1),
+    Column(header="p value [-]", value=lambda row: row.probability, terminal=1),
+    Column(header="moved", value=lambda row: "yes" if row.moved else "", terminal=1),
+    Column(header="sources, total effect on it", value=lambda row: _makers(row, len(row.sources))),
+)
 
 
 class LotTeller(Teller[LotResult]):
@@ -107,12 +117,31 @@ class LotTeller(Teller[LotResult]):
         found, moved, level = self.result, self.result.moved, self.result.level * 100.0
         if not moved:
             unmoved = _say("unmoved", columns=len(found.processes), level=level)
-            return (unmoved, *self._seen, *self._gauges, self._least_capable)
+            return (unmoved, *self._curves, *self._seen, *self._gauges, self._least_capable)
         named = "; ".join(map(_what, moved[:_NAMED]))
         more = f"; and {len(moved) - _NAMED} more" if len(moved) > _NAMED else ""
         left = len(found.processes) - len(moved)
         rest = (_say("rest", count=left),) if left else ()
-        return (_say("moved", what=named + more, level=level), *rest, *self._seen, *self._gauges, self._least_capable)
+        first = _say("moved", what=named + more, level=level)
+        return (first, *rest, *self._curves, *self._seen, *self._gauges, self._least_capable)
+
+    @property
+    def _curves(self) -> tuple[str, ...]:
+        """Which orders of the curves moved, and what makes them."""
+        found = self.result.orders
+        if not self.result.curves:
+            return ()
+        said = {"orders": len(found), "units": len(self.result.curves.waves)}
+        moved = sorted((own for own in found if own.moved), key=lambda own: own.probability)
+        if not moved:
+            return (_say("orders_unmoved", **said),)
+        first = moved[0]
+        amplitude, low, high = alike(first.amplitude, *first.predicted)
+        what = {"order": first.order, "amplitude": amplitude, "low": low, "high": high}
+        more = _say("orders_more", names=", ".join(str(own.order) for own in moved[1:])) if moved[1:] else ""
+        several = "order_of_several" if len(first.sources) > 1 else "order_of_one"
+        makers = _say(several, order=first.order, makers=_makers(first, _NAMED)) if first.sources else ""
+        return (" ".join(filter(None, (_say("order_moved", **said, **what), more, makers))),)
 
     @property
     def _seen(self) -> tuple[str, ...]:
@@ -144,8 +173,25 @@ class LotTeller(Teller[LotResult]):
                 for own in rows
                 if own.clipped
             ),
+            *self._doubts_of_curves,
             *self.result.stated.notes,
         )
+
+    @property
+    def _doubts_of_curves(self) -> tuple[str, ...]:
+        curves = self.result.curves
+        if not curves:
+            return ()
+        failed = (_say("warn_failed", failed=self.header.failed),) if self.header.failed else ()
+        return (*failed, *curves.model.mismatches, *(_say("warn_repaired", repair=own) for own in curves.repairs))
+
+    @property
+    def _assumed_of_curves(self) -> tuple[str, ...]:
+        if not self.result.curves:
+            return ()
+        noise, torque = self.result.curves.discrepancy, self.result.curves.model.kernel.torque
+        errs = {"reading": noise.reading / ARCSECOND, "discrepancy": noise.discrepancy / ARCSECOND}
+        return (_say("assume_curves", torque=torque, angle=noise.correlation_angle / DEGREE, **errs),)
 
     @property
     def assumptions(self) -> tuple[str, ...]:
@@ -156,6 +202,7 @@ class LotTeller(Teller[LotResult]):
             *(() if all(normal) else (_say("assume_simulated", lots=self.result.lots),)),
             _say("assume_holm", level=self.result.level * 100.0),
             *self._assumed_of_gauges,
+            *self._assumed_of_curves,
             *self.header.assumptions,
         )
 
@@ -175,6 +222,10 @@ class LotTeller(Teller[LotResult]):
         return Table(name="capability", columns=_CAPABILITIES, rows=self.result.capabilities)
 
     @cached_property
+    def _orders(self) -> Table[LotOrder]:
+        return Table(name="orders of the curves", columns=_ORDERS, rows=self.result.orders)
+
+    @cached_property
     def _limits(self) -> Table[MeasuredProcess]:
         return Table(name="control limits", columns=_LIMITS, rows=self.result.processes)
 
@@ -188,6 +239,7 @@ class LotTeller(Teller[LotResult]):
                 figures=(self._shift_figure, self._spread_figure),
                 tables=(("processes", self._processes.frame()),),
             ),
+            *self._section_of_curves,
             Section(
                 heading=_say("capability_heading"),
                 paragraphs=(_say("capability"),),
@@ -206,14 +258,23 @@ class LotTeller(Teller[LotResult]):
         )
 
     @property
+    def _section_of_curves(self) -> tuple[Section, ...]:
+        if not self.result.curves:
+            return ()
+        tables = (("orders of the curves", self._orders.frame()),)
+        return (Section(heading=_say("orders_heading"), paragraphs=(_say("orders"),), tables=tables),)
+
+    @property
     def terminal(self) -> tuple[tuple[pd.DataFrame, str], ...]:
         """The processes that are likeliest to have moved, and the zones that are kept least."""
         surest = sorted(self.result.processes, key=lambda own: own.probability)
         least = sorted(self.result.capabilities, key=lambda own: own.cpk)
         processes = replace(self._processes, rows=surest[:_SHOWN])
         capabilities = replace(self._capabilities, rows=least[:_SHOWN])
+        orders = ((self._orders.terminal(), _say("terminal_orders", lot=self.header.name)),)
         return (
             (processes.terminal(), _say("terminal_processes", lot=self.header.name)),
+            *(orders if self.result.curves else ()),
             (capabilities.terminal(), _say("terminal_capability", lot=self.header.name)),
         )
 
@@ -230,6 +291,7 @@ class LotTeller(Teller[LotResult]):
             "processes": self._processes.records(),
             "capability": self._capabilities.records(),
             "control limits": self._limits.records(),
+            **({"orders of the curves": self._orders.records()} if self.result.curves else {}),
             "seed": self.header.seed,
             "warnings": list(self.warnings),
         }
@@ -278,6 +340,11 @@ class LotTeller(Teller[LotResult]):
             ),
             vertical=((1.0, "drawing"),),
         )
+
+
+def _makers(own: LotOrder, most: int) -> str:
+    """Return the sources that make an order, each with its part of the variance."""
+    return ", ".join(_say("maker", name=name, share=share) for name, share in own.sources[:most])
 
 
 def _what(own: MeasuredProcess) -> str:

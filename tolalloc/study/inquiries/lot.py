@@ -1,18 +1,21 @@
-"""What gauge readings of a lot say of the processes that a drawing states."""
+"""What gauge readings and curves of a lot say of the processes that a drawing states."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
+from tolalloc.exceptions import InputError
 from tolalloc.reports.header import Header
-from tolalloc.running.progress import Progress
+from tolalloc.running.progress import Progress, RunRecord
 from tolalloc.study.answer import Answer
-from tolalloc.study.inquiry import Inquiry, Word
+from tolalloc.study.inquiry import Inquiry, ReducerName, StiffnessName, TestTorque, Word
 
 if TYPE_CHECKING:
+    from tolalloc.bench.lot_orders import LotCurves
     from tolalloc.bench.lots import LotRequest, LotResult
+    from tolalloc.drawings.drawing import Drawing
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +37,19 @@ class Lot(Inquiry["LotRequest"]):
     write_to: Annotated[
         Path | None, Word("Tolerance table to write, new: Cp and shift of the lot.", option="--write")
     ] = None
+    curves: Annotated[
+        Path | None, Word("Folder of curves, a CSV per unit: columns 'angle [deg]', 'transmission error [arcsec]'.")
+    ] = None
+    reducer: ReducerName = None
+    torque: TestTorque = None
+    noise: Annotated[float, Word("Standard deviation of one reading [arcsec].")] = 0.5
+    discrepancy: Annotated[float, Word("Standard deviation of what the model leaves out [arcsec].")] = 0.5
+    stiffness: StiffnessName = ""
     seed: Annotated[int, Word("Seed of every random number.")] = 1
+
+    def with_reducer(self, *written: Path | None, argument: str = "reducer") -> Self:
+        """Return it with the default reducer if there are curves, which alone ask for one."""
+        return super().with_reducer(*written, argument=argument) if self.curves else self
 
     def prepare(self) -> LotRequest:
         """Return the readings and the drawing that they are held against."""
@@ -44,16 +59,48 @@ class Lot(Inquiry["LotRequest"]):
 
         if self.write_to:
             require_new(self.write_to)
+        for field in ("reducer", "torque"):
+            if getattr(self, field) is not None and not self.curves:
+                raise InputError.of_argument("lot", field, getattr(self, field), "none without curves")
         drawing = load_drawing(self.tolerances, sheet=self.sheet)
-        return prepare_lot(self.readings, drawing, self.false_alarms, self.next_parts, self.seed)
+        curves = self._curves(self.curves, drawing) if self.curves else None
+        return prepare_lot(self.readings, drawing, self.false_alarms, self.next_parts, self.seed, curves)
 
-    def solve(self, prepared: LotRequest, progress: Progress) -> Answer[LotResult]:  # noqa: ARG002
+    def _curves(self, folder: Path, drawing: Drawing) -> LotCurves:
+        """Return the curves and the model that predicts them."""
+        from tolalloc.bench.diagnosis import LARGEST_NOISE
+        from tolalloc.bench.lot_orders import load_lot_curves
+        from tolalloc.bench.posterior import Noise
+        from tolalloc.reading.units import ARCSECOND
+        from tolalloc.reducers.choice import reducer
+
+        if not 0.0 < self.noise <= LARGEST_NOISE:
+            raise InputError.of_argument("lot", "noise", self.noise, f"above 0 up to {LARGEST_NOISE:g}")
+        if not 0.0 <= self.discrepancy <= LARGEST_NOISE:
+            raise InputError.of_argument("lot", "discrepancy", self.discrepancy, f"0 to {LARGEST_NOISE:g}")
+        choice = reducer(str(self.reducer), stiffness=self.stiffness, torque=self.torque).set_to(drawing.settings)
+        noise = Noise(reading=self.noise * ARCSECOND, discrepancy=self.discrepancy * ARCSECOND)
+        return load_lot_curves(folder, choice.bound(drawing.errors, "lot"), drawing.errors, noise)
+
+    def room(self, prepared: LotRequest) -> str:
+        """Return the room that curves are predicted with."""
+        return "equivalent" if prepared.curves else ""
+
+    def solve(self, prepared: LotRequest, progress: Progress) -> Answer[LotResult]:
         """Return what moved, the capabilities and the drawing of the lot."""
         from tolalloc.bench.lots import judge_lot
 
-        named = Path(prepared.drawing.name).name
-        header = Header(name=prepared.path.name, model=named, seed=prepared.seed)
-        return Answer(kind="lot", header=header, result=judge_lot(prepared))
+        header = Header(name=prepared.path.name, model=Path(prepared.drawing.name).name, seed=prepared.seed)
+        if not prepared.curves:
+            return Answer(kind="lot", header=header, result=judge_lot(prepared))
+        from tolalloc.reducers.equivalent.model import OUTCOMES
+
+        record, model = RunRecord(progress, OUTCOMES), prepared.curves.model
+        with record.stage("orders of the curves"):
+            result = judge_lot(replace(prepared, curves=prepared.curves.observed(record)))
+        assumed = (*model.reducer.assumptions, *model.left_out)
+        header = replace(header, assumptions=assumed, statuses=record.counts, stages=record.stages)
+        return Answer(kind="lot", header=header, result=result)
 
     def write(self, answer: Answer[Any]) -> tuple[str, ...]:
         """Write the tolerance table of the lot, if it was asked for."""
