@@ -334,6 +334,13 @@ class ModificationRecord(Record):
     profile: str = ""
 
 
+CROWNING = (
+    "the crowning of the teeth is felt by line load and pressure alone, by slices as stiff as the contact law at the "
+    "force of the pin; forces, twist and transmission error are those of the section in the middle over the whole width"
+)
+"""What is assumed of crowned teeth."""
+
+
 class ReducerRecord(Record):
     """A whole reducer file."""
 
@@ -401,7 +408,7 @@ class ReducerRecord(Record):
             friction=self.friction,
             friction_dimensions=self.stiffness.friction_dimensions,
             catalogue=self.catalogue,
-            assumptions=self.assumptions,
+            assumptions=(*self.assumptions, *([CROWNING] if self.cycloid_stage.crowning else [])),
         )
         reducer = replace(reducer, parts=self.stiffness.parts(reducer), clearances=self._clearances())
         return at_torque(reducer, reducer.load.rated_torque)
