@@ -14,6 +14,7 @@ from scipy.special import ellipe, ellipkm1
 from tests.random_cases import random_reducer
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND, MEGAPASCAL, MICROMETRE, MILLIMETRE
+from tolalloc.reducers import TORSIONAL_STIFFNESS
 from tolalloc.reducers.cycloid.line_contact import LineContact
 from tolalloc.reducers.cycloid.loaded_contact import assess, crowned_contact, peak_pressure
 from tolalloc.reducers.cycloid.solvers import LINEAR
@@ -303,6 +304,22 @@ def test_crowning_raises_the_pressure_of_a_loaded_contact_and_nothing_else():
         carries = own.force > 0
         assert 1.1 < own.pressure.max() / getattr(even, name).pressure.max() < 1.5
         assert (own.pressure[carries] > getattr(even, name).pressure[carries]).all()
+
+
+def test_what_crowning_would_change_as_a_spring_in_series():
+    """The figures that theory and assumptions state for what the equilibrium does not feel."""
+    design = crowned(load_reducer("rv20e"), 5)
+    pins = assess(design, design.load.rated_torque, phases=8).together.force
+    force = np.array([(pins**2).sum() / pins.sum()])
+    contact = crowned_contact(design, np.array([1.0]), force, np.zeros(1))
+    more = contact.deformation - force / contact.stiffness
+    softer = replace(design, stiffness=replace(design.stiffness, pin_bending=float((force / more)[0])))
+    models = [EquivalentModel(reducer) for reducer in (design, softer)]
+    errors = np.array([design.modification.deviations.get(column, 0.0) for column in models[0].columns])
+    even, own = (stress(model, errors) for model in models)
+    names = TORSIONAL_STIFFNESS, "largest pin force, rated torque [N]", "peak pressure, rated torque [MPa]"
+    assert [own[name] / even[name] for name in names] == pytest.approx([0.973, 0.818, 0.955], abs=0.005)
+    assert even[names[2]] == pytest.approx(1571, abs=1)
 
 
 @pytest.mark.parametrize(

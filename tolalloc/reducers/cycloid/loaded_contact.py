@@ -79,6 +79,12 @@ def crowned_contact(
     Slices are as stiff as the law's secant at the force, F/δ (assumed). The bending of a pin is left out: it gives way
     to the whole force and does not level what the crowning leaves.
 
+    K = F/δ of the law, C, C(ρ−r)/(ρ+r) or c/ln(cλ/F) [N/m].
+
+    References
+    ----------
+    Own derivation, theory page (31); within 7 % of Hertz's ellipse under the logarithmic law.
+
     Examples
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
