@@ -99,7 +99,9 @@ def test_files_are_found_beside_the_study_and_shipped_ones_by_name(tmp_path, mon
     assert drawing.costs == folder / "costs.csv"
     assert load_drawing("rv20e_table4", costs="rv20e", folder=folder).costs == "rv20e"
     assert load_drawing(folder / "t.csv", folder / "own.csv").sources == drawing.sources
-    with pytest.raises(InputError, match="no such file; shipped tolerance table files are rv110e_drawing, rv20e_all"):
+    with pytest.raises(
+        InputError, match="no such file; shipped tolerance table files are cd29_drawing, rv110e_drawing, rv20e_all"
+    ):
         load_drawing("none.csv", folder=folder)
 
 

@@ -3,29 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipkm1
 
 from tests.random_cases import random_reducer
 from tolalloc.exceptions import InputError
-from tolalloc.reading.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
-from tolalloc.reducers.cycloid.loaded_contact import peak_pressure
+from tolalloc.reading.units import ARCSECOND, MEGAPASCAL, MICROMETRE, MILLIMETRE
+from tolalloc.reducers import TORSIONAL_STIFFNESS
+from tolalloc.reducers.cycloid.line_contact import LineContact
+from tolalloc.reducers.cycloid.loaded_contact import assess, crowned_contact, peak_pressure
 from tolalloc.reducers.cycloid.solvers import LINEAR
 from tolalloc.reducers.cycloid.solvers.pins import pin_force
-from tolalloc.reducers.cycloid.tooth_profile import normals
+from tolalloc.reducers.cycloid.tooth_profile import normals, path_curvature
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import (
-    LineContact,
-    Solved,
-    contact_pattern,
-    line_contact,
-    peak_line_load,
-    unit_pressure,
-)
+from tolalloc.reducers.equivalent.outputs import Solved, contact_pattern, line_contact, peak_line_load, unit_pressure
+from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.reducers.response.outputs import OutputsResponse, requirements_of
+from tolalloc.study.numeric import reducer as design_of
 
 TORQUE = -100.0
 
@@ -182,3 +183,152 @@ def test_a_contact_pattern_needs_a_law_that_knows_the_load_along_the_width(rv20e
     model = EquivalentModel(linear(rv20e.reducer, "logarithmic", np.inf))
     with pytest.raises(InputError, match="allowed is constant or table2"):
         contact_pattern(model, np.zeros(len(model.columns)), TORQUE)
+
+
+def crowned_slices(force, slope, crowning, stiffness=2e9, width=12e-3):
+    force, slope = np.atleast_1d(force).astype(float), np.atleast_1d(slope).astype(float)
+    even = np.full_like(force, stiffness)
+    return LineContact(force=force, stiffness=even, slope=slope, face_width=width, crowning=crowning)
+
+
+def test_crowned_and_tilted_teeth_carry_what_quadrature_gives(generator):
+    stiffness, width, kinds = 2e9, 12e-3, set()
+    for _ in range(300):
+        crowning = 10.0 ** generator.uniform(-8, -4)
+        slope = generator.choice([0.0, 1.0, -1.0]) * 10.0 ** generator.uniform(-6, -2.5)
+        bend, end = 4 * crowning / width**2, width / 2
+        deepest = float(np.clip(slope / (2 * bend), -end, end))
+        middle = 10.0 ** generator.uniform(-8, -5) - slope * deepest + bend * deepest**2
+
+        def load(z, middle=middle, slope=slope, bend=bend):
+            return stiffness / width * max(middle + slope * z - bend * z**2, 0.0)
+
+        root = np.sqrt(complex(slope**2 + 4 * bend * middle)).real
+        lifts = [2 * middle / (root - slope) if slope < 0 else (slope + root) / (2 * bend)]
+        lifts += [-2 * middle / (root + slope) if slope >= 0 else (slope - root) / (2 * bend)]
+        inside = sorted(z for z in lifts if -end < z < end)
+        edges = [-end, *inside, end]
+        force = sum(quad(load, *piece, epsrel=1e-12, epsabs=0)[0] for piece in pairwise(edges))
+        kinds.add((len(inside), abs(deepest) < end))
+        own = crowned_slices(force, slope, crowning)
+        assert own.peak[0] == pytest.approx(load(deepest), rel=1e-9)
+        assert own.deformation[0] == pytest.approx(load(deepest) * width / stiffness, rel=1e-9)
+        places = np.linspace(-end, end, 41)
+        found = own.line_load(places)[0]
+        np.testing.assert_allclose(found, [load(z) for z in places], rtol=1e-9, atol=1e-9 * own.peak[0])
+    assert kinds == {(0, True), (1, True), (2, True), (0, False), (1, False)}
+
+
+def test_crowned_teeth_that_are_not_tilted_have_closed_forms():
+    stiffness, crowning = 2e9, 6e-6
+    touching = 2 / 3 * stiffness * crowning
+    force = touching * np.array([1e-12, 1e-4, 0.5, 1.0, 3.0])
+    free = (1.5 * force / stiffness) ** (2 / 3) * crowning ** (1 / 3)
+    depth = np.where(force <= touching, free, force / stiffness + crowning / 3)
+    np.testing.assert_allclose(crowned_slices(force, np.zeros(5), crowning).deformation, depth, rtol=1e-12)
+    # However much is taken off, the load stands on the middle and grows with the third root of it.
+    more = [crowned_slices(force[1], 0.0, scale * 1e-4).peak[0] for scale in (1.0, 8.0)]
+    assert more[1] == pytest.approx(2 * more[0], rel=1e-12)
+
+
+@pytest.mark.parametrize("slope", [0.0, 1e-5, -3e-4])
+def test_without_crowning_the_line_load_is_the_tilted_one_s(slope):
+    force, places = np.array([0.0, 50.0, 900.0, np.nan]), np.linspace(-6e-3, 6e-3, 7)
+    tilted, nearly = (crowned_slices(force, np.full(4, slope), crowning) for crowning in (0.0, 1e-18))
+    np.testing.assert_allclose(nearly.peak, tilted.peak, rtol=1e-9)
+    np.testing.assert_allclose(nearly.line_load(places), tilted.line_load(places), rtol=1e-9, atol=1e-5)
+    assert crowned_slices(force, np.full(4, slope), 5e-6).peak[0] == 0.0
+
+
+def hertz_ellipse(force, modulus, across, along):
+    """Peak pressure of bodies of two relative radii, Johnson (1985), section 4.2; along the longer."""
+    small, large = 0.5 / along, 0.5 / across
+
+    def integrals(ratio):
+        return ellipkm1(ratio**-2), ellipe(1 - ratio**-2)
+
+    def missed(ratio):
+        first, second = integrals(ratio)
+        return (ratio**2 * second - first) / (first - second) - large / small
+
+    ratio = brentq(missed, 1.001, 1e4, xtol=1e-10)
+    first, second = integrals(ratio)
+    shape = np.sqrt((ratio**2 * second - first) * (first - second)) / (ratio**2 - 1)
+    half = (1.5 * force * shape / (np.pi * ratio * modulus * np.sqrt(small * large))) ** (1 / 3)
+    return 1.5 * force / (np.pi * ratio * half**2)
+
+
+@pytest.mark.parametrize(("law", "low", "high"), [("logarithmic", 0.93, 0.99), ("constant", 1.25, 1.34)])
+def test_pressure_of_crowned_teeth_beside_hertz_s_ellipse(rv20e, law, low, high):
+    reducer, angle = linear(rv20e.reducer, law, 1e7), np.array([np.pi])
+    stage, forces = reducer.cycloid_stage, np.array([100.0, 200.0, 400.0])
+    bend = path_curvature(stage, angle)[0]
+    across = 1 / (1 / stage.pin_radius - bend / (1 + stage.pin_radius * bend))
+    for crowning in (5e-6, 10e-6, 20e-6):
+        own = replace(reducer, cycloid_stage=replace(stage, crowning=crowning))
+        peak = crowned_contact(own, angle, forces, np.zeros(3)).peak
+        found = peak_pressure(stage, reducer.contact_modulus, angle, peak * stage.face_width)
+        along = stage.face_width**2 / (8 * crowning)
+        expected = [hertz_ellipse(force, reducer.contact_modulus, across, along) for force in forces]
+        assert low < (found / expected).min() <= (found / expected).max() < high
+        if law == "constant":  # as the ellipse, with the third root of the force
+            np.testing.assert_allclose(found[1:] / found[:-1], 2 ** (1 / 3), rtol=1e-12)
+
+
+def crowned(reducer, micrometres):
+    return replace(reducer, cycloid_stage=replace(reducer.cycloid_stage, crowning=micrometres * MICROMETRE))
+
+
+@pytest.mark.parametrize(("law", "bending"), [("table2", 3e8), ("logarithmic", 3e8)])
+def test_a_crowned_model_keeps_its_forces_and_balances_them_along_the_width(law, bending, generator):
+    reducer = linear(random_reducer(generator), law, bending)
+    angles, plain, own = np.array([0.0, 0.3]), EquivalentModel(reducer), EquivalentModel(crowned(reducer, 4))
+    errors = tilted(plain, generator) if law == "table2" else np.zeros((1, len(plain.columns)))
+    even, solved = (Solved.of(model.equilibria(errors, TORQUE, angles)) for model in (plain, own))
+    np.testing.assert_array_equal(solved.forces.pins, even.forces.pins)
+    contact = line_contact(solved.equilibria, solved.forces)
+    for place in np.ndindex(contact.force.shape[:-1]):
+        position, slice_width = whole_width(contact.of(place))
+        load = contact.of(place).line_load(position)
+        np.testing.assert_allclose(load.sum(axis=1) * slice_width, contact.force[place], rtol=1e-5, atol=1e-3)
+    peak = peak_line_load(solved.equilibria, solved.forces)
+    np.testing.assert_array_equal(peak, contact.peak)
+    carries = contact.force > 0
+    assert (peak[carries] > contact.force[carries] / contact.face_width).all() and not peak[~carries].any()
+
+
+def test_crowning_raises_the_pressure_of_a_loaded_contact_and_nothing_else():
+    design = load_reducer("rv40e_xi2015")
+    even, none, five = (assess(crowned(design, at), 572.0, phases=2) for at in (0, 1e-9, 5))
+    for name in ("linear", "single", "together"):
+        own = getattr(five, name)
+        np.testing.assert_array_equal(own.force, getattr(even, name).force)
+        np.testing.assert_allclose(getattr(none, name).pressure, getattr(even, name).pressure, rtol=1e-6)
+        carries = own.force > 0
+        assert 1.1 < own.pressure.max() / getattr(even, name).pressure.max() < 1.5
+        assert (own.pressure[carries] > getattr(even, name).pressure[carries]).all()
+
+
+def test_what_crowning_would_change_as_a_spring_in_series():
+    """The figures that theory and assumptions state for what the equilibrium does not feel."""
+    design = crowned(load_reducer("rv20e"), 5)
+    pins = assess(design, design.load.rated_torque, phases=8).together.force
+    force = np.array([(pins**2).sum() / pins.sum()])
+    contact = crowned_contact(design, np.array([1.0]), force, np.zeros(1))
+    more = contact.deformation - force / contact.stiffness
+    softer = replace(design, stiffness=replace(design.stiffness, pin_bending=float((force / more)[0])))
+    models = [EquivalentModel(reducer) for reducer in (design, softer)]
+    errors = np.array([design.modification.deviations.get(column, 0.0) for column in models[0].columns])
+    even, own = (stress(model, errors) for model in models)
+    names = TORSIONAL_STIFFNESS, "largest pin force, rated torque [N]", "peak pressure, rated torque [MPa]"
+    assert [own[name] / even[name] for name in names] == pytest.approx([0.973, 0.818, 0.955], abs=0.005)
+    assert even[names[2]] == pytest.approx(1571, abs=1)
+
+
+@pytest.mark.parametrize(
+    ("micrometres", "allowed"), [(-1, "greater than or equal to 0"), (101, "less than or equal to 100")]
+)
+def test_a_crowning_beyond_what_is_believed_is_refused(micrometres, allowed):
+    with pytest.raises(InputError) as refused:
+        design_of("rv20e", {"cycloid_stage.crowning_um": micrometres})
+    assert str(refused.value).endswith(f"cycloid_stage.crowning_um is {micrometres}; input should be {allowed}.")

@@ -13,7 +13,7 @@ from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.condensation import spring_groups
 from tolalloc.reducers.equivalent.hysteresis import BACKLASH, DRAWN, both_directions, hysteresis_loop
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import OUTPUTS, Solved, attribute, forces, load_share, order_spectrum
+from tolalloc.reducers.equivalent.outputs import Solved, attribute, forces, load_share, order_spectrum, outputs_of
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
 from tolalloc.reducers.equivalent.springs import Coordinates
 from tolalloc.reducers.reducer.design import Clearances
@@ -48,7 +48,7 @@ def test_forces_are_those_of_the_dense_twin(seed):
 
 def test_every_output_of_a_solve_is_one_number_per_sample(rv20e, table4):
     solved = Solved.of(rv20e.equilibria(np.repeat(table4, 3, axis=0), -10.0, np.linspace(0, 1, 7)))
-    for name, (_, value) in OUTPUTS.items():
+    for name, (_, value) in outputs_of(rv20e.reducer).items():
         assert value(solved).shape == (3,), name
         assert np.isfinite(value(solved)).all(), name
     np.testing.assert_allclose(load_share(solved.forces.pins).sum(axis=1), 1.0, rtol=1e-12)

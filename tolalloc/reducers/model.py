@@ -300,9 +300,11 @@ class ReducerModel(Model):
 
     @property
     def content(self) -> Any:
-        """Reducer, identified stiffnesses, torque, and the form and temperatures of its parts where there are any."""
+        """Reducer, identified stiffnesses, torque, and form, crowning and temperatures of parts where there are any."""
         own: tuple[Any, ...] = (self.reducer, self.identified.content if self.identified else None, self.kernel.torque)
         own = (*own, self.reducer.form) if self.reducer.form else own
+        crowning = self.reducer.cycloid_stage.crowning
+        own = (*own, crowning) if crowning else own
         warm = (self.kernel.disc_temperature, self.further_disc_temperatures)
         return (*own, *warm) if any(warm) else own
 

@@ -1,6 +1,6 @@
 """Forces in every interface at the equilibria, and what engineers read off them: each output one small function.
 
-Load along the width of teeth: even where disc and pin are parallel, heavier towards one end where they are not.
+Load along the width of teeth whose discs are tilted.
 
 Which source makes which order of a unit's transmission error.
 """
@@ -8,14 +8,15 @@ Which source makes which order of a unit's transmission error.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Complex, Float, Int, Integer
 
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.reducers.cycloid.loaded_contact import peak_pressure
+from tolalloc.reducers.cycloid.line_contact import LineContact
+from tolalloc.reducers.cycloid.loaded_contact import crowned_contact, peak_pressure
 from tolalloc.reducers.cycloid.solvers import LAWS, LINEAR
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.interfaces import PinContact, pin_contact
@@ -344,45 +345,6 @@ def _at_tips_and_roots(model: EquivalentModel, disc: int) -> PinContact:
     return pin_contact(Positions(model.reducer, half_turns / teeth, model.orders))
 
 
-@dataclass(frozen=True, kw_only=True)
-class LineContact:
-    """Contacts of pins and teeth as springs side by side along the width of the tooth, theory page equation (31).
-
-    What follows holds for the linear laws. Under the logarithmic one no disc tilts: `peak` is then the even load, and
-    stiffness and `deformation` mean nothing.
-    """
-
-    force: Float[np.ndarray, "*contacts"]  # Normal force [N]
-    stiffness: Float[np.ndarray, "*contacts"]  # Stiffness of the whole width, bending of the pin included [N/m]
-    # By how much the tooth lies deeper in the pin per length along the width [rad]
-    slope: Float[np.ndarray, "*contacts"]
-    face_width: float  # Width b of the tooth [m]
-
-    @property
-    def peak(self) -> Float[np.ndarray, "*contacts"]:
-        """Line load at the deeper end, F/b + C|γ|/2; where one end is lifted, √(2C|γ|F/b) [N/m]."""
-        # Force at which the shallower end just touches.
-        lifting = 0.5 * self.stiffness * self.face_width * np.abs(self.slope)
-        deep = np.where(self.force < lifting, 2.0 * np.sqrt(lifting * self.force), self.force + lifting)
-        return np.asarray(deep / self.face_width)
-
-    def of(self, place: tuple[int, ...]) -> LineContact:
-        """Return the contacts at a place, the first indices of the arrays [-]."""
-        return replace(self, force=self.force[place], stiffness=self.stiffness[place], slope=self.slope[place])
-
-    @property
-    def deformation(self) -> Float[np.ndarray, "*contacts"]:
-        """Compression at the deeper end, 0 without contact [m]."""
-        return np.asarray(self.peak * self.face_width / self.stiffness)
-
-    def line_load(self, position: Float[np.ndarray, " position"]) -> Float[np.ndarray, "*contacts position"]:
-        """Return the line load along the width at places from −b/2 to b/2, 0 in the middle of the tooth [m], [N/m]."""
-        slope = self.slope[..., np.newaxis]
-        below_the_end = 0.5 * self.face_width * np.abs(slope) - slope * position
-        rise = self.stiffness[..., np.newaxis] / self.face_width
-        return np.asarray(np.maximum(self.peak[..., np.newaxis] - rise * below_the_end, 0.0))
-
-
 def line_contact(equilibria: Equilibria, forces: Forces) -> LineContact:
     """Return the contacts of all pins and discs, [sample, angle, disc, pin].
 
@@ -407,6 +369,8 @@ def line_contact(equilibria: Equilibria, forces: Forces) -> LineContact:
     cosine, sine = (tables.turn[:, part, np.newaxis] for part in (0, 1))
     along_x, along_y = (tables.contact_by_disc[:, :, axis] for axis in (0, 1))
     slope = (sine * x + cosine * y)[..., np.newaxis] * along_x - (cosine * x - sine * y)[..., np.newaxis] * along_y
+    if equilibria.reducer.cycloid_stage.crowning:
+        return crowned_contact(equilibria.reducer, _pin_angles(equilibria), forces.pins, slope)
     return LineContact(
         force=forces.pins,
         stiffness=np.broadcast_to(tables.contact_stiffness.reshape(slope.shape[1:]), slope.shape),
@@ -416,9 +380,9 @@ def line_contact(equilibria: Equilibria, forces: Forces) -> LineContact:
 
 
 def peak_line_load(equilibria: Equilibria, forces: Forces) -> Float[np.ndarray, "sample angle disc pin"]:
-    """Return the largest line load of every pin and disc, the even one where no disc is tilted [N/m].
+    """Return the largest line load of every pin and disc, the even one where nothing is tilted or crowned [N/m].
 
-    F/b + C|γ|/2, own derivation; without tilt F/b.
+    F/b + C|γ|/2, own derivation; without tilt F/b; of crowned teeth that of `LineContact`.
 
     Examples
     --------
@@ -429,9 +393,9 @@ def peak_line_load(equilibria: Equilibria, forces: Forces) -> Float[np.ndarray, 
     >>> round(float(solved.forces.pins.max() / found.max()), 6)  # face width [m]
     0.01
     """
-    layout = equilibria.columns.layout
-    if not np.any(equilibria.columns.matrix[layout.tilt : layout.end] @ equilibria.errors.T):
-        return np.asarray(forces.pins / equilibria.reducer.cycloid_stage.face_width)
+    layout, stage = equilibria.columns.layout, equilibria.reducer.cycloid_stage
+    if not (stage.crowning or np.any(equilibria.columns.matrix[layout.tilt : layout.end] @ equilibria.errors.T)):
+        return np.asarray(forces.pins / stage.face_width)
     return line_contact(equilibria, forces).peak
 
 
@@ -452,11 +416,16 @@ def unit_pressure(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]
     >>> f"{found.max():.2e}"  # at the tip, where the tooth is most convex [Pa]
     '5.63e+06'
     """
-    reducer, at = equilibria.reducer, Positions(equilibria.reducer, equilibria.carrier_angle)
-    discs = [at.pin_direction - at.disc_direction(disc)[:, np.newaxis] for disc in range(reducer.disc_count)]
-    pin_angle, stage = np.stack(discs, axis=1), reducer.cycloid_stage
-    even = np.full_like(pin_angle, stage.face_width)
-    return peak_pressure(stage, reducer.contact_modulus, pin_angle, even)
+    reducer, pin_angle = equilibria.reducer, _pin_angles(equilibria)
+    even = np.full_like(pin_angle, reducer.cycloid_stage.face_width)
+    return peak_pressure(reducer.cycloid_stage, reducer.contact_modulus, pin_angle, even)
+
+
+def _pin_angles(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]:
+    """Return φ of every pin from the crank direction of every disc [rad]."""
+    at = Positions(equilibria.reducer, equilibria.carrier_angle)
+    discs = range(equilibria.reducer.disc_count)
+    return np.stack([at.pin_direction - at.disc_direction(disc)[:, np.newaxis] for disc in discs], axis=1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -501,7 +470,7 @@ def contact_pattern(
     SolveError
         No equilibrium at one of the angles.
 
-    Line load q(z) = C/b·max(0, s + γz) [N/m] and pressure √(q·E*/(πR)) [Pa], slice by slice (assumed).
+    Line load q(z) = C/b·max(0, s + γz − c(2z/b)²) [N/m] and pressure √(q·E*/(πR)) [Pa], slice by slice (assumed).
 
     References
     ----------

@@ -65,6 +65,10 @@ class CycloidStage:
     # [m]
     face_width: Annotated[float, Field(alias="face_width_mm", ge=0.5, le=200), times(MILLIMETRE)]
     disc_spacing: Annotated[float, Field(alias="disc_spacing_mm", ge=0, le=500), times(MILLIMETRE)] = 0.0
+    # Relief c of the teeth at either end of the width, c·(2z/b)² at z from the middle [m]
+    crowning: Annotated[float, Field(alias="crowning_um", ge=0, le=100), times(MICROMETRE)] = field(
+        default=0.0, repr=False
+    )
 
     @property
     def shortening(self) -> float:

@@ -367,6 +367,13 @@ class ModificationRecord(Record):
     profile: str = ""
 
 
+CROWNING = (
+    "the crowning of the teeth is felt by line load and pressure alone, by slices as stiff as the contact law at the "
+    "force of the pin; forces, twist and transmission error are those of the section in the middle over the whole width"
+)
+"""What is assumed of crowned teeth."""
+
+
 class _AnyReducerRecord(Record):
     """What the files of all families state."""
 
@@ -401,7 +408,7 @@ class _AnyReducerRecord(Record):
             "load": self.load,
             "friction": self.friction,
             "catalogue": self.catalogue,
-            "assumptions": self.assumptions,
+            "assumptions": (*self.assumptions, *([CROWNING] if self.cycloid_stage.crowning else [])),
         }
 
     def _require_catalogue(self, reducer: Reducer) -> None:

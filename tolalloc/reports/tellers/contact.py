@@ -213,11 +213,12 @@ def _largest(own: dict[str, Any], force_at: str = "", pressure_at: str = "") -> 
 def _profile_summary(found: Assessment) -> dict[str, float | str | None]:
     """Return profile and clearance, units in the names."""
     profile, clearance = found.profile, found.clearance
-    turned = profile.modification.rotation
+    turned, crowning = profile.modification.rotation, profile.stage.crowning
     return {
         "equidistant amount [µm]": profile.modification.equidistant / MICROMETRE,
         "shift amount [µm]": profile.modification.shift / MICROMETRE,
         **({"rotation amount [µrad]": turned / MICRORADIAN} if turned else {}),
+        **({"crowning at either end [µm]": crowning / MICROMETRE} if crowning else {}),
         "tip radius [mm]": profile.tip_radius / MILLIMETRE,
         "root radius [mm]": profile.root_radius / MILLIMETRE,
         "K1 at grinding [-]": profile.ground.shortening,
