@@ -138,6 +138,15 @@ def test_waves_and_stand_ins(model):
     assert len(names) == 3
 
 
+def test_crowning_is_part_of_what_tells_a_study_from_another(model):
+    def content(crowning):
+        reducer = replace(model.reducer, cycloid_stage=replace(model.reducer.cycloid_stage, crowning=crowning))
+        return repr(replace(model, kernel=replace(model.kernel, model=EquivalentModel(reducer))).content)
+
+    assert content(0.0) == repr(model.content)
+    assert len({content(crowning) for crowning in (0.0, 2e-6, 3e-6)}) == 3
+
+
 def bound(changed: dict[str, dict[str, object]]) -> ReducerModel:
     """Return the RV-20E at a table of all its sources, some of them changed."""
     drawing = ta.drawing("rv20e_all_sources")

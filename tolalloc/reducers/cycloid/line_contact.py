@@ -73,12 +73,12 @@ class LineContact:
         On either side of the deepest place the depth is p − gu − ku², k = 4c/b², over the length l up to where it ends
         or lifts; it adds C/b·l(p − gl/2 − kl²/3) to F. That is convex in p, so Newton's steps from above stay above.
         """
-        bend, deepest = self._bend, self._deepest
+        carries = ~(self.force <= 0.0)
+        bend, deepest, slope = self._bend, self._deepest[carries], np.abs(self.slope[carries])
         sides = np.stack([0.5 * self.face_width + deepest, 0.5 * self.face_width - deepest])
         # Fall per length at the deepest place: none unless that is an end.
-        fall = np.maximum(np.abs(self.slope) - bend * self.face_width, 0.0)
-        carries = ~(self.force <= 0.0)
-        asked = np.where(carries, self.force / self.stiffness, 1.0) * self.face_width
+        fall = np.maximum(slope - bend * self.face_width, 0.0)
+        asked = self.force[carries] / self.stiffness[carries] * self.face_width
         # From above: were the whole width to follow, its lifted part pulling, this depth would be asked for.
         depth = (asked + (sides**2 * (fall / 2.0 + bend * sides / 3.0)).sum(axis=0)) / self.face_width
         for _ in range(_STEPS):
@@ -88,7 +88,9 @@ class LineContact:
             depth = depth - step
             if not (np.abs(step) > _STILL * depth).any():
                 break
-        return np.where(carries, depth, 0.0)
+        found = np.zeros_like(self.force)
+        found[carries] = depth
+        return found
 
     def of(self, place: tuple[int, ...]) -> LineContact:
         """Return the contacts at a place, the first indices of the arrays [-]."""
