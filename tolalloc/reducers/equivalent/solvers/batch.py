@@ -25,15 +25,17 @@ from jaxtyping import Float, Int
 
 from tolalloc.reducers.cycloid.solvers import LINEAR
 from tolalloc.reducers.equivalent.solvers.contact_solver import PIVOT, ROUNDING, TOLERANCE
+from tolalloc.reducers.equivalent.solvers.play import bring_play, displace_play, list_touched, settle_with_play
 from tolalloc.reducers.equivalent.solvers.pressing import (
+    BEYOND,
     Pressing,
     VectorTables,
+    first_touch,
     make_pressing,
-    normal,
-    pole_moves,
     press,
 )
 from tolalloc.reducers.equivalent.solvers.simd import (
+    ALL,
     WIDTH,
     Common,
     above,
@@ -98,7 +100,7 @@ def make_batch(layout, size, contacts, samples):
         aligned(1, samples).reshape(samples),
         aligned(1, samples).reshape(samples),
         np.empty(samples, np.int64),
-        make_pressing(size, contacts),
+        make_pressing(3 * contacts // layout.pins, contacts),
         aligned(size, WIDTH),
         aligned(size, WIDTH),
     )
@@ -213,10 +215,12 @@ def _undisturbed(at, tables, layout, waves, teeth_deviate, flanks_turned, used, 
 
 
 @jit_within
-def _displace_nothing(at, tables, layout, rows, waves, teeth_deviate, flanks_turned, used, batch):
+def _displace_nothing(at, tables, layout, rows, waves, teeth_deviate, flanks_turned, used, batch, play):
     """Set all that the errors do at one node while the discs are undisplaced."""
     _forces(at, tables, rows, used, batch)
     _undisturbed(at, tables, layout, waves, teeth_deviate, flanks_turned, used, batch)
+    if play is not None:
+        displace_play(at, tables, layout, rows, used, batch.values, play)
 
 
 _LAST, _AHEAD, _HERE, _BEHIND = 0.3, 0.5, 0.35, -0.15
@@ -270,9 +274,8 @@ def _add(own, weight, kept, used, q, history):
 _FIRST_STEPS, _STEPS = 2, 10
 # Under a curved law, whose stiffness changes with every step
 _FIRST_CURVED_STEPS, _CURVED_STEPS = 4, 16
-_BEYOND = 1.000001  # of the way to the next contact
-ALL = 2**WIDTH - 1
-"""One bit for every lane."""
+# With elements with play, whose steps also go back
+_FIRST_STEPS_WITH_PLAY, _STEPS_WITH_PLAY = 4, 30
 
 
 @jit_within
@@ -304,32 +307,6 @@ def _balance(discs, stiffness, v, batch):
         cancelling, residual = larger(terms, cancelling), larger(magnitude(value), residual)
     allowed = larger(multiply(spread(TOLERANCE), largest), multiply(spread(ROUNDING), cancelling))
     return residual, allowed, largest
-
-
-@jit_in_place
-def _first_touch(discs, tables, v, batch, lanes):
-    """Return how many steps away the next pin touches in some lanes, and one bit per lane that meets one.
-
-    Quotients are compared by products, because a division takes as long as sixteen.
-    """
-    zero, contacts, found = spread(0.0), batch.undisturbed.shape[1], 0
-    gap, speed = spread(1.0), zero  # of the pin that touches first, as yet one that never does
-    pins, width = contacts // len(discs), batch.q.shape[1]
-    for d in range(len(discs)):
-        x, y = pole_moves(d, tables, batch.q, width, v)
-        along, across = pole_moves(d, tables, batch.step, WIDTH, 0)
-        for c in range(d * pins, d * pins + batch.pressing.looked_at[d]):
-            a, b = normal(tables, d, pins, c)
-            depth = fma(b, y, fma(a, x, load(batch.undisturbed, v * contacts + c * WIDTH)))
-            rate = fma(b, across, multiply(a, along))
-            meets = above(rate, zero) & (lanes & ~above(depth, zero))
-            if not meets:
-                continue
-            # −depth/rate < gap/speed
-            sooner = meets & above(multiply(gap, rate), multiply(subtract(zero, depth), speed))
-            gap, speed = choose(sooner, subtract(zero, depth), gap), choose(sooner, rate, speed)
-            found |= sooner
-    return divide(gap, choose(found, speed, spread(1.0))), found
 
 
 @jit_within
@@ -375,9 +352,9 @@ def settle(law, discs, tables, v, batch, done, steps):
         singular &= ALL ^ (done | careful)
         length = spread(1.0)
         if singular:
-            reach, met = _first_touch(discs, tables, v, batch, singular)
+            reach, met = first_touch(discs, tables, v, batch, singular)
             careful |= singular & (ALL ^ met)
-            length = choose(singular, multiply(spread(_BEYOND), reach), length)
+            length = choose(singular, multiply(spread(BEYOND), reach), length)
         moving = ALL ^ (done | careful)
         for i in range(3 * len(discs)):
             q = load(batch.q, i * width + v)
@@ -388,7 +365,7 @@ def settle(law, discs, tables, v, batch, done, steps):
 
 
 @jit_in_place
-def _bring_late(first, count, batch):
+def _bring_late(first, count, batch, play):
     """Put some of the late samples into the register behind the batch."""
     contacts = batch.undisturbed.shape[1]
     undisturbed = batch.undisturbed.reshape(batch.undisturbed.size)
@@ -399,6 +376,8 @@ def _bring_late(first, count, batch):
             undisturbed[late + c * WIDTH] = undisturbed[own + c * WIDTH]
         for i in range(batch.q.shape[0]):
             batch.q[i, LATE + lane], batch.force[i, LATE + lane] = batch.q[i, s], batch.force[i, s]
+        if play is not None:
+            bring_play(s, LATE + lane, play)
 
 
 @jit_in_place
@@ -412,7 +391,16 @@ def _take_back_late(first, count, batch):
 
 
 @jit_within
-def _settle_all(law, discs, here, samples, batch, careful):
+def settle_any(law, discs, tables, v, batch, play, done, among):
+    """Bring one register's samples to equilibrium, with elements with play or none; in few steps ``among`` all others."""
+    if play is None:
+        return settle(law, discs, tables, v, batch, done, _first_steps(law) if among else most_steps(law))
+    steps = _FIRST_STEPS_WITH_PLAY if among else _STEPS_WITH_PLAY
+    return settle_with_play(law, discs, tables, v, batch, play, done, steps)
+
+
+@jit_within
+def _settle_all(law, discs, here, samples, batch, play, careful):
     """Bring the first samples of a batch to equilibrium: register by register, then those that are late together."""
     late, brought, v = 0, 0, 0
     # One loop for both, so that `settle`, which is written out where it is called, is compiled once.
@@ -420,9 +408,9 @@ def _settle_all(law, discs, here, samples, batch, careful):
         among = v < samples
         count = WIDTH if among else min(late - brought, WIDTH)
         if not among:
-            _bring_late(brought, count, batch)
+            _bring_late(brought, count, batch, play)
         at, done = (v, 0) if among else (LATE, ALL ^ (2**count - 1))
-        left, hard = settle(law, discs, here, at, batch, done, _first_steps(law) if among else most_steps(law))
+        left, hard = settle_any(law, discs, here, at, batch, play, done, among)
         for lane in range(count):
             left_alone = ((hard if among else left) >> lane) & 1
             if among:
@@ -439,18 +427,24 @@ def _settle_all(law, discs, here, samples, batch, careful):
 
 
 @jit_within
-def solve_batch_at(law, discs, at, tables, layout, rows, waves, teeth_deviate, flanks_turned, samples, batch, careful):
+def solve_batch_at(
+    law, discs, at, tables, layout, rows, waves, teeth_deviate, flanks_turned, samples, batch, play, careful
+):  # fmt: skip
     """Solve the first samples of a batch at one node from the warm starts in ``batch.q``; set which need more care."""
     used = (samples + FOUR - 1) // FOUR * FOUR
-    _displace_nothing(at, tables, layout, rows, waves, teeth_deviate, flanks_turned, used, batch)
+    _displace_nothing(at, tables, layout, rows, waves, teeth_deviate, flanks_turned, used, batch, play)
     here = VectorTables(
         Common(tables.stiffness[at]),
         Common(tables.contact_by_disc[at]),
         Common(tables.pole_by_rotation[at]),
         Common(tables.contact_stiffness[at]),
         Common(tables.contact_log_length[at]),
+        Common(tables.play_by_retained[at]),
+        Common(tables.play_stiffness[at]),
     )
-    _settle_all(law, discs, here, samples, batch, careful)
+    if play is not None:
+        list_touched(here, play)
+    _settle_all(law, discs, here, samples, batch, play, careful)
     width = batch.q.shape[1]
     for v in range(0, samples, WIDTH):
         total = load(batch.rotation, v)
