@@ -25,7 +25,7 @@ from jaxtyping import Float, Int
 
 from tolalloc.reducers.cycloid.solvers import LINEAR
 from tolalloc.reducers.equivalent.solvers.contact_solver import PIVOT, ROUNDING, TOLERANCE
-from tolalloc.reducers.equivalent.solvers.play import bring_play, displace_play, list_touched, settle_with_play
+from tolalloc.reducers.equivalent.solvers.play import begin_search, bring_play, displace_play, list_touched, move_with_play
 from tolalloc.reducers.equivalent.solvers.pressing import (
     BEYOND,
     Pressing,
@@ -274,8 +274,6 @@ def _add(own, weight, kept, used, q, history):
 _FIRST_STEPS, _STEPS = 2, 10
 # Under a curved law, whose stiffness changes with every step
 _FIRST_CURVED_STEPS, _CURVED_STEPS = 4, 16
-# With elements with play, whose steps also go back
-_FIRST_STEPS_WITH_PLAY, _STEPS_WITH_PLAY = 4, 30
 
 
 @jit_within
@@ -348,7 +346,7 @@ def settle(law, discs, tables, v, batch, done, steps):
             break
         # A vanishing pivot is replaced by a small one.
         stiffness = batch.pressing.stiffness
-        singular = newton_step(discs, tables.stiffness, stiffness, batch.gradient, batch.step, PIVOT)
+        singular = newton_step(discs, (), tables.stiffness, stiffness, batch.gradient, batch.step, PIVOT)
         singular &= ALL ^ (done | careful)
         length = spread(1.0)
         if singular:
@@ -365,42 +363,27 @@ def settle(law, discs, tables, v, batch, done, steps):
 
 
 @jit_in_place
-def _bring_late(first, count, batch, play):
-    """Put some of the late samples into the register behind the batch."""
+def _bring(sample, lane, batch):
+    """Put a sample into a lane of the register behind the batch."""
     contacts = batch.undisturbed.shape[1]
     undisturbed = batch.undisturbed.reshape(batch.undisturbed.size)
-    for lane in range(count):
-        s = batch.late[first + lane]
-        own, late = (s // WIDTH * contacts) * WIDTH + s % WIDTH, LATE * contacts + lane
-        for c in range(contacts):
-            undisturbed[late + c * WIDTH] = undisturbed[own + c * WIDTH]
-        for i in range(batch.q.shape[0]):
-            batch.q[i, LATE + lane], batch.force[i, LATE + lane] = batch.q[i, s], batch.force[i, s]
-        if play is not None:
-            bring_play(s, LATE + lane, play)
+    own, late = (sample // WIDTH * contacts) * WIDTH + sample % WIDTH, LATE * contacts + lane
+    for c in range(contacts):
+        undisturbed[late + c * WIDTH] = undisturbed[own + c * WIDTH]
+    for i in range(batch.q.shape[0]):
+        batch.q[i, LATE + lane], batch.force[i, LATE + lane] = batch.q[i, sample], batch.force[i, sample]
 
 
 @jit_in_place
-def _take_back_late(first, count, batch):
-    """Put the late samples back into their own registers."""
-    for lane in range(count):
-        s = batch.late[first + lane]
-        batch.ratio[s], batch.touching[s] = batch.ratio[LATE + lane], batch.touching[LATE + lane]
-        for i in range(batch.q.shape[0]):
-            batch.q[i, s] = batch.q[i, LATE + lane]
+def _take_back(sample, lane, batch):
+    """Put a sample back into its own register."""
+    batch.ratio[sample], batch.touching[sample] = batch.ratio[LATE + lane], batch.touching[LATE + lane]
+    for i in range(batch.q.shape[0]):
+        batch.q[i, sample] = batch.q[i, LATE + lane]
 
 
 @jit_within
-def settle_any(law, discs, tables, v, batch, play, done, among):
-    """Bring one register's samples to equilibrium, with elements with play or none; in few steps ``among`` all others."""
-    if play is None:
-        return settle(law, discs, tables, v, batch, done, _first_steps(law) if among else most_steps(law))
-    steps = _FIRST_STEPS_WITH_PLAY if among else _STEPS_WITH_PLAY
-    return settle_with_play(law, discs, tables, v, batch, play, done, steps)
-
-
-@jit_within
-def _settle_all(law, discs, here, samples, batch, play, careful):
+def _settle_all(law, discs, here, samples, batch, careful):
     """Bring the first samples of a batch to equilibrium: register by register, then those that are late together."""
     late, brought, v = 0, 0, 0
     # One loop for both, so that `settle`, which is written out where it is called, is compiled once.
@@ -408,9 +391,10 @@ def _settle_all(law, discs, here, samples, batch, play, careful):
         among = v < samples
         count = WIDTH if among else min(late - brought, WIDTH)
         if not among:
-            _bring_late(brought, count, batch, play)
+            for lane in range(count):
+                _bring(batch.late[brought + lane], lane, batch)
         at, done = (v, 0) if among else (LATE, ALL ^ (2**count - 1))
-        left, hard = settle_any(law, discs, here, at, batch, play, done, among)
+        left, hard = settle(law, discs, here, at, batch, done, _first_steps(law) if among else most_steps(law))
         for lane in range(count):
             left_alone = ((hard if among else left) >> lane) & 1
             if among:
@@ -419,11 +403,36 @@ def _settle_all(law, discs, here, samples, batch, play, careful):
                 late += ((left & (ALL ^ hard)) >> lane) & 1
             else:
                 careful[batch.late[brought + lane]] = left_alone
+                _take_back(batch.late[brought + lane], lane, batch)
         if among:
             v += WIDTH
         else:
-            _take_back_late(brought, count, batch)
             brought += count
+
+
+@jit_within
+def _settle_in_turn(law, discs, here, samples, batch, play, careful):
+    """Bring the first samples of a batch to equilibrium, with elements with play: a lane that ends takes the next one.
+
+    They take from three steps to thirty, so that a register would wait for its slowest sample half of the time.
+    """
+    following, running = 0, 0
+    list_touched(here, play)
+    while running or following < samples:
+        for lane in range(WIDTH):
+            if not (running >> lane) & 1 and following < samples:
+                _bring(following, lane, batch)
+                bring_play(following, LATE + lane, play)
+                begin_search(lane, batch, play)
+                batch.late[lane] = following
+                running |= 1 << lane
+                following += 1
+        settled, hard = move_with_play(law, discs, here, LATE, batch, play, running)
+        for lane in range(WIDTH):
+            if ((settled | hard) >> lane) & 1:
+                careful[batch.late[lane]] = (hard >> lane) & 1
+                _take_back(batch.late[lane], lane, batch)
+        running &= ALL ^ (settled | hard)
 
 
 @jit_within
@@ -442,9 +451,10 @@ def solve_batch_at(
         Common(tables.play_by_retained[at]),
         Common(tables.play_stiffness[at]),
     )
-    if play is not None:
-        list_touched(here, play)
-    _settle_all(law, discs, here, samples, batch, play, careful)
+    if play is None:
+        _settle_all(law, discs, here, samples, batch, careful)
+    else:
+        _settle_in_turn(law, discs, here, samples, batch, play, careful)
     width = batch.q.shape[1]
     for v in range(0, samples, WIDTH):
         total = load(batch.rotation, v)

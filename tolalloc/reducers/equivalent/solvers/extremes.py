@@ -20,10 +20,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.reducers.equivalent.solvers.batch import settle_any
+from tolalloc.reducers.equivalent.solvers.batch import most_steps, settle
 from tolalloc.reducers.equivalent.solvers.contact_solver import values_of
 from tolalloc.reducers.equivalent.solvers.records import CONVERGED, MARGIN, NOT_FINITE, SolvedExtremes, SolvedTurn
-from tolalloc.reducers.equivalent.solvers.play import list_touched
+from tolalloc.reducers.equivalent.solvers.play import settle_with_play
 from tolalloc.reducers.equivalent.solvers.simd import ALL, WIDTH
 from tolalloc.reducers.equivalent.solvers.turn import batch_size, make_turn, solve_batch
 from tolalloc.reducers.equivalent.solvers.workspace import (
@@ -221,9 +221,11 @@ def _search_peaks(
         if not together | careful:
             return
         if together:
-            if play is not None:
-                list_touched(workspace.tables, play)
-            left, _ = settle_any(design.law, discs, workspace.tables, 0, batch, play, ALL ^ together, False)
+            if play is None:
+                done, steps = ALL ^ together, most_steps(design.law)
+                left, _ = settle(design.law, discs, workspace.tables, 0, batch, done, steps)
+            else:
+                left = settle_with_play(design.law, discs, workspace.tables, batch, play, together)
             careful |= left
         for lane in range(WIDTH):
             q = own.new_q[lane, own.half[lane]]
@@ -320,7 +322,8 @@ def refine(
     best, left_over = np.full((errors.shape[0], 2), -np.inf), np.zeros((errors.shape[0], 2))
     alone = _prepare(layout, mapped, errors, torque, turn, values, found)
     size, elements = turn.retained.shape[2], tables.play_stiffness.shape[1]
-    own, workspace = _make_searches(size), make_workspace(layout, size, contacts, elements)
+    coordinates = (0,) * size if elements else ()
+    own, workspace = _make_searches(size), make_workspace(layout, size, contacts, coordinates, elements)
     memory, play = make_memory(design.law, tables), workspace.play if elements else None
     given = (discs, alone, play, tables, layout, design, values, search, turn, best)
     highest = _highest(turn, found)

@@ -18,6 +18,7 @@ from tolalloc.reducers.equivalent.solvers.pressing import BEYOND, first_touch, p
 from tolalloc.reducers.equivalent.solvers.simd import (
     ALL,
     WIDTH,
+    Apart,
     above,
     add,
     aligned,
@@ -29,6 +30,7 @@ from tolalloc.reducers.equivalent.solvers.simd import (
     load,
     magnitude,
     multiply,
+    newton_step,
     root,
     spread,
     store,
@@ -42,6 +44,8 @@ _LEAST_SHARE = 0.1
 """Of a step that is left where it goes back [-]."""
 _LONGEST = 1e-3
 """Step beyond which a part is held by nothing, and goes to where the next pin touches [m]."""
+_LOOKS = 40
+"""At a lane's contacts, before it is left to the solver for one sample [-]."""
 _REACH = 1.0
 """Displacement of a disc beyond which nothing holds it [m]."""
 
@@ -49,31 +53,35 @@ _REACH = 1.0
 class Play(NamedTuple):
     """Elements with play of a batch, and the work space of one register; samples are the last axis."""
 
+    coordinates: tuple[int, ...]  # One entry for each retained coordinate: their number is part of the type [-]
     # Compression x, y of every element at undisplaced coordinates, and its clearance [m]
     offset: Float[np.ndarray, "row sample"]
     clearance: Float[np.ndarray, "element sample"]
     # The coordinates that each element touches, one element after another, and where each one's end
     coordinate: Int[np.ndarray, " touched"]
     end: Int[np.ndarray, " element"]
-    # Of one register: forces of all contacts [N], tangent by rows and its factors [N/m], two rows of one element [N/m]
+    # Of one register: forces of all contacts [N], lower tangent by rows [N/m], the next one of Newton's steps [m]
     force: Float[np.ndarray, "coordinate lane"]
     tangent: Float[np.ndarray, "entry lane"]
-    weighted: Float[np.ndarray, "row lane"]
-    step: Float[np.ndarray, "coordinate lane"]  # The next one of Newton's [m]
+    step: Float[np.ndarray, "coordinate lane"]
+    # The same: the energy's fall where the step began [N·m], how much of the step is gone, looks so far [-]
+    search: Float[np.ndarray, "3 lane"]
 
 
 @jit
-def make_play(size, elements, samples):
+def make_play(coordinates, elements, samples):
     """Return the room for a batch of so many samples."""
+    size = len(coordinates)
     return Play(
+        coordinates,
         aligned(2 * elements, samples),
         aligned(elements, samples),
         np.empty(elements * size, np.int64),
         np.zeros(elements, np.int64),
         aligned(size, WIDTH),
         aligned(size * size, WIDTH),
-        aligned(2 * size, WIDTH),
         aligned(size, WIDTH),
+        aligned(3, WIDTH),
     )
 
 
@@ -122,6 +130,15 @@ def bring_play(sample, lane, play):
         play.offset[row, lane] = play.offset[row, sample]
     for e in range(play.end.size):
         play.clearance[e, lane] = play.clearance[e, sample]
+
+
+@jit_in_place
+def begin_search(lane, batch, play):
+    """Let a lane begin where it stands."""
+    for i in range(batch.step.shape[0]):
+        batch.step[i, lane] = 0.0
+    for row in range(play.search.shape[0]):
+        play.search[row, lane] = 0.0
 
 
 @jit_within
@@ -210,41 +227,6 @@ def _balance(tables, v, largest, batch, play):
     return residual, allowed, largest
 
 
-@jit_in_place
-def _solve_tangent(gradient, play):
-    """Set Newton's next step; return one bit per lane with a vanishing pivot, which a small one replaces.
-
-    LDLᵀ·step = −gradient as in `newton_step`, for a number of coordinates that only a reducer's clearances tell. Column
-    by column, so that no product waits for the one before; −L stands above the diagonal, 1/D on it.
-    """
-    size, tangent, step, singular = play.force.shape[0], play.tangent, play.step, 0
-    least, one, zero = load(tangent, 0), spread(1.0), spread(0.0)
-    for i in range(1, size):
-        least = larger(load(tangent, i * (size + 1) * WIDTH), least)
-    least = multiply(spread(PIVOT), least)
-    for j in range(size):
-        pivot, value = load(tangent, j * (size + 1) * WIDTH), subtract(zero, load(gradient, j * WIDTH))
-        regular = above(pivot, least)
-        singular |= ALL ^ regular
-        inverse = divide(one, choose(regular, pivot, least))
-        store(tangent, j * (size + 1) * WIDTH, inverse)
-        for m in range(j):
-            value = fma(load(tangent, (m * size + j) * WIDTH), load(step, m * WIDTH), value)
-        store(step, j * WIDTH, value)
-        for i in range(j + 1, size):
-            own = load(tangent, (i * size + j) * WIDTH)
-            store(tangent, (j * size + i) * WIDTH, multiply(subtract(zero, own), inverse))
-            for k in range(j + 1, i + 1):
-                place = (i * size + k) * WIDTH
-                store(tangent, place, fma(own, load(tangent, (j * size + k) * WIDTH), load(tangent, place)))
-    for i in range(size - 1, -1, -1):
-        value = multiply(load(tangent, i * (size + 1) * WIDTH), load(step, i * WIDTH))
-        for m in range(i + 1, size):
-            value = fma(load(tangent, (i * size + m) * WIDTH), load(step, m * WIDTH), value)
-        store(step, i * WIDTH, value)
-    return singular
-
-
 @jit_within
 def _slope(gradient, step):
     """Return the energy's slope along the step."""
@@ -283,15 +265,6 @@ def _first_taut(tables, v, batch, play, lanes):
     return nearest, found
 
 
-@jit_within
-def _far(step):
-    """Return one bit per lane whose step leads farther than errors do: what it moves is held by nothing."""
-    longest = spread(0.0)
-    for i in range(step.shape[0]):
-        longest = larger(magnitude(load(step, i * WIDTH)), longest)
-    return above(longest, spread(_LONGEST))
-
-
 @jit_in_place
 def _curvature(step, play):
     """Return the energy's curvature along the step."""
@@ -306,51 +279,80 @@ def _curvature(step, play):
 
 
 @jit_within
-def settle_with_play(law, discs, tables, v, batch, play, done, steps):
-    """Bring one register's samples to equilibrium as `settle` does, with elements with play."""
-    zero, size, width = spread(0.0), batch.q.shape[0], batch.q.shape[1]
-    careful, fall, length = 0, zero, zero
+def _go_back(slope, back, batch, play):
+    """Shorten the step in some lanes; return by how much of it they move."""
+    length = load(play.search, WIDTH)
+    shorter = subtract(length, divide(slope, _curvature(batch.step, play)))
+    shorter = larger(shorter, multiply(spread(_LEAST_SHARE), length))
+    store(play.search, WIDTH, choose(back, shorter, length))
+    return choose(back, subtract(shorter, length), spread(0.0))
+
+
+@jit_within
+def _go_on(discs, tables, v, onward, batch, play):
+    """Begin Newton's next step in some lanes; return how much of it they move, and which nothing will hold."""
+    size, whole, unheld = play.force.shape[0], spread(1.0), 0
+    singular = newton_step((), play.coordinates, Apart(play.tangent), play.tangent, batch.gradient, play.step, PIVOT)
+    longest = spread(0.0)
     for i in range(size):
-        store(batch.step, i * WIDTH, zero)
-    for step in range(steps + 1):
-        touching, far = press(law, discs, tables, v, batch)
-        largest = larger(_begin_sums(discs, tables, batch, play), _press_elements(tables, v, batch, play))
-        residual, allowed, largest = _balance(tables, v, largest, batch, play)
-        fresh = (ALL ^ above(residual, allowed)) & (ALL ^ (done | careful | far))
-        if fresh:
-            ratio = choose(above(largest, zero), divide(residual, largest), zero)
-            store(batch.ratio, v, choose(fresh, ratio, load(batch.ratio, v)))
-            store(batch.touching, v, choose(fresh, touching, load(batch.touching, v)))
-            done |= fresh
-        moving = ALL ^ (done | careful)
-        if not moving or step == steps:
-            break
-        slope, change = _slope(batch.gradient, batch.step), zero
-        back = above(slope, multiply(spread(_ENOUGH), fall)) & moving
-        if back:
-            shorter = subtract(length, divide(slope, _curvature(batch.step, play)))
-            shorter = larger(shorter, multiply(spread(_LEAST_SHARE), length))
-            change, length = choose(back, subtract(shorter, length), zero), choose(back, shorter, length)
-        onward = moving & (ALL ^ back)
-        if onward:
-            singular = _solve_tangent(batch.gradient, play) & onward
-            for i in range(size):
-                own = choose(onward, load(play.step, i * WIDTH), load(batch.step, i * WIDTH))
-                store(batch.step, i * WIDTH, own)
-            fall = choose(onward, magnitude(_slope(batch.gradient, batch.step)), fall)
-            whole = spread(1.0)
-            loose = singular and singular & _far(batch.step)
-            if loose:
-                gap, met = first_touch(discs, tables, v, batch, loose)
-                tight, taut = _first_taut(tables, v, batch, play, loose)
-                sooner = taut & ((ALL ^ met) | above(gap, tight))
-                gap = choose(sooner, tight, gap)
-                careful |= loose & (ALL ^ (met | taut))
-                whole = choose(loose, multiply(spread(BEYOND), gap), whole)
-            change, length = choose(onward, whole, change), choose(onward, whole, length)
-        for i in range(size):
+        own = load(play.step, i * WIDTH)
+        longest = larger(magnitude(own), longest)
+        store(batch.step, i * WIDTH, choose(onward, own, load(batch.step, i * WIDTH)))
+    loose = singular & onward & above(longest, spread(_LONGEST))
+    if loose:
+        gap, met = first_touch(discs, tables, v, batch, loose)
+        tight, taut = _first_taut(tables, v, batch, play, loose)
+        gap = choose(taut & ((ALL ^ met) | above(gap, tight)), tight, gap)
+        unheld = loose & (ALL ^ (met | taut))
+        whole = choose(loose, multiply(spread(BEYOND), gap), whole)
+    fall = magnitude(_slope(batch.gradient, batch.step))
+    store(play.search, 0, choose(onward, fall, load(play.search, 0)))
+    store(play.search, WIDTH, choose(onward, whole, load(play.search, WIDTH)))
+    return whole, unheld
+
+
+@jit_in_place
+def move_with_play(law, discs, tables, v, batch, play, running):
+    """Look at one register's contacts where its lanes stand, and move them on or back.
+
+    Return one bit per lane that is settled, as `settle` says it, and one per lane that needs more care than more steps.
+    """
+    zero, width = spread(0.0), batch.q.shape[1]
+    touching, far = press(law, discs, tables, v, batch)
+    largest = larger(_begin_sums(discs, tables, batch, play), _press_elements(tables, v, batch, play))
+    residual, allowed, largest = _balance(tables, v, largest, batch, play)
+    settled = (ALL ^ above(residual, allowed)) & running & (ALL ^ far)
+    store(batch.ratio, v, choose(above(largest, zero), divide(residual, largest), zero))
+    store(batch.touching, v, touching)
+    looks = add(load(play.search, 2 * WIDTH), spread(1.0))
+    store(play.search, 2 * WIDTH, looks)
+    moving = running & (ALL ^ settled)
+    slope, change = _slope(batch.gradient, batch.step), zero
+    back = above(slope, multiply(spread(_ENOUGH), load(play.search, 0))) & moving
+    onward, careful = moving & (ALL ^ back), above(looks, spread(_LOOKS)) & moving
+    if back:
+        change = _go_back(slope, back, batch, play)
+    if onward:
+        whole, unheld = _go_on(discs, tables, v, onward, batch, play)
+        change, careful = choose(onward, whole, change), careful | unheld
+    if moving:
+        for i in range(play.force.shape[0]):
             q = load(batch.q, i * width + v)
             moved = choose(moving, fma(change, load(batch.step, i * WIDTH), q), q)
             store(batch.q, i * width + v, moved)
             careful |= moving & (ALL ^ above(spread(_REACH), magnitude(moved)))
-    return ALL ^ done, careful & (ALL ^ done)
+    return settled, careful
+
+
+@jit_in_place
+def settle_with_play(law, discs, tables, batch, play, running):
+    """Bring the lanes that run to equilibrium; return one bit per lane that is not settled."""
+    left = 0
+    list_touched(tables, play)
+    for lane in range(WIDTH):
+        begin_search(lane, batch, play)
+    while running:
+        settled, careful = move_with_play(law, discs, tables, 0, batch, play, running)
+        running &= ALL ^ (settled | careful)
+        left |= careful
+    return left
