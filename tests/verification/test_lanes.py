@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -23,10 +25,11 @@ from tolalloc.reducers.equivalent.solvers.batch import (
     start_next,
 )
 from tolalloc.reducers.equivalent.solvers.contact_solver import values_of
+from tolalloc.reducers.equivalent.solvers.play import make_play
 from tolalloc.reducers.equivalent.solvers.pressing import DEEPEST, line_contact
 from tolalloc.reducers.equivalent.solvers.simd import WIDTH, aligned, load, logarithm, spread, store
+from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.unit_file import load_unit
 from tolalloc.running.compiled import jit
 
 
@@ -73,16 +76,68 @@ def test_line_contact_is_the_law_of_one_pin(log_length, generator):
     np.testing.assert_allclose(slope[~deep], expected[~deep, 1], rtol=1e-13)
 
 
-def test_line_contact_has_the_same_bits_alone_and_among_others(generator):
-    model, unit = EquivalentModel(load_reducer("rv20e")), load_unit("table4")
-    own = unit.errors(model.columns, model.reducer.modification.deviations)
-    errors, angles = random_units(own, model.columns, generator, 21), 2 * np.pi * np.arange(30) / 936
+def reducer_of(name: str, clearance: float) -> Reducer:
+    """Return a preset, with a clearance of its crank–disc bearings [m]; the holes of `cd29` have theirs anyway."""
+    reducer = load_reducer(name)
+    return (
+        replace(reducer, clearances=replace(reducer.clearances, crank_disc_bearing=clearance)) if clearance else reducer
+    )
+
+
+def errors_of(model: EquivalentModel, count: int, generator: np.random.Generator) -> np.ndarray:
+    """Return units whose errors are normal, σ a micrometre or a microradian, but for the discs' tilt."""
+    errors = 1e-6 * generator.standard_normal((count, len(model.columns)))
+    errors[:, ["tilt" in name for name in model.columns]] = 0.0
+    for name, amount in model.reducer.modification.deviations.items():
+        errors[:, model.columns.index(name)] = amount
+    return errors
+
+
+@pytest.mark.parametrize(("name", "clearance"), [("rv20e", 0.0), ("rv20e", 2e-6), ("cd29", 0.0)])
+def test_units_have_the_same_bits_alone_and_among_others(name, clearance, generator):
+    model, angles = EquivalentModel(reducer_of(name, clearance)), 2 * np.pi * np.arange(30) / 936
+    errors = errors_of(model, 21, generator)
     together = model.equilibria(errors, -1.0, angles)
     assert (together.status == Status.CONVERGED).all()
     for rows in (slice(0, 1), slice(5, 14), slice(20, 21)):
         apart = model.equilibria(errors[rows], -1.0, angles)
         np.testing.assert_array_equal(apart.transmission_error, together.transmission_error[rows])
         np.testing.assert_array_equal(apart.retained, together.retained[rows])
+
+
+@pytest.mark.parametrize(("name", "clearance", "torque"), [("rv20e", 2e-6, -5.0), ("cd29", 0.0, -1.0)])
+def test_units_with_play_settle_in_their_register_where_the_solver_for_one_sample_does(
+    name, clearance, torque, generator
+):
+    """A disc tilted by nothing that is seen sends a unit to the solver for one sample."""
+    model, angles = EquivalentModel(reducer_of(name, clearance)), 2 * np.pi * np.arange(20) / 936
+    errors = errors_of(model, 40, generator)
+    careful = careful_with_play(model, errors, torque, angles[:1])
+    assert careful.mean() < 0.1
+    alone = errors.copy()
+    alone[:, next(i for i, column in enumerate(model.columns) if "tilt" in column)] = 1e-300
+    side_by_side, one_by_one = (model.equilibria(own, torque, angles) for own in (errors, alone))
+    assert (side_by_side.status == Status.CONVERGED).all()
+    assert side_by_side.residual.max() <= 1e-11
+    assert not np.array_equal(side_by_side.transmission_error, one_by_one.transmission_error)
+    np.testing.assert_allclose(
+        side_by_side.transmission_error, one_by_one.transmission_error, rtol=0, atol=1e-6 * ARCSECOND
+    )
+
+
+def careful_with_play(model: EquivalentModel, errors: np.ndarray, torque: float, angle: np.ndarray) -> np.ndarray:
+    """Return which units with play leave their register at an angle, from rest."""
+    columns, tables, samples = model.error_columns, model.tables_at(angle), len(errors)
+    layout, careful = columns.layout, np.empty(BATCH, np.bool_)
+    values, size = np.empty((samples, layout.end)), tables.load.shape[2]
+    values_of(errors, torque, layout, columns.map, values)
+    batch = make_batch(layout, size, tables.contact_stiffness.shape[1], ROW)
+    batch.values[:, :samples] = values.T
+    play = make_play((0,) * size, tables.play_stiffness.shape[1], ROW)
+    rows, waves = nonzero_rows(batch.values, 0, layout.torque + 1), nonzero_waves(layout, batch.values)
+    given = (tables, layout, rows, waves, True, np.any(batch.values[layout.flank] != 0.0))
+    solve_batch_at(model.design.law, (0, 0), 0, *given, samples, batch, play, careful)
+    return careful[:samples]
 
 
 def test_nearly_all_samples_settle_in_their_register(rv20e, table4, generator):
@@ -97,7 +152,7 @@ def test_nearly_all_samples_settle_in_their_register(rv20e, table4, generator):
     rows, waves = nonzero_rows(batch.values, 0, layout.torque + 1), nonzero_waves(layout, batch.values)
     teeth_deviate = np.any(batch.values[layout.tooth : layout.tilt] != 0.0)
     given = (tables, layout, rows, waves, teeth_deviate, np.any(batch.values[layout.flank] != 0.0))
-    solve_batch_at(LINEAR, (0, 0), 0, *given, BATCH, batch, careful)
+    solve_batch_at(LINEAR, (0, 0), 0, *given, BATCH, batch, None, careful)
     settled = ~careful
     found = rv20e.equilibria(units, -1.0, angle).transmission_error[:, 0]
     np.testing.assert_allclose(batch.rotation[:BATCH][settled], found[settled], rtol=1e-9)

@@ -25,7 +25,13 @@ from jaxtyping import Float, Int
 
 from tolalloc.reducers.cycloid.solvers import LINEAR
 from tolalloc.reducers.equivalent.solvers.contact_solver import PIVOT, ROUNDING, TOLERANCE
-from tolalloc.reducers.equivalent.solvers.play import begin_search, bring_play, displace_play, list_touched, move_with_play
+from tolalloc.reducers.equivalent.solvers.play import (
+    begin_search,
+    bring_play,
+    displace_play,
+    list_touched,
+    move_with_play,
+)
 from tolalloc.reducers.equivalent.solvers.pressing import (
     BEYOND,
     Pressing,

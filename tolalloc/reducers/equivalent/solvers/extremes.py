@@ -22,8 +22,8 @@ from jaxtyping import Float, Int
 
 from tolalloc.reducers.equivalent.solvers.batch import most_steps, settle
 from tolalloc.reducers.equivalent.solvers.contact_solver import values_of
-from tolalloc.reducers.equivalent.solvers.records import CONVERGED, MARGIN, NOT_FINITE, SolvedExtremes, SolvedTurn
 from tolalloc.reducers.equivalent.solvers.play import settle_with_play
+from tolalloc.reducers.equivalent.solvers.records import CONVERGED, MARGIN, NOT_FINITE, SolvedExtremes, SolvedTurn
 from tolalloc.reducers.equivalent.solvers.simd import ALL, WIDTH
 from tolalloc.reducers.equivalent.solvers.turn import batch_size, make_turn, solve_batch
 from tolalloc.reducers.equivalent.solvers.workspace import (

@@ -38,7 +38,7 @@ from tolalloc.reducers.equivalent.solvers.simd import (
 )
 from tolalloc.running.compiled import jit, jit_in_place, jit_within
 
-_ENOUGH = 0.1
+_ENOUGH = 0.5
 """Rise at the end of a step, over the fall at its beginning, up to which it is taken [-]."""
 _LEAST_SHARE = 0.1
 """Of a step that is left where it goes back [-]."""
@@ -90,6 +90,15 @@ def displace_play(at, tables, layout, rows, used, values, play):
     """Set clearances, and what the errors compress the elements by at one node while all coordinates are undisplaced.
 
     The sources of one element compress that one alone, so nearly all entries of the table are zero.
+
+    h = E·ε, and c = max(c, 0) [m], theory page (28), own derivation.
+
+    Examples
+    --------
+    What it adds up, a pin that stands 3 µm off and a hole that stands 1 µm off [µm]:
+
+    >>> float(np.round(np.array([1.0, -1.0]) @ np.array([3.0, 1.0]), 6))
+    2.0
     """
     table, width = tables.play_by_load[at], play.offset.shape[1]
     for e in range(play.end.size):
@@ -115,8 +124,9 @@ def list_touched(tables, play):
     size, count = play.force.shape[0], 0
     for e in range(play.end.size):
         for j in range(size):
-            along, across = entry(tables.play_by_retained, 2 * e * size + j), entry(
-                tables.play_by_retained, (2 * e + 1) * size + j
+            along, across = (
+                entry(tables.play_by_retained, 2 * e * size + j),
+                entry(tables.play_by_retained, (2 * e + 1) * size + j),
             )
             play.coordinate[count] = j
             count += above(larger(magnitude(along), magnitude(across)), spread(0.0)) != 0
@@ -316,6 +326,22 @@ def move_with_play(law, discs, tables, v, batch, play, running):
     """Look at one register's contacts where its lanes stand, and move them on or back.
 
     Return one bit per lane that is settled, as `settle` says it, and one per lane that needs more care than more steps.
+
+    Newton's method on S·q − f + Σ D·F(h + D·q) = 0 with the forces of theory page (28) among F; where the energy's slope
+    along the step has turned to more than half of the first fall, Newton's method on that slope.
+
+    References
+    ----------
+    Own derivation.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.equivalent.model import EquivalentModel
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> model = EquivalentModel(load_reducer("cd29"))
+    >>> found = model.equilibria(np.zeros((1, len(model.columns))), -60.0, np.zeros(1))
+    >>> bool(found.residual.max() <= 1e-11)
+    True
     """
     zero, width = spread(0.0), batch.q.shape[1]
     touching, far = press(law, discs, tables, v, batch)

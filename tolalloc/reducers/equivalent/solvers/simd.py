@@ -327,10 +327,10 @@ def count_bits(typing, bits):
 def newton_step(typing, discs, further, stiffness, contact, gradient, step, least):
     """Solve (S + contact stiffness)·step = −gradient in every lane; return one bit per lane with a vanishing pivot.
 
-    ``discs`` has one entry per disc, ``further`` one for each coordinate behind theirs, ``contact`` six rows per disc:
-    the lower triangle of its 3×3 block by rows. A pivot not above ``least`` of the largest diagonal entry is replaced by that. The factorisation LDLᵀ is written out
-    for the number of coordinates at hand, every factor a value of its own; loops through memory take three times as
-    long.
+    ``discs`` has one entry per disc, ``further`` one per coordinate behind theirs, ``contact`` six rows per disc: the
+    lower triangle of its 3×3 block by rows. A pivot not above ``least`` of the largest diagonal entry is replaced by
+    that. The factorisation LDLᵀ is written out for the number of coordinates at hand, every factor a value of its own;
+    loops through memory take three times as long.
 
     LDLᵀ·step = −gradient, own derivation of the replaced pivot; [N/m, N, m].
 
@@ -345,7 +345,9 @@ def newton_step(typing, discs, further, stiffness, contact, gradient, step, leas
     size = 3 * len(discs) + len(further)
 
     def emit(context, builder, signature, arguments):
-        kinds = dict(zip(("discs", "further", "stiffness", "contact", "gradient", "step", "least"), signature.args, strict=True))
+        kinds = dict(
+            zip(("discs", "further", "stiffness", "contact", "gradient", "step", "least"), signature.args, strict=True)
+        )
         given = dict(zip(kinds, arguments, strict=True))
 
         def at(name, row):

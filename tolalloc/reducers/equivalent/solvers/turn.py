@@ -1,6 +1,6 @@
 """All samples over a turn: batches of samples in parallel, each from its own last angle's equilibrium; their forces.
 
-Samples without play go side by side in registers; whatever needs more care goes one by one. Which way
+Samples go side by side in registers; whatever needs more care, and every tilted disc, goes one by one. Which way
 a sample goes depends on itself alone, so its bits do not depend on the batch that it is in.
 """
 
@@ -106,7 +106,10 @@ def _take_over(samples, angle, batch, turn):
 def _side_by_side(
     discs, coordinates, first, stride, turn_of_crank, tables, layout, mapped, design, errors, torque, turn
 ):  # fmt: skip
-    """Solve up to a batch of samples at every ``stride``-th node, side by side; no ``coordinates`` stand for no play."""
+    """Solve up to a batch of samples at every ``stride``-th node, side by side.
+
+    ``coordinates`` has one entry per retained coordinate where elements have play, and is nothing elsewhere.
+    """
     values = np.empty((errors.shape[0], layout.end))
     finite, memory = values_of(errors, torque, layout, mapped, values), make_memory(design.law, tables)
     samples, size, contacts = values.shape[0], turn.retained.shape[2], tables.contact_stiffness.shape[1]
@@ -116,10 +119,7 @@ def _side_by_side(
         np.empty(BATCH, np.bool_),
         np.zeros(BATCH, np.bool_),
     )
-    if coordinates is None:
-        play = None
-    else:
-        play = make_play(coordinates, tables.play_stiffness.shape[1], ROW)
+    play = None if coordinates is None else make_play(coordinates, tables.play_stiffness.shape[1], ROW)
     _fill_batch(layout, values, finite, used, batch, tilted)
     rows, waves = nonzero_rows(batch.values, 0, layout.torque + 1), nonzero_waves(layout, batch.values)
     teeth_deviate = np.any(batch.values[layout.tooth : layout.tilt] != 0.0)
