@@ -327,8 +327,8 @@ def move_with_play(law, discs, tables, v, batch, play, running):
 
     Return one bit per lane that is settled, as `settle` says it, and one per lane that needs more care than more steps.
 
-    Newton's method on S·q − f + Σ D·F(h + D·q) = 0 with the forces of theory page (28) among F; where the energy's slope
-    along the step has turned to more than half of the first fall, Newton's method on that slope.
+    Newton's method on S·q − f + Σ D·F(h + D·q) = 0 with the forces of theory page (28) among F; where the energy's
+    slope along the step has turned to more than half of its first fall, Newton's method on that slope.
 
     References
     ----------
