@@ -117,7 +117,7 @@ def test_units_with_play_settle_in_their_register_where_the_solver_for_one_sampl
     values = np.empty((samples, layout.end))
     values_of(errors_of(model, samples, generator), torque, layout, columns.map, values)
     batch = make_batch(layout, size, tables.contact_stiffness.shape[1], ROW)
-    play = make_play((0,) * size, tables.play_stiffness.shape[1], ROW)
+    play = make_play(size, tables.play_stiffness.shape[1], ROW)
     batch.values[:, :samples] = values.T
     rows, waves = nonzero_rows(batch.values, 0, layout.torque + 1), nonzero_waves(layout, batch.values)
     solve_batch_at(law, (0, 0), 0, tables, layout, rows, waves, True, True, samples, batch, play, careful)

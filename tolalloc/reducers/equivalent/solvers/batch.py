@@ -352,7 +352,7 @@ def settle(law, discs, tables, v, batch, done, steps):
             break
         # A vanishing pivot is replaced by a small one.
         stiffness = batch.pressing.stiffness
-        singular = newton_step(discs, (), tables.stiffness, stiffness, batch.gradient, batch.step, PIVOT)
+        singular = newton_step(discs, tables.stiffness, stiffness, batch.gradient, batch.step, PIVOT)
         singular &= ALL ^ (done | careful)
         length = spread(1.0)
         if singular:

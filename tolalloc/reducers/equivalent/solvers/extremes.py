@@ -322,8 +322,7 @@ def refine(
     best, left_over = np.full((errors.shape[0], 2), -np.inf), np.zeros((errors.shape[0], 2))
     alone = _prepare(layout, mapped, errors, torque, turn, values, found)
     size, elements = turn.retained.shape[2], tables.play_stiffness.shape[1]
-    coordinates = (0,) * size if elements else ()
-    own, workspace = _make_searches(size), make_workspace(layout, size, contacts, coordinates, elements)
+    own, workspace = _make_searches(size), make_workspace(layout, size, contacts, elements)
     memory, play = make_memory(design.law, tables), workspace.play if elements else None
     given = (discs, alone, play, tables, layout, design, values, search, turn, best)
     highest = _highest(turn, found)

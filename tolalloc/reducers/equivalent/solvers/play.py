@@ -18,7 +18,6 @@ from tolalloc.reducers.equivalent.solvers.pressing import BEYOND, first_touch, p
 from tolalloc.reducers.equivalent.solvers.simd import (
     ALL,
     WIDTH,
-    Apart,
     above,
     add,
     aligned,
@@ -30,7 +29,6 @@ from tolalloc.reducers.equivalent.solvers.simd import (
     load,
     magnitude,
     multiply,
-    newton_step,
     root,
     spread,
     store,
@@ -53,14 +51,13 @@ _REACH = 1.0
 class Play(NamedTuple):
     """Elements with play of a batch, and the work space of one register; samples are the last axis."""
 
-    coordinates: tuple[int, ...]  # One entry for each retained coordinate: their number is part of the type [-]
     # Compression x, y of every element at undisplaced coordinates, and its clearance [m]
     offset: Float[np.ndarray, "row sample"]
     clearance: Float[np.ndarray, "element sample"]
     # The coordinates that each element touches, one element after another, and where each one's end
     coordinate: Int[np.ndarray, " touched"]
     end: Int[np.ndarray, " element"]
-    # Of one register: forces of all contacts [N], lower tangent by rows [N/m], the next one of Newton's steps [m]
+    # Of one register: forces of all contacts [N], tangent by rows, the lower half [N/m], the next of Newton's steps [m]
     force: Float[np.ndarray, "coordinate lane"]
     tangent: Float[np.ndarray, "entry lane"]
     step: Float[np.ndarray, "coordinate lane"]
@@ -69,11 +66,9 @@ class Play(NamedTuple):
 
 
 @jit
-def make_play(coordinates, elements, samples):
+def make_play(size, elements, samples):
     """Return the room for a batch of so many samples."""
-    size = len(coordinates)
     return Play(
-        coordinates,
         aligned(2 * elements, samples),
         aligned(elements, samples),
         np.empty(elements * size, np.int64),
@@ -237,6 +232,48 @@ def _balance(tables, v, largest, batch, play):
     return residual, allowed, largest
 
 
+@jit_in_place
+def _solve_tangent(gradient, play):
+    """Set Newton's next step; return one bit per lane with a vanishing pivot, which a small one replaces.
+
+    LDLᵀ·step = −gradient as in `newton_step`, in loops: how many coordinates there are depends on which interfaces have
+    play, and code of its own for each number would take half a minute to compile. −Lᵀ stands above the diagonal, 1/D on
+    it; two rows at a time share what they load, the last one of an odd number with itself.
+    """
+    size, tangent, step, singular = play.force.shape[0], play.tangent, play.step, 0
+    least, one, zero = load(tangent, 0), spread(1.0), spread(0.0)
+    for i in range(1, size):
+        least = larger(load(tangent, i * (size + 1) * WIDTH), least)
+    least = multiply(spread(PIVOT), least)
+    for k in range(size):
+        pivot, value = load(tangent, k * (size + 1) * WIDTH), subtract(zero, load(gradient, k * WIDTH))
+        for j in range(k):
+            factor = load(tangent, (j * size + k) * WIDTH)
+            pivot = fma(load(tangent, (k * size + j) * WIDTH), factor, pivot)
+            value = fma(factor, load(step, j * WIDTH), value)
+        regular = above(pivot, least)
+        singular |= ALL ^ regular
+        inverse = divide(one, choose(regular, pivot, least))
+        store(tangent, k * (size + 1) * WIDTH, inverse)
+        store(step, k * WIDTH, value)
+        for i in range(k + 1, size, 2):
+            other = min(i + 1, size - 1)
+            a, b = load(tangent, (i * size + k) * WIDTH), load(tangent, (other * size + k) * WIDTH)
+            for j in range(k):
+                factor = load(tangent, (j * size + k) * WIDTH)
+                a = fma(load(tangent, (i * size + j) * WIDTH), factor, a)
+                b = fma(load(tangent, (other * size + j) * WIDTH), factor, b)
+            for row, own in ((i, a), (other, b)):
+                store(tangent, (row * size + k) * WIDTH, own)
+                store(tangent, (k * size + row) * WIDTH, multiply(subtract(zero, own), inverse))
+    for i in range(size - 1, -1, -1):
+        value = multiply(load(tangent, i * (size + 1) * WIDTH), load(step, i * WIDTH))
+        for m in range(i + 1, size):
+            value = fma(load(tangent, (i * size + m) * WIDTH), load(step, m * WIDTH), value)
+        store(step, i * WIDTH, value)
+    return singular
+
+
 @jit_within
 def _slope(gradient, step):
     """Return the energy's slope along the step."""
@@ -302,8 +339,7 @@ def _go_back(slope, back, batch, play):
 def _go_on(discs, tables, v, onward, batch, play):
     """Begin Newton's next step in some lanes; return how much of it they move, and which nothing will hold."""
     size, whole, unheld = play.force.shape[0], spread(1.0), 0
-    singular = newton_step((), play.coordinates, Apart(play.tangent), play.tangent, batch.gradient, play.step, PIVOT)
-    longest = spread(0.0)
+    singular, longest = _solve_tangent(batch.gradient, play), spread(0.0)
     for i in range(size):
         own = load(play.step, i * WIDTH)
         longest = larger(magnitude(own), longest)

@@ -324,13 +324,13 @@ def count_bits(typing, bits):
 
 
 @intrinsic
-def newton_step(typing, discs, further, stiffness, contact, gradient, step, least):
+def newton_step(typing, discs, stiffness, contact, gradient, step, least):
     """Solve (S + contact stiffness)·step = −gradient in every lane; return one bit per lane with a vanishing pivot.
 
-    ``discs`` has one entry per disc, ``further`` one per coordinate behind theirs, ``contact`` six rows per disc: the
-    lower triangle of its 3×3 block by rows. A pivot not above ``least`` of the largest diagonal entry is replaced by
-    that. The factorisation LDLᵀ is written out for the number of coordinates at hand, every factor a value of its own;
-    loops through memory take three times as long.
+    ``discs`` has one entry per disc, ``contact`` six rows per disc: the lower triangle of its 3×3 block by rows. A
+    pivot not above ``least`` of the largest diagonal entry is replaced by that. The factorisation LDLᵀ is written out
+    for the number of coordinates at hand, every factor a value of its own; loops through memory take three times as
+    long.
 
     LDLᵀ·step = −gradient, own derivation of the replaced pivot; [N/m, N, m].
 
@@ -342,12 +342,10 @@ def newton_step(typing, discs, further, stiffness, contact, gradient, step, leas
     >>> np.linalg.solve(np.array([[4.0, 2.0], [2.0, 3.0]]), np.array([8.0, 8.0])).round(9).tolist()
     [1.0, 2.0]
     """
-    size = 3 * len(discs) + len(further)
+    size = 3 * len(discs)
 
     def emit(context, builder, signature, arguments):
-        kinds = dict(
-            zip(("discs", "further", "stiffness", "contact", "gradient", "step", "least"), signature.args, strict=True)
-        )
+        kinds = dict(zip(("discs", "stiffness", "contact", "gradient", "step", "least"), signature.args, strict=True))
         given = dict(zip(kinds, arguments, strict=True))
 
         def at(name, row):
@@ -361,7 +359,7 @@ def newton_step(typing, discs, further, stiffness, contact, gradient, step, leas
             for j in range(i + 1):
                 place = ir.IntType(64)(i * size + j)
                 own = _entry(context, builder, kinds["stiffness"], given["stiffness"], place)
-                if i // 3 == j // 3 < len(discs):
+                if i // 3 == j // 3:
                     row = 6 * (i // 3) + (i % 3) * (i % 3 + 1) // 2 + j % 3
                     own = builder.fadd(own, builder.load(at("contact", row), align=8))
                 entry[i, j] = own
@@ -393,4 +391,4 @@ def newton_step(typing, discs, further, stiffness, contact, gradient, step, leas
             builder.store(value[i], at("step", i), align=8)
         return builder.zext(builder.bitcast(singular, ir.IntType(WIDTH)), ir.IntType(64))
 
-    return types.int64(discs, further, stiffness, contact, gradient, step, least), emit
+    return types.int64(discs, stiffness, contact, gradient, step, least), emit

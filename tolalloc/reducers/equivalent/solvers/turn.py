@@ -104,12 +104,9 @@ def _take_over(samples, angle, batch, turn):
 
 @jit
 def _side_by_side(
-    discs, coordinates, first, stride, turn_of_crank, tables, layout, mapped, design, errors, torque, turn
+    discs, elements, first, stride, turn_of_crank, tables, layout, mapped, design, errors, torque, turn
 ):  # fmt: skip
-    """Solve up to a batch of samples at every ``stride``-th node, side by side.
-
-    ``coordinates`` has one entry per retained coordinate where elements have play, and is nothing elsewhere.
-    """
+    """Solve up to a batch of samples at every ``stride``-th node, side by side; no ``elements`` without play."""
     values = np.empty((errors.shape[0], layout.end))
     finite, memory = values_of(errors, torque, layout, mapped, values), make_memory(design.law, tables)
     samples, size, contacts = values.shape[0], turn.retained.shape[2], tables.contact_stiffness.shape[1]
@@ -119,7 +116,7 @@ def _side_by_side(
         np.empty(BATCH, np.bool_),
         np.zeros(BATCH, np.bool_),
     )
-    play = None if coordinates is None else make_play(coordinates, tables.play_stiffness.shape[1], ROW)
+    play = None if elements is None else make_play(size, elements, ROW)
     _fill_batch(layout, values, finite, used, batch, tilted)
     rows, waves = nonzero_rows(batch.values, 0, layout.torque + 1), nonzero_waves(layout, batch.values)
     teeth_deviate = np.any(batch.values[layout.tooth : layout.tilt] != 0.0)
@@ -159,9 +156,9 @@ def solve_batch(
     A crank turns once in ``turn_of_crank`` of these nodes; 0 where that is no whole number, or they are not equally far
     apart.
     """
-    coordinates = (0,) * tables.load.shape[2] if tables.play_stiffness.shape[1] else None
+    elements = tables.play_stiffness.shape[1] or None
     given = (tables, layout, mapped, design, errors, torque)
-    _side_by_side(discs, coordinates, first, stride, turn_of_crank, *given, turn)
+    _side_by_side(discs, elements, first, stride, turn_of_crank, *given, turn)
 
 
 def solve_curves(

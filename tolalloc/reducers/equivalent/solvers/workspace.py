@@ -210,7 +210,7 @@ class Workspace(NamedTuple):
 
 
 @jit
-def make_workspace(layout, size, contacts, coordinates, elements):
+def make_workspace(layout, size, contacts, elements):
     """Return empty lanes."""
     discs, batch = contacts // layout.pins, make_batch(layout, size, contacts, WIDTH)
     batch.undisturbed[:] = _NOWHERE
@@ -225,7 +225,7 @@ def make_workspace(layout, size, contacts, coordinates, elements):
             Apart(aligned(elements, WIDTH)),
         ),
         batch,
-        make_play(coordinates, elements, WIDTH),
+        make_play(size, elements, WIDTH),
         np.full((WIDTH, _SLOTS), -1),
         np.empty((WIDTH, _SLOTS)),
         np.empty((WIDTH, _SLOTS, size)),
