@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -22,11 +24,13 @@ from tolalloc.reducers.equivalent.solvers.batch import (
     solve_batch_at,
     start_next,
 )
-from tolalloc.reducers.equivalent.solvers.contact_solver import values_of
+from tolalloc.reducers.equivalent.solvers.contact_solver import solve_at_node, values_of
+from tolalloc.reducers.equivalent.solvers.play import make_play
 from tolalloc.reducers.equivalent.solvers.pressing import DEEPEST, line_contact
 from tolalloc.reducers.equivalent.solvers.simd import WIDTH, aligned, load, logarithm, spread, store
+from tolalloc.reducers.equivalent.solvers.workspace import make_memory
+from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.unit_file import load_unit
 from tolalloc.running.compiled import jit
 
 
@@ -73,16 +77,58 @@ def test_line_contact_is_the_law_of_one_pin(log_length, generator):
     np.testing.assert_allclose(slope[~deep], expected[~deep, 1], rtol=1e-13)
 
 
-def test_line_contact_has_the_same_bits_alone_and_among_others(generator):
-    model, unit = EquivalentModel(load_reducer("rv20e")), load_unit("table4")
-    own = unit.errors(model.columns, model.reducer.modification.deviations)
-    errors, angles = random_units(own, model.columns, generator, 21), 2 * np.pi * np.arange(30) / 936
+def reducer_of(name: str, clearance: float) -> Reducer:
+    """Return a preset, with a clearance of its crank–disc bearings [m]; the holes of `cd29` have theirs anyway."""
+    reducer = load_reducer(name)
+    return (
+        replace(reducer, clearances=replace(reducer.clearances, crank_disc_bearing=clearance)) if clearance else reducer
+    )
+
+
+def errors_of(model: EquivalentModel, count: int, generator: np.random.Generator) -> np.ndarray:
+    """Return units whose errors are normal, σ a micrometre or a microradian, but for the discs' tilt."""
+    errors = 1e-6 * generator.standard_normal((count, len(model.columns)))
+    errors[:, ["tilt" in name for name in model.columns]] = 0.0
+    for name, amount in model.reducer.modification.deviations.items():
+        errors[:, model.columns.index(name)] = amount
+    return errors
+
+
+@pytest.mark.parametrize(("name", "clearance"), [("rv20e", 0.0), ("rv20e", 2e-6), ("cd29", 0.0)])
+def test_units_have_the_same_bits_alone_and_among_others(name, clearance, generator):
+    model, angles = EquivalentModel(reducer_of(name, clearance)), 2 * np.pi * np.arange(30) / 936
+    errors = errors_of(model, 21, generator)
     together = model.equilibria(errors, -1.0, angles)
     assert (together.status == Status.CONVERGED).all()
     for rows in (slice(0, 1), slice(5, 14), slice(20, 21)):
         apart = model.equilibria(errors[rows], -1.0, angles)
         np.testing.assert_array_equal(apart.transmission_error, together.transmission_error[rows])
         np.testing.assert_array_equal(apart.retained, together.retained[rows])
+
+
+@pytest.mark.parametrize(("name", "clearance", "torque"), [("rv20e", 2e-6, -5.0), ("cd29", 0.0, -1.0)])
+def test_units_with_play_settle_in_their_register_where_the_solver_for_one_sample_does(
+    name, clearance, torque, generator
+):
+    """From rest, which is farther than any guess; a wrong tangent would leave them to the solver for one sample."""
+    model, samples, angle = EquivalentModel(reducer_of(name, clearance)), 64, np.array([0.3])
+    columns, tables, law = model.error_columns, model.tables_at(angle), model.design.law
+    layout, careful, size = columns.layout, np.empty(BATCH, np.bool_), tables.load.shape[2]
+    values = np.empty((samples, layout.end))
+    values_of(errors_of(model, samples, generator), torque, layout, columns.map, values)
+    batch = make_batch(layout, size, tables.contact_stiffness.shape[1], ROW)
+    play = make_play(size, tables.play_stiffness.shape[1], ROW)
+    batch.values[:, :samples] = values.T
+    rows, waves = nonzero_rows(batch.values, 0, layout.torque + 1), nonzero_waves(layout, batch.values)
+    solve_batch_at(law, (0, 0), 0, tables, layout, rows, waves, True, True, samples, batch, play, careful)
+    settled, memory = np.flatnonzero(~careful[:samples]), make_memory(law, tables)
+    assert settled.size > 0.9 * samples
+    assert batch.ratio[settled].max() <= 1e-11
+    for s in settled:
+        start, face_width = np.zeros(size), model.design.face_width
+        rotation, status, *_ = solve_at_node(0, tables, layout, face_width, values[s], start, *memory[:2])
+        assert status == Status.CONVERGED
+        assert batch.rotation[s] == pytest.approx(rotation, rel=0, abs=1e-6 * ARCSECOND)
 
 
 def test_nearly_all_samples_settle_in_their_register(rv20e, table4, generator):
@@ -97,7 +143,7 @@ def test_nearly_all_samples_settle_in_their_register(rv20e, table4, generator):
     rows, waves = nonzero_rows(batch.values, 0, layout.torque + 1), nonzero_waves(layout, batch.values)
     teeth_deviate = np.any(batch.values[layout.tooth : layout.tilt] != 0.0)
     given = (tables, layout, rows, waves, teeth_deviate, np.any(batch.values[layout.flank] != 0.0))
-    solve_batch_at(LINEAR, (0, 0), 0, *given, BATCH, batch, careful)
+    solve_batch_at(LINEAR, (0, 0), 0, *given, BATCH, batch, None, careful)
     settled = ~careful
     found = rv20e.equilibria(units, -1.0, angle).transmission_error[:, 0]
     np.testing.assert_allclose(batch.rotation[:BATCH][settled], found[settled], rtol=1e-9)

@@ -25,15 +25,23 @@ from jaxtyping import Float, Int
 
 from tolalloc.reducers.cycloid.solvers import LINEAR
 from tolalloc.reducers.equivalent.solvers.contact_solver import PIVOT, ROUNDING, TOLERANCE
+from tolalloc.reducers.equivalent.solvers.play import (
+    begin_search,
+    bring_play,
+    displace_play,
+    list_touched,
+    move_with_play,
+)
 from tolalloc.reducers.equivalent.solvers.pressing import (
+    BEYOND,
     Pressing,
     VectorTables,
+    first_touch,
     make_pressing,
-    normal,
-    pole_moves,
     press,
 )
 from tolalloc.reducers.equivalent.solvers.simd import (
+    ALL,
     WIDTH,
     Common,
     above,
@@ -98,7 +106,7 @@ def make_batch(layout, size, contacts, samples):
         aligned(1, samples).reshape(samples),
         aligned(1, samples).reshape(samples),
         np.empty(samples, np.int64),
-        make_pressing(size, contacts),
+        make_pressing(3 * contacts // layout.pins, contacts),
         aligned(size, WIDTH),
         aligned(size, WIDTH),
     )
@@ -213,10 +221,12 @@ def _undisturbed(at, tables, layout, waves, teeth_deviate, flanks_turned, used, 
 
 
 @jit_within
-def _displace_nothing(at, tables, layout, rows, waves, teeth_deviate, flanks_turned, used, batch):
+def _displace_nothing(at, tables, layout, rows, waves, teeth_deviate, flanks_turned, used, batch, play):
     """Set all that the errors do at one node while the discs are undisplaced."""
     _forces(at, tables, rows, used, batch)
     _undisturbed(at, tables, layout, waves, teeth_deviate, flanks_turned, used, batch)
+    if play is not None:
+        displace_play(at, tables, layout, rows, used, batch.values, play)
 
 
 _LAST, _AHEAD, _HERE, _BEHIND = 0.3, 0.5, 0.35, -0.15
@@ -270,9 +280,6 @@ def _add(own, weight, kept, used, q, history):
 _FIRST_STEPS, _STEPS = 2, 10
 # Under a curved law, whose stiffness changes with every step
 _FIRST_CURVED_STEPS, _CURVED_STEPS = 4, 16
-_BEYOND = 1.000001  # of the way to the next contact
-ALL = 2**WIDTH - 1
-"""One bit for every lane."""
 
 
 @jit_within
@@ -304,32 +311,6 @@ def _balance(discs, stiffness, v, batch):
         cancelling, residual = larger(terms, cancelling), larger(magnitude(value), residual)
     allowed = larger(multiply(spread(TOLERANCE), largest), multiply(spread(ROUNDING), cancelling))
     return residual, allowed, largest
-
-
-@jit_in_place
-def _first_touch(discs, tables, v, batch, lanes):
-    """Return how many steps away the next pin touches in some lanes, and one bit per lane that meets one.
-
-    Quotients are compared by products, because a division takes as long as sixteen.
-    """
-    zero, contacts, found = spread(0.0), batch.undisturbed.shape[1], 0
-    gap, speed = spread(1.0), zero  # of the pin that touches first, as yet one that never does
-    pins, width = contacts // len(discs), batch.q.shape[1]
-    for d in range(len(discs)):
-        x, y = pole_moves(d, tables, batch.q, width, v)
-        along, across = pole_moves(d, tables, batch.step, WIDTH, 0)
-        for c in range(d * pins, d * pins + batch.pressing.looked_at[d]):
-            a, b = normal(tables, d, pins, c)
-            depth = fma(b, y, fma(a, x, load(batch.undisturbed, v * contacts + c * WIDTH)))
-            rate = fma(b, across, multiply(a, along))
-            meets = above(rate, zero) & (lanes & ~above(depth, zero))
-            if not meets:
-                continue
-            # −depth/rate < gap/speed
-            sooner = meets & above(multiply(gap, rate), multiply(subtract(zero, depth), speed))
-            gap, speed = choose(sooner, subtract(zero, depth), gap), choose(sooner, rate, speed)
-            found |= sooner
-    return divide(gap, choose(found, speed, spread(1.0))), found
 
 
 @jit_within
@@ -375,9 +356,9 @@ def settle(law, discs, tables, v, batch, done, steps):
         singular &= ALL ^ (done | careful)
         length = spread(1.0)
         if singular:
-            reach, met = _first_touch(discs, tables, v, batch, singular)
+            reach, met = first_touch(discs, tables, v, batch, singular)
             careful |= singular & (ALL ^ met)
-            length = choose(singular, multiply(spread(_BEYOND), reach), length)
+            length = choose(singular, multiply(spread(BEYOND), reach), length)
         moving = ALL ^ (done | careful)
         for i in range(3 * len(discs)):
             q = load(batch.q, i * width + v)
@@ -388,27 +369,23 @@ def settle(law, discs, tables, v, batch, done, steps):
 
 
 @jit_in_place
-def _bring_late(first, count, batch):
-    """Put some of the late samples into the register behind the batch."""
+def _bring(sample, lane, batch):
+    """Put a sample into a lane of the register behind the batch."""
     contacts = batch.undisturbed.shape[1]
     undisturbed = batch.undisturbed.reshape(batch.undisturbed.size)
-    for lane in range(count):
-        s = batch.late[first + lane]
-        own, late = (s // WIDTH * contacts) * WIDTH + s % WIDTH, LATE * contacts + lane
-        for c in range(contacts):
-            undisturbed[late + c * WIDTH] = undisturbed[own + c * WIDTH]
-        for i in range(batch.q.shape[0]):
-            batch.q[i, LATE + lane], batch.force[i, LATE + lane] = batch.q[i, s], batch.force[i, s]
+    own, late = (sample // WIDTH * contacts) * WIDTH + sample % WIDTH, LATE * contacts + lane
+    for c in range(contacts):
+        undisturbed[late + c * WIDTH] = undisturbed[own + c * WIDTH]
+    for i in range(batch.q.shape[0]):
+        batch.q[i, LATE + lane], batch.force[i, LATE + lane] = batch.q[i, sample], batch.force[i, sample]
 
 
 @jit_in_place
-def _take_back_late(first, count, batch):
-    """Put the late samples back into their own registers."""
-    for lane in range(count):
-        s = batch.late[first + lane]
-        batch.ratio[s], batch.touching[s] = batch.ratio[LATE + lane], batch.touching[LATE + lane]
-        for i in range(batch.q.shape[0]):
-            batch.q[i, s] = batch.q[i, LATE + lane]
+def _take_back(sample, lane, batch):
+    """Put a sample back into its own register."""
+    batch.ratio[sample], batch.touching[sample] = batch.ratio[LATE + lane], batch.touching[LATE + lane]
+    for i in range(batch.q.shape[0]):
+        batch.q[i, sample] = batch.q[i, LATE + lane]
 
 
 @jit_within
@@ -420,7 +397,8 @@ def _settle_all(law, discs, here, samples, batch, careful):
         among = v < samples
         count = WIDTH if among else min(late - brought, WIDTH)
         if not among:
-            _bring_late(brought, count, batch)
+            for lane in range(count):
+                _bring(batch.late[brought + lane], lane, batch)
         at, done = (v, 0) if among else (LATE, ALL ^ (2**count - 1))
         left, hard = settle(law, discs, here, at, batch, done, _first_steps(law) if among else most_steps(law))
         for lane in range(count):
@@ -431,26 +409,58 @@ def _settle_all(law, discs, here, samples, batch, careful):
                 late += ((left & (ALL ^ hard)) >> lane) & 1
             else:
                 careful[batch.late[brought + lane]] = left_alone
+                _take_back(batch.late[brought + lane], lane, batch)
         if among:
             v += WIDTH
         else:
-            _take_back_late(brought, count, batch)
             brought += count
 
 
 @jit_within
-def solve_batch_at(law, discs, at, tables, layout, rows, waves, teeth_deviate, flanks_turned, samples, batch, careful):
+def _settle_in_turn(law, discs, here, samples, batch, play, careful):
+    """Bring the first samples of a batch to equilibrium, with elements with play: a lane that ends takes the next one.
+
+    They take from three steps to thirty, so that a register would wait for its slowest sample half of the time.
+    """
+    following, running = 0, 0
+    list_touched(here, play)
+    while running or following < samples:
+        for lane in range(WIDTH):
+            if not (running >> lane) & 1 and following < samples:
+                _bring(following, lane, batch)
+                bring_play(following, LATE + lane, play)
+                begin_search(lane, batch, play)
+                batch.late[lane] = following
+                running |= 1 << lane
+                following += 1
+        settled, hard = move_with_play(law, discs, here, LATE, batch, play, running)
+        for lane in range(WIDTH):
+            if ((settled | hard) >> lane) & 1:
+                careful[batch.late[lane]] = (hard >> lane) & 1
+                _take_back(batch.late[lane], lane, batch)
+        running &= ALL ^ (settled | hard)
+
+
+@jit_within
+def solve_batch_at(
+    law, discs, at, tables, layout, rows, waves, teeth_deviate, flanks_turned, samples, batch, play, careful
+):  # fmt: skip
     """Solve the first samples of a batch at one node from the warm starts in ``batch.q``; set which need more care."""
     used = (samples + FOUR - 1) // FOUR * FOUR
-    _displace_nothing(at, tables, layout, rows, waves, teeth_deviate, flanks_turned, used, batch)
+    _displace_nothing(at, tables, layout, rows, waves, teeth_deviate, flanks_turned, used, batch, play)
     here = VectorTables(
         Common(tables.stiffness[at]),
         Common(tables.contact_by_disc[at]),
         Common(tables.pole_by_rotation[at]),
         Common(tables.contact_stiffness[at]),
         Common(tables.contact_log_length[at]),
+        Common(tables.play_by_retained[at]),
+        Common(tables.play_stiffness[at]),
     )
-    _settle_all(law, discs, here, samples, batch, careful)
+    if play is None:
+        _settle_all(law, discs, here, samples, batch, careful)
+    else:
+        _settle_in_turn(law, discs, here, samples, batch, play, careful)
     width = batch.q.shape[1]
     for v in range(0, samples, WIDTH):
         total = load(batch.rotation, v)

@@ -20,10 +20,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.reducers.equivalent.solvers.batch import ALL, most_steps, settle
+from tolalloc.reducers.equivalent.solvers.batch import most_steps, settle
 from tolalloc.reducers.equivalent.solvers.contact_solver import values_of
+from tolalloc.reducers.equivalent.solvers.play import settle_with_play
 from tolalloc.reducers.equivalent.solvers.records import CONVERGED, MARGIN, NOT_FINITE, SolvedExtremes, SolvedTurn
-from tolalloc.reducers.equivalent.solvers.simd import WIDTH
+from tolalloc.reducers.equivalent.solvers.simd import ALL, WIDTH
 from tolalloc.reducers.equivalent.solvers.turn import batch_size, make_turn, solve_batch
 from tolalloc.reducers.equivalent.solvers.workspace import (
     fill_lane,
@@ -202,7 +203,7 @@ def _fill_all(alone, law, tables, layout, values, peaks, own, workspace):
 
 @jit_in_place
 def _search_peaks(
-    discs, alone, tables, layout, design, values, search, turn, best, peaks, own, memory, workspace, found
+    discs, alone, play, tables, layout, design, values, search, turn, best, peaks, own, memory, workspace, found
 ):
     """Search around all peaks, the lanes taking one after another.
 
@@ -220,7 +221,11 @@ def _search_peaks(
         if not together | careful:
             return
         if together:
-            left, _ = settle(design.law, discs, workspace.tables, 0, batch, ALL ^ together, most_steps(design.law))
+            if play is None:
+                done, steps = ALL ^ together, most_steps(design.law)
+                left, _ = settle(design.law, discs, workspace.tables, 0, batch, done, steps)
+            else:
+                left = settle_with_play(design.law, discs, workspace.tables, batch, play, together)
             careful |= left
         for lane in range(WIDTH):
             q = own.new_q[lane, own.half[lane]]
@@ -285,7 +290,7 @@ def _keep_best(peaks, best, left_over, found):
 
 
 @jit
-def _prepare(layout, mapped, errors, torque, elements, turn, values, found):
+def _prepare(layout, mapped, errors, torque, turn, values, found):
     """Set the values of all samples and what their coarse turns say; return which are solved one by one."""
     alone = np.empty(errors.shape[0], np.bool_)
     values_of(errors, torque, layout, mapped, values)
@@ -293,7 +298,7 @@ def _prepare(layout, mapped, errors, torque, elements, turn, values, found):
         found.solves[s] = turn.rotation.shape[1]
         found.status[s], found.residual[s] = turn.status[s].max(), turn.residual[s].max()
         found.extreme[s], found.position[s] = np.nan, np.nan
-        alone[s] = elements > 0 or np.any(values[s, layout.tilt :] != 0.0)
+        alone[s] = np.any(values[s, layout.tilt :] != 0.0)
     return alone
 
 
@@ -315,10 +320,11 @@ def refine(
     """
     contacts, values = tables.contact_stiffness.shape[1], np.empty((errors.shape[0], layout.end))
     best, left_over = np.full((errors.shape[0], 2), -np.inf), np.zeros((errors.shape[0], 2))
-    alone = _prepare(layout, mapped, errors, torque, tables.play_stiffness.shape[1], turn, values, found)
-    own, workspace = _make_searches(turn.retained.shape[2]), make_workspace(layout, 3 * len(discs), contacts)
-    memory = make_memory(design.law, tables)
-    given = (discs, alone, tables, layout, design, values, search, turn, best)
+    alone = _prepare(layout, mapped, errors, torque, turn, values, found)
+    size, elements = turn.retained.shape[2], tables.play_stiffness.shape[1]
+    own, workspace = _make_searches(size), make_workspace(layout, size, contacts, elements)
+    memory, play = make_memory(design.law, tables), workspace.play if elements else None
+    given = (discs, alone, play, tables, layout, design, values, search, turn, best)
     highest = _highest(turn, found)
     _search_peaks(*given, highest, own, memory, workspace, found)
     _keep_best(highest, best, left_over, found)

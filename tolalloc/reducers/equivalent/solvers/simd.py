@@ -21,6 +21,9 @@ from tolalloc.running.compiled import jit, processor
 WIDTH = 8
 """Samples side by side."""
 
+ALL = 2**WIDTH - 1
+"""One bit for every lane."""
+
 _MOVES_LANES = "+avx512f" in processor()["features"]
 """Whether one instruction of the processor moves chosen numbers of a register together, or apart."""
 
@@ -212,6 +215,16 @@ def magnitude(typing, a):
 
     def emit(context, builder, signature, arguments):
         return _call(builder, "fabs", arguments)
+
+    return vector(vector), emit
+
+
+@intrinsic
+def root(typing, a):
+    """Return the square roots."""
+
+    def emit(context, builder, signature, arguments):
+        return _call(builder, "sqrt", arguments)
 
     return vector(vector), emit
 

@@ -1,6 +1,6 @@
 """All samples over a turn: batches of samples in parallel, each from its own last angle's equilibrium; their forces.
 
-Samples without play go side by side in registers; whatever needs more care goes one by one. Which way
+Samples go side by side in registers; whatever needs more care, and every tilted disc, goes one by one. Which way
 a sample goes depends on itself alone, so its bits do not depend on the batch that it is in.
 """
 
@@ -29,6 +29,7 @@ from tolalloc.reducers.equivalent.solvers.contact_solver import (
     solve_at_node,
     values_of,
 )
+from tolalloc.reducers.equivalent.solvers.play import make_play
 from tolalloc.reducers.equivalent.solvers.records import CONVERGED, NOT_FINITE, SolvedTurn
 from tolalloc.reducers.equivalent.solvers.workspace import make_memory
 from tolalloc.running.compiled import in_threads, jit, jit_in_place, thread_count
@@ -52,21 +53,6 @@ _AT_ONCE = 8  # samples whose forces a thread takes together
 def _give_up(turn, s):
     turn.rotation[s], turn.residual[s], turn.status[s], turn.touching[s] = np.nan, np.inf, NOT_FINITE, 0
     turn.retained[s] = np.nan
-
-
-@jit
-def _one_by_one(first, stride, tables, layout, mapped, design, errors, torque, turn):
-    """Solve some samples at every ``stride``-th node, one after another; the tables of a node stay in the cache."""
-    values = np.empty((errors.shape[0], layout.end))
-    finite, memory = values_of(errors, torque, layout, mapped, values), make_memory(design.law, tables)
-    start = np.zeros((values.shape[0], turn.retained.shape[2]))
-    for s in range(values.shape[0]):
-        if not finite[s]:
-            _give_up(turn, s)
-    for angle in range(turn.rotation.shape[1]):
-        for s in range(values.shape[0]):
-            if finite[s]:
-                _alone(s, angle, first + angle * stride, tables, layout, design, values, start[s], memory, turn)
 
 
 @jit
@@ -117,8 +103,10 @@ def _take_over(samples, angle, batch, turn):
 
 
 @jit
-def _side_by_side(discs, first, stride, turn_of_crank, tables, layout, mapped, design, errors, torque, turn):
-    """Solve up to a batch of samples at every ``stride``-th node, side by side."""
+def _side_by_side(
+    discs, elements, first, stride, turn_of_crank, tables, layout, mapped, design, errors, torque, turn
+):  # fmt: skip
+    """Solve up to a batch of samples at every ``stride``-th node, side by side; no ``elements`` without play."""
     values = np.empty((errors.shape[0], layout.end))
     finite, memory = values_of(errors, torque, layout, mapped, values), make_memory(design.law, tables)
     samples, size, contacts = values.shape[0], turn.retained.shape[2], tables.contact_stiffness.shape[1]
@@ -128,6 +116,7 @@ def _side_by_side(discs, first, stride, turn_of_crank, tables, layout, mapped, d
         np.empty(BATCH, np.bool_),
         np.zeros(BATCH, np.bool_),
     )
+    play = None if elements is None else make_play(size, elements, ROW)
     _fill_batch(layout, values, finite, used, batch, tilted)
     rows, waves = nonzero_rows(batch.values, 0, layout.torque + 1), nonzero_waves(layout, batch.values)
     teeth_deviate = np.any(batch.values[layout.tooth : layout.tilt] != 0.0)
@@ -136,7 +125,7 @@ def _side_by_side(discs, first, stride, turn_of_crank, tables, layout, mapped, d
     for angle in range(turn.rotation.shape[1]):
         at = first + angle * stride
         given = (tables, layout, rows, waves, teeth_deviate, flanks_turned)
-        solve_batch_at(design.law, discs, at, *given, samples, batch, careful)
+        solve_batch_at(design.law, discs, at, *given, samples, batch, play, careful)
         _take_over(samples, angle, batch, turn)
         for s in range(samples):
             if finite[s] and (careful[s] or tilted[s]):
@@ -167,10 +156,9 @@ def solve_batch(
     A crank turns once in ``turn_of_crank`` of these nodes; 0 where that is no whole number, or they are not equally far
     apart.
     """
-    if tables.play_stiffness.shape[1] == 0:
-        _side_by_side(discs, first, stride, turn_of_crank, tables, layout, mapped, design, errors, torque, turn)
-    else:
-        _one_by_one(first, stride, tables, layout, mapped, design, errors, torque, turn)
+    elements = tables.play_stiffness.shape[1] or None
+    given = (tables, layout, mapped, design, errors, torque)
+    _side_by_side(discs, elements, first, stride, turn_of_crank, *given, turn)
 
 
 def solve_curves(

@@ -23,6 +23,7 @@ from tolalloc.reducers.equivalent.solvers.contact_solver import (
     sample_constants,
     solve_at_node,
 )
+from tolalloc.reducers.equivalent.solvers.play import Play, make_play
 from tolalloc.reducers.equivalent.solvers.pressing import VectorTables
 from tolalloc.reducers.equivalent.solvers.simd import WIDTH, Apart, aligned
 from tolalloc.running.compiled import jit, jit_in_place, jit_within
@@ -185,12 +186,13 @@ class Workspace(NamedTuple):
 
     tables: VectorTables
     batch: Batch  # Of which the first register is used
+    play: Play
     node: Int[np.ndarray, "lane slot"]  # Which node a slot holds; −1 for none [-]
-    # Carrier rotation [rad], forces [N] and compressions [m] at undisplaced discs; no elements with play
+    # Carrier rotation [rad], forces [N], compressions of pins and of elements with play [m] at undisplaced discs
     rotation: Float[np.ndarray, "lane slot"]
     force: Float[np.ndarray, "lane slot coordinate"]
     undisturbed: Float[np.ndarray, "lane slot contact"]
-    play_offset: Float[np.ndarray, "0 2"]
+    play_offset: Float[np.ndarray, "lane slot element 2"]
     # Where a lane looks: carrier rotation at undisplaced discs [rad], and by the discs' coordinates [rad/m]
     base: Float[np.ndarray, " lane"]
     by_coordinate: Float[np.ndarray, "coordinate lane"]
@@ -208,9 +210,9 @@ class Workspace(NamedTuple):
 
 
 @jit
-def make_workspace(layout, size, contacts):
+def make_workspace(layout, size, contacts, elements):
     """Return empty lanes."""
-    discs, batch = size // 3, make_batch(layout, size, contacts, WIDTH)
+    discs, batch = contacts // layout.pins, make_batch(layout, size, contacts, WIDTH)
     batch.undisturbed[:] = _NOWHERE
     return Workspace(
         VectorTables(
@@ -219,13 +221,16 @@ def make_workspace(layout, size, contacts):
             Apart(aligned(2 * discs, WIDTH)),
             Apart(aligned(contacts, WIDTH)),
             Apart(aligned(contacts, WIDTH)),
+            Apart(aligned(2 * elements * size, WIDTH)),
+            Apart(aligned(elements, WIDTH)),
         ),
         batch,
+        make_play(size, elements, WIDTH),
         np.full((WIDTH, _SLOTS), -1),
         np.empty((WIDTH, _SLOTS)),
         np.empty((WIDTH, _SLOTS, size)),
         np.empty((WIDTH, _SLOTS, contacts)),
-        np.empty((0, 2)),
+        np.empty((WIDTH, _SLOTS, elements, 2)),
         np.empty(WIDTH),
         aligned(size, WIDTH),
         np.empty(3 * contacts),
@@ -246,9 +251,8 @@ def _slot(lane, node, tables, layout, values, workspace):
     if workspace.node[lane, slot] != node:
         workspace.node[lane, slot] = node
         force, undisturbed = workspace.force[lane, slot], workspace.undisturbed[lane, slot]
-        workspace.rotation[lane, slot] = fill_loads(
-            node, tables, layout, values, force, undisturbed, workspace.play_offset
-        )
+        offset = workspace.play_offset[lane, slot]
+        workspace.rotation[lane, slot] = fill_loads(node, tables, layout, values, force, undisturbed, offset)
     return slot
 
 
@@ -340,6 +344,20 @@ def _turn_flanks(turned, workspace):
 
 
 @jit_within
+def _fill_play(lane, first, weights, slots, tables, layout, values, workspace):
+    """Put the elements with play where the lane looks into it."""
+    own, (a, b, c, d), (w, x, y, z) = workspace.play, slots, weights
+    kept = workspace.play_offset[lane]
+    for e in range(own.end.size):
+        own.clearance[e, lane] = max(values[layout.clearance + e], 0.0)
+        for i in range(2):
+            near = w * kept[a, e, i] + x * kept[b, e, i]
+            own.offset[2 * e + i, lane] = near + (y * kept[c, e, i] + z * kept[d, e, i])
+    _blend_into_lane(tables.play_by_retained, first, weights, lane, workspace.tables.play_by_retained.entries)
+    _blend_into_lane(tables.play_stiffness, first, weights, lane, workspace.tables.play_stiffness.entries)
+
+
+@jit_within
 def fill_lane(lane, position, start, side, law, tables, layout, values, workspace):
     """Put a sample's problem where its lane looks into the lane."""
     here = workspace.tables
@@ -362,6 +380,7 @@ def fill_lane(lane, position, start, side, law, tables, layout, values, workspac
     _blend(tables.contact_stiffness[around], weights, workspace.stiffness)
     if law != LINEAR:
         _blend(tables.contact_log_length[around], weights, workspace.log_length)
+    _fill_play(lane, first, weights, slots, tables, layout, values, workspace)
     _take_near(lane, start, side, law, workspace)
 
 
