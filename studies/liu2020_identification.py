@@ -18,12 +18,13 @@ from tolalloc.bench.identification import IdentificationRequest, IdentificationR
 from tolalloc.bench.information import information
 from tolalloc.bench.least_squares import IdentificationProblem
 from tolalloc.bench.measurements import Measurements
-from tolalloc.bench.parameters import LIU2020, SYMBOLS, Parameter, parameter
+from tolalloc.bench.parameters import SYMBOLS, Parameter, parameter
 from tolalloc.bench.prediction import KernelPredictor, data_of
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.families.rv import RV
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.unit_file import BuiltUnit
@@ -241,7 +242,7 @@ def _peak_to_peaks(
     units = random_units(errors, 50, seeds.child("units"), LIKE_TABLE_7)
     measured = simulated_bench(true, units, bench).measured(seeds.child("noise"))
     request = IdentificationRequest(
-        parameters=tuple(parameter(name, given, BOUNDS[name]) for name in LIU2020),
+        parameters=tuple(parameter(name, given, BOUNDS[name]) for name in RV.identified),
         data="50 simulated units",
     )
     answer = identify(request, measured, given, progress)
@@ -263,7 +264,7 @@ def _curves_and_loops(
 ) -> tuple[IdentificationResult, Recovery]:
     """Identify from curves in both directions and torque loops of five units, then again with fresh noise."""
     exact = simulated_bench(true, _five_units(errors, seeds), CURVES_AND_LOOPS)
-    parameters = tuple(parameter(name, given) for name in LIU2020)
+    parameters = tuple(parameter(name, given) for name in RV.identified)
     request = IdentificationRequest(parameters=parameters, data="5 simulated units")
     results = identify(request, exact.measured(seeds.child("once")), given, progress)
     progress.begin("measured again and again")
