@@ -344,8 +344,8 @@ class Indexing(_Fitting):
 
     Notes
     -----
-    Of the vectors v of the part and s = Σ w·vₛ of the others, v turns by k·360°/n with the k that leaves the least of
-    |v + s|: the one that is nearest to the direction of −s. Other vectors of the part turn too and keep their law, as
+    Of the vectors v of the part and s = Σ w·vₛ of the others, v turns by k·360°/n with the k that leaves the shortest
+    sum v + s: the one that is nearest to the direction of −s. Other vectors of the part turn too and keep their law, as
     all directions are alike (own derivation). Measuring errs by nothing (an assumption). Derivatives with respect to
     zones are those of the positions chosen, with the vector as it is turned.
 
