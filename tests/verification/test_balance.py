@@ -189,10 +189,11 @@ def test_equal_parts_may_change_labels(cranks, discs, teeth, seed):
     here = generator.uniform(0, 2 * np.pi, 20)
     first, second = (model.equilibria(units, -10.0, at) for at in (here, here + 2 * np.pi / cranks))
     assert max(first.status.max(), second.status.max()) == Status.CONVERGED
-    settled = np.maximum(first.residual[0], second.residual[1]) <= 1e-11
+    residual = np.maximum(first.residual[0], second.residual[1])
     difference = np.abs(second.transmission_error[1] - first.transmission_error[0]) / ARCSECOND
-    # Where a bearing just touches, the kernel stops at the promised residual, 1e-9 of the largest force.
-    assert (difference <= np.where(settled, 1e-9, 1e-6)).all()
-    assert settled.mean() > 0.8
+    # What is left of the forces moves the softest direction: 1e-6″ at 1e-9 of the largest force, the residual that is
+    # promised where a bearing just touches, and in proportion below, down to rounding.
+    assert (difference <= 1e-9 + 1e3 * residual).all()
+    assert (residual <= 1e-11).mean() > 0.8
     change = second.transmission_error[0] - first.transmission_error[0]
     assert np.abs(change).max() > 0.1 * ARCSECOND  # so the labels do matter

@@ -260,7 +260,7 @@ def hertz_ellipse(force, modulus, across, along):
 
 @pytest.mark.parametrize(("law", "low", "high"), [("logarithmic", 0.93, 0.99), ("constant", 1.25, 1.34)])
 def test_pressure_of_crowned_teeth_beside_hertz_s_ellipse(rv20e, law, low, high):
-    reducer, angle = linear(rv20e.reducer, law, 1e7), np.array([np.pi])
+    reducer, angle = linear(rv20e.reducer, law, 1e7), np.full(3, np.pi)
     stage, forces = reducer.cycloid_stage, np.array([100.0, 200.0, 400.0])
     bend = path_curvature(stage, angle)[0]
     across = 1 / (1 / stage.pin_radius - bend / (1 + stage.pin_radius * bend))

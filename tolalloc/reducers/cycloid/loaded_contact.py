@@ -72,7 +72,7 @@ def contact_stiffness(
 
 
 def crowned_contact(
-    reducer: Reducer, pin_angle: Angles, force: Float[np.ndarray, "*angles"], slope: Float[np.ndarray, "*angles"]
+    reducer: Reducer, pin_angle: Angles, force: Float[np.ndarray, "..."], slope: Float[np.ndarray, "..."]
 ) -> LineContact:
     """Return pins on the crowned teeth that they meet at φ under forces [rad, N], tilted by slopes [rad].
 

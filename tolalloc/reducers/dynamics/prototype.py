@@ -144,7 +144,7 @@ _TABULATED = 1801  # angles of the contact's stiffness along a tooth
 _FORM_ANGLES = 720  # of the form in one tooth space, and around a pin
 
 
-def _forms(reducer: Reducer) -> tuple[Float[np.ndarray, "disc angle"], Float[np.ndarray, "pin angle"]]:
+def _forms(reducer: Reducer) -> tuple[Float[np.ndarray, "disc angle"], Float[np.ndarray, "pin direction"]]:
     """Return the form of discs and pins at equally spaced angles; no angles where the reducer has none [m]."""
     discs, stage, form = range(reducer.disc_count), reducer.cycloid_stage, reducer.form
     if form is None:
