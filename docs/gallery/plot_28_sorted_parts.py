@@ -8,8 +8,6 @@ sorted into classes and mated class by class; sorting and parts that find no mat
 **Read off it:** where one more class saves less in the zones than it costs at assembly.
 """
 
-import matplotlib.pyplot as plt
-
 import tolalloc as ta
 
 row = {"plus": 10, "minus": -10, "unit": "µm", "min": 2, "max": 60, "cost": 10.0}
@@ -26,24 +24,3 @@ study = ta.Study(
 answer = study.allocate()
 print(answer.sentences[3])
 answer.plot("assembly")
-
-# %%
-# The RV-20E's main study at the same limits, quick, seed 1, by how its pins are chosen: sorted to grooves in classes,
-# or taken in steps of 1 µm for the measured groove and disc profile. As measured by
-# ``studies/benchmarks/sorted_batches.py --reducer``, ten minutes; prices of assembly are assumed.
-
-measured = {
-    "as they come": (101.42, 0.0),
-    "2 classes": (98.32, 0.22),
-    "4 classes": (98.32, 0.64),
-    "3 sizes": (96.42, 0.40),
-    "5 sizes": (94.59, 0.80),
-}
-zones, assembly = zip(*measured.values(), strict=True)
-figure, axes = plt.subplots(figsize=(8, 3.5), constrained_layout=True)
-axes.barh(list(measured), zones, label="zones")
-axes.barh(list(measured), assembly, left=zones, label="assembly")
-axes.invert_yaxis()
-axes.set(xlim=(90, 103), xlabel="cost [cost units], from 90 on")
-axes.legend()
-plt.show()
