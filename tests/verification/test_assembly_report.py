@@ -20,6 +20,7 @@ from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.model import OUTCOMES
 from tolalloc.reducers.equivalent.outputs import ContactPattern
 from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reports.columns import of_positions
 from tolalloc.reports.figure import chart
 from tolalloc.reports.header import Header
 from tolalloc.reports.tellers import assembly_tables as tables
@@ -525,7 +526,8 @@ def test_costs_that_are_no_reciprocals_keep_their_scale(plan):
 
 @pytest.mark.slow
 def test_digits_that_mean_nothing_are_cut(measured, expected):
-    frame = tables.rounded(pd.DataFrame({"name": ["a"] * 4, "x": [-4.4e-17, -0.0, 13.999999999999998, 1.5e-12]}))
+    columns = {"name": ["a"] * 4, "x": [-4.4e-17, -0.0, 13.999999999999998, 1.5e-12]}
+    frame = tables.rounded(of_positions("digits", columns, range(4)))
     assert list(map(repr, frame["x"].tolist())) == ["0.0", "0.0", "14.0", "0.0"]
     for results, samples in ((measured, 1), (expected, 10)):
         for section in answer(replace(results, transmission=effect(samples))).document.sections:
