@@ -8,6 +8,7 @@ a map of one unit's numbers, of the uniform ones that it is drawn from (`Compens
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -100,7 +101,7 @@ Known = Mapping[str, Standing]
 """Where the columns of each source stand, by its name."""
 
 
-class Compensator(NamedFields):
+class Compensator(NamedFields, ABC):
     """What is chosen at assembly: how many choices there are, what they cost, and the map of one unit's numbers."""
 
     counted: ClassVar[str]
@@ -135,14 +136,14 @@ class Compensator(NamedFields):
         return self.count > 1
 
     @property
+    @abstractmethod
     def chosen(self) -> tuple[str, ...]:
         """Sources whose parts are chosen."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def named(self) -> tuple[str, ...]:
         """Sources that it names, those that are chosen first."""
-        raise NotImplementedError
 
     @property
     def tied(self) -> tuple[tuple[str, str], ...]:
@@ -165,6 +166,7 @@ class Compensator(NamedFields):
         more = f" and {len(self.chosen) - 1} more" if len(self.chosen) > 1 else ""
         return f"{self.count} {self.counted} of {self.chosen[0]}{more}"
 
+    @abstractmethod
     def resolved(self, sources: Sequence[Source], place: str) -> Self:
         """Return the same with the names that the table itself uses.
 
@@ -173,11 +175,10 @@ class Compensator(NamedFields):
         InputError, UnknownNameError
             No such source, or one of which nothing can be chosen so.
         """
-        raise NotImplementedError
 
+    @abstractmethod
     def cost(self, sources: Mapping[str, Source]) -> float:
         """Return what it costs per unit that is built, at the zones of sources by their names [cost units]."""
-        raise NotImplementedError
 
     def leftover_of(self, sources: Mapping[str, Source]) -> float:  # noqa: ARG002
         """Return the share of parts that find no mate, at the zones of sources by their names [-]."""

@@ -187,8 +187,9 @@ def prepare_simulation(asked: SimulationRequest) -> PreparedSimulation:
     >>> f"{prepared.crank_turn:.4f} s, {prepared.crank_turns} whole crank turns"
     '0.2374 s, 2 whole crank turns'
     """
-    unit = load_unit(asked.unit)
-    reducer = unit.as_built(load_reducer(asked.reducer))
+    unit, designed = load_unit(asked.unit), load_reducer(asked.reducer)
+    _ = designed.gears  # masses and speeds are those of sun and planets, so a single stage is refused first
+    reducer = unit.as_built(designed)
     if asked.engine == "exudyn":
         multibody_engine()
         reducer = _with_modification_of(unit, with_ideal_gears(reducer))

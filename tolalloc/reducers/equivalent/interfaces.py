@@ -21,6 +21,7 @@ from tolalloc.reducers.equivalent.springs import (
     SpringGroup,
     harmonic_columns,
     harmonic_waves,
+    support,
     turned,
     vector_columns,
     with_play,
@@ -66,17 +67,7 @@ def sun_support(at: Positions) -> SpringGroup:
     >>> sun_support(Positions(load_reducer("rv20e_liu2020"), np.zeros(1))).error[0].tolist()
     [[-1.0, -0.0], [-0.0, -1.0]]
     """
-    angles = at.carrier_angle.size
-    displacement = np.zeros((angles, 2, at.coordinates.count))
-    displacement[:, [0, 1], [at.coordinates.input, at.coordinates.input + 1]] = 1.0
-    return SpringGroup(
-        name="sun support",
-        stiffness_name="sun_support",
-        displacement=displacement,
-        error=np.broadcast_to(-np.eye(2), (angles, 2, 2)),
-        columns=vector_columns("sun.assembly"),
-        stiffness=np.full((angles, 2), at.reducer.stiffness.sun_support),
-    )
+    return support(at, at.coordinates.input, "sun support", "sun_support", "sun.assembly")
 
 
 SUN_SUPPORT = Interface(
@@ -379,17 +370,7 @@ def carrier_support(at: Positions) -> SpringGroup:
     >>> group.columns, group.error[0].tolist()  # δ = Xca − a_cx, Yca − a_cy
     (('carrier.assembly.x', 'carrier.assembly.y'), [[-1.0, -0.0], [-0.0, -1.0]])
     """
-    angles, carrier = at.carrier_angle.size, at.coordinates.carrier
-    displacement = np.zeros((angles, 2, at.coordinates.count))
-    displacement[:, [0, 1], [carrier, carrier + 1]] = 1.0
-    group = SpringGroup(
-        name="carrier bearing",
-        stiffness_name="carrier_bearing",
-        displacement=displacement,
-        error=np.broadcast_to(-np.eye(2), (angles, 2, 2)),
-        columns=vector_columns("carrier.assembly"),
-        stiffness=np.full((angles, 2), at.reducer.stiffness.carrier_bearing),
-    )
+    group = support(at, at.coordinates.carrier, "carrier bearing", "carrier_bearing", "carrier.assembly")
     return with_play(group, at.reducer.clearance_of("carrier_bearing"), ("carrier",))
 
 

@@ -152,6 +152,42 @@ def vector_columns(name: str) -> tuple[str, str]:
     return f"{name}.x", f"{name}.y"
 
 
+def support(at: Positions, first: int, name: str, stiffness_name: str, error: str) -> SpringGroup:
+    """Return the two springs that hold a part's axis in the housing, which may stand off there.
+
+    δ = X − a_x, Y − a_y [m], own derivation.
+
+    Parameters
+    ----------
+    at
+        Where the parts stand.
+    first
+        First of the part's coordinates, X and Y behind it [-].
+    name, stiffness_name
+        What the springs stand for, and the field of `Stiffness`.
+    error
+        Source of (a_x, a_y).
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> at = Positions(load_reducer("rv20e_liu2020"), np.zeros(1))
+    >>> support(at, at.coordinates.carrier, "carrier bearing", "carrier_bearing", "carrier.assembly").columns
+    ('carrier.assembly.x', 'carrier.assembly.y')
+    """
+    angles = at.carrier_angle.size
+    displacement = np.zeros((angles, 2, at.coordinates.count))
+    displacement[:, [0, 1], [first, first + 1]] = 1.0
+    return SpringGroup(
+        name=name,
+        stiffness_name=stiffness_name,
+        displacement=displacement,
+        error=np.broadcast_to(-np.eye(2), (angles, 2, 2)),
+        columns=vector_columns(error),
+        stiffness=np.full((angles, 2), getattr(at.reducer.stiffness, stiffness_name)),
+    )
+
+
 def turned(direction: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle 2 2"]:
     """Return the rotation matrices from a part that has turned by a direction [rad] into the housing's frame.
 

@@ -23,6 +23,14 @@ class Place:
     sources: tuple[str, ...] = ()  # Names of the drawing's sources that sit there
 
 
+HOUSING_PLACES = (
+    Place(id="housing.pins", label="places of the pins in the housing", part="housing"),
+    Place(id="housing.grooves", label="grooves of the pins", part="housing"),
+    Place(id="pins", label="pins", part="pins"),
+)
+"""Of the housing with its pins, which all families have."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class NewRows:
     """What a new folder starts from: presets, allowed counts, and the table whose zones are scaled."""

@@ -15,16 +15,14 @@ from tolalloc.reducers.equivalent.interfaces import (
     PIN_SOURCES,
     SUN_SUPPORT,
 )
-from tolalloc.reducers.families.family import NewRows, Place, ReducerFamily
+from tolalloc.reducers.families.family import HOUSING_PLACES, NewRows, Place, ReducerFamily
 from tolalloc.reducers.reducer.bearings import RollingBearing
 from tolalloc.reducers.reducer.design import Reducer
 
 
 def _places(reducer: Reducer) -> Iterator[Place]:
     cranks, discs = range(1, reducer.crank_count + 1), range(1, reducer.disc_count + 1)
-    yield Place(id="housing.pins", label="places of the pins in the housing", part="housing")
-    yield Place(id="housing.grooves", label="grooves of the pins", part="housing")
-    yield Place(id="pins", label="pins", part="pins")
+    yield from HOUSING_PLACES
     for disc in discs:
         yield Place(id=f"disc{disc}", label=f"disc {disc}", part=f"disc{disc}")
         yield Place(id=f"disc{disc}.teeth", label=f"teeth of disc {disc}", part=f"disc{disc}")

@@ -15,8 +15,8 @@ from tolalloc.drawings.zones import Characteristic
 from tolalloc.reading.units import MILLIMETRE
 from tolalloc.reducers.equivalent.interfaces import CARRIER_SUPPORT, PIN_SOURCES, Interface, lever
 from tolalloc.reducers.equivalent.sources import ErrorSource, Nominal
-from tolalloc.reducers.equivalent.springs import Positions, SpringGroup, turned, vector_columns, with_play
-from tolalloc.reducers.families.family import NewRows, Place, ReducerFamily
+from tolalloc.reducers.equivalent.springs import Positions, SpringGroup, support, turned, vector_columns, with_play
+from tolalloc.reducers.families.family import HOUSING_PLACES, NewRows, Place, ReducerFamily
 from tolalloc.reducers.reducer.design import Reducer
 
 _STANDS_OFF = Characteristic("coaxiality", "how far the shaft stands off is drawn as coaxiality")
@@ -39,17 +39,7 @@ def shaft_support(at: Positions) -> SpringGroup:
     >>> shaft_support(Positions(load_reducer("cd29"), np.zeros(1))).columns
     ('shaft.assembly.x', 'shaft.assembly.y')
     """
-    angles, shaft = at.carrier_angle.size, at.coordinates.input
-    displacement = np.zeros((angles, 2, at.coordinates.count))
-    displacement[:, [0, 1], [shaft, shaft + 1]] = 1.0
-    return SpringGroup(
-        name="shaft bearing",
-        stiffness_name="shaft_support",
-        displacement=displacement,
-        error=np.broadcast_to(-np.eye(2), (angles, 2, 2)),
-        columns=vector_columns("shaft.assembly"),
-        stiffness=np.full((angles, 2), at.reducer.stiffness.shaft_support),
-    )
+    return support(at, at.coordinates.input, "shaft bearing", "shaft_support", "shaft.assembly")
 
 
 SHAFT_SUPPORT = Interface(
@@ -211,9 +201,7 @@ OUTPUT_PINS = Interface(
 
 def _places(reducer: Reducer) -> Iterator[Place]:
     discs = range(1, reducer.disc_count + 1)
-    yield Place(id="housing.pins", label="places of the pins in the housing", part="housing")
-    yield Place(id="housing.grooves", label="grooves of the pins", part="housing")
-    yield Place(id="pins", label="pins", part="pins")
+    yield from HOUSING_PLACES
     for disc in discs:
         yield Place(id=f"disc{disc}", label=f"disc {disc}", part=f"disc{disc}")
         yield Place(id=f"disc{disc}.teeth", label=f"teeth of disc {disc}", part=f"disc{disc}")
