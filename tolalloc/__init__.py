@@ -54,7 +54,10 @@ if TYPE_CHECKING:
     from tolalloc.reducers import RADIAL_CLEARANCE as RADIAL_CLEARANCE
     from tolalloc.reducers import TORSIONAL_STIFFNESS as TORSIONAL_STIFFNESS
     from tolalloc.reducers.choice import reducer as reducer
-    from tolalloc.reducers.settings import at as at
+    from tolalloc.reducers.load_case import LoadCase as LoadCase
+    from tolalloc.reducers.load_case import at as at
+    from tolalloc.reducers.load_case import mean as mean
+    from tolalloc.reducers.load_case import worst as worst
     from tolalloc.reports.document import Document as Document
     from tolalloc.reports.document import Section as Section
     from tolalloc.reports.figure import Figure as Figure
@@ -129,7 +132,10 @@ _WHERE = {
     "UnitPrice": "allocation.cost.unit_price",
     "UnknownNameError": "exceptions",
     "WorstCase": "allocation.space.requirement",
-    "at": "reducers.settings",
+    "LoadCase": "reducers.load_case",
+    "at": "reducers.load_case",
+    "mean": "reducers.load_case",
+    "worst": "reducers.load_case",
     "check": "study.commands",
     "drawing": ("drawings.drawing", "load_drawing"),
     "from_fmu": "models.function_model",

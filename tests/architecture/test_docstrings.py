@@ -21,6 +21,7 @@ EXAMPLE = re.compile(r"^\s*(>>>|\.\.\.).*$", re.MULTILINE)
 COMPUTES_NOTHING = {
     # reads a file or a table
     "reducers.choice.reducer": "reads",
+    "reducers.load_case.require_load_cases": "checks",
     "reducers.reducer.files.load_identified_stiffness": "reads",
     "reducers.reducer.form.load_designed": "reads",
     "reducers.reducer.form.read_profile": "reads",
@@ -48,7 +49,6 @@ COMPUTES_NOTHING = {
     "reducers.equivalent.model.count_statuses": "checks",
     "reducers.reducer.stiffness.checked_correlation": "checks",
     "reducers.scene.is_placed": "checks",
-    "reducers.settings.require_temperature": "checks",
     "allocation.search.lagrange_dual.require_convex": "checks",
     "allocation.search.zone_allocation.require_groups": "checks",
     "allocation.space.design_space.outside_range": "checks",
@@ -113,7 +113,10 @@ COMPUTES_NOTHING = {
     "reducers.reducer.bearings.friction_assumptions": "orders",
     "reducers.scene.places_of": "orders",
     "reducers.settings.clearance_settings": "orders",
-    "reducers.settings.at": "orders",
+    "reducers.load_case.at": "orders",
+    "reducers.load_case.worst": "orders",
+    "reducers.load_case.mean": "orders",
+    "reducers.load_case.combined_outputs": "orders",
     "reducers.settings.temperature_condition": "orders",
     "reducers.settings.torque_condition": "orders",
     "allocation.cost.points.shop_fits": "orders",

@@ -85,7 +85,7 @@ def test_an_error_that_is_no_number_is_a_status(prepared):
     reading = requirements_of(prepared.model.reducer)[-1]
     errors = prepared.model.kernel.errors(np.zeros((2, len(prepared.model.kernel.columns))))
     errors[1, prepared.model.kernel.model.columns.index("pin.diameter")] = np.nan
-    values, status = reading.read(prepared.model.kernel.model, errors, -1.0)
+    values, status = reading.read(prepared.model.kernel, errors)
     assert status.tolist() == [Status.CONVERGED, Status.NOT_FINITE]
     assert values[0, 0] == pytest.approx(prepared.model.reducer.modification.radial_clearance / MICROMETRE)
 

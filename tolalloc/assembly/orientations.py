@@ -77,15 +77,15 @@ def transmission_curves(
     )
 
 
-def _unloaded(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
-    found, curves = model.extremes(errors, torque), model.equilibria(errors, torque)
+def _unloaded(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+    found, curves = kernel.extremes(errors), kernel.model.equilibria(errors, kernel.torque)
     values = np.stack([found.peak_to_peak, curves.transmission_error.mean(axis=1)], axis=1) / ARCSECOND
     return values, np.maximum(found.status, curves.status.max(axis=1))
 
 
-def _loaded(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
-    rated = float(np.copysign(model.reducer.load.rated_torque, torque))
-    model = model.at_torque(rated)
+def _loaded(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+    rated = kernel.load_torque
+    model = kernel.model.at_torque(rated)
     found = model.extremes(errors, rated)
     values, status = [], []
     for first in range(0, errors.shape[0], _AT_ONCE):

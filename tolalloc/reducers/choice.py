@@ -20,11 +20,12 @@ from tolalloc.reducers.equivalent.model import EquivalentModel, cached_model
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
 from tolalloc.reducers.equivalent.springs import HARMONICS
 from tolalloc.reducers.families.known import SOURCES
+from tolalloc.reducers.load_case import LoadCase, require_load_cases
 from tolalloc.reducers.reducer.design import Modification, Reducer, at_torque
 from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.reducers.response.kernel import KernelResponse
-from tolalloc.reducers.settings import clearance_settings, require_temperature
+from tolalloc.reducers.settings import TEMPERATURE, clearance_settings
 from tolalloc.reducers.unit_file import BuiltUnit, load_unit
 
 if TYPE_CHECKING:
@@ -165,7 +166,7 @@ class ReducerChoice:
     rotation_clearance: tuple[float, float] | None = None
     # As there [K]
     disc_temperature: float = 0.0
-    further_disc_temperatures: tuple[float, ...] = ()
+    load_cases: tuple[LoadCase, ...] = ()
     neglected: tuple[str, ...] = NEGLECTED
     unit: BuiltUnit | None = None  # Built unit whose curve is shown, if any
 
@@ -194,7 +195,7 @@ class ReducerChoice:
         place, torque = f"reducer {self.name}", settings.get(TORQUE, self.torque)
         self.reducer.torque_on_carrier(torque, place)
         warmer = settings.get(DISC_TEMPERATURE, self.disc_temperature)
-        require_temperature(place, DISC_TEMPERATURE, warmer)
+        TEMPERATURE.check(place, DISC_TEMPERATURE, warmer, of_argument=True)
         clearances = {name: value for name, value in settings.items() if name not in (TORQUE, DISC_TEMPERATURE)}
         stage = self.reducer.cycloid_stage
         present = [own / MICROMETRE for own in self.reducer.modification.clearances(stage)]
@@ -232,7 +233,7 @@ class ReducerChoice:
         turned, flank, radial = ((own[0] * MICROMETRE, own[1] * MICROMETRE) if own else None for own in self._ranges)
         return ReducerModel(
             kernel=kernel.at_disc_temperature(self.disc_temperature),
-            further_disc_temperatures=self.further_disc_temperatures,
+            load_cases=self.load_cases,
             flank=flank,
             radial=radial,
             turned=turned,
@@ -241,14 +242,6 @@ class ReducerChoice:
             left_out=assumptions,
             mismatches=_other_sizes(errors, self.reducer),
         )
-
-
-def _require_temperatures(place: str, own: object, further: object) -> None:
-    require_temperature(place, "disc_temperature", own)
-    if isinstance(further, str) or not isinstance(further, Sequence):
-        raise InputError.at(place, "further_disc_temperatures", further, "a list of temperatures, such as (-5, 5)")
-    for warmer in further:
-        require_temperature(place, "further_disc_temperatures", warmer)
 
 
 def reducer(
@@ -260,7 +253,7 @@ def reducer(
     radial_clearance: tuple[float, float] | None = None,
     rotation_clearance: tuple[float, float] | None = None,
     disc_temperature: float = 0.0,
-    further_disc_temperatures: tuple[float, ...] = (),
+    load_cases: Sequence[LoadCase] = (),
     neglected: tuple[str, ...] = NEGLECTED,
     unit: str | Path = "",
 ) -> ReducerChoice:
@@ -282,9 +275,10 @@ def reducer(
         their teeth, δ·r_d; as it is unless given [µm].
     disc_temperature
         Temperature of the discs less that of the ring of pins [K].
-    further_disc_temperatures
-        Others of that kind at which outputs may be limited as well, by names that `tolalloc.at` makes, such as
-        ``ta.at(ta.LOST_MOTION, disc_temperature=-5)`` [K].
+    load_cases
+        Further conditions under which outputs may be limited as well, by names that `tolalloc.at`, `tolalloc.worst` and
+        `tolalloc.mean` make, such as ``ta.at(ta.LOST_MOTION, cold)`` with
+        ``cold = ta.LoadCase("cold", disc_temperature=-5)``.
     neglected
         Sources that a drawing may leave out, taken as zero; ``*`` stands for anything. A bearing's or a mesh's
         clearance may always be left out: it is then the nominal one of the reducer file.
@@ -311,7 +305,8 @@ def reducer(
         ):
             allowed = "two numbers from -50 to 50 µm, the smaller one first"
             raise InputError.at(f"reducer {name}", f"{field}_clearance", own, allowed)
-    _require_temperatures(f"reducer {name}", disc_temperature, further_disc_temperatures)
+    TEMPERATURE.check(f"reducer {name}", "disc_temperature", disc_temperature, of_argument=True)
+    cases = require_load_cases(f"reducer {name}", load_cases)
     if isinstance(neglected, str) or not (
         isinstance(neglected, Sequence) and all(isinstance(pattern, str) for pattern in neglected)
     ):
@@ -320,6 +315,8 @@ def reducer(
     chosen = load_reducer(name)
     if torque is not None:
         chosen.torque_on_carrier(torque, f"reducer {name}")
+    for case in cases:
+        chosen.torque_on_carrier(case.torque, f"load case {case.name} of reducer {name}")
     identified = load_identified_stiffness(stiffness) if stiffness else None
     return ReducerChoice(
         reducer=with_stiffness(chosen, identified) if identified else chosen,
@@ -329,7 +326,7 @@ def reducer(
         radial_clearance=radial_clearance,
         rotation_clearance=rotation_clearance,
         disc_temperature=float(disc_temperature),
-        further_disc_temperatures=tuple(dict.fromkeys(map(float, further_disc_temperatures))),
+        load_cases=cases,
         neglected=tuple(neglected),
         unit=load_unit(unit) if unit else None,
     )

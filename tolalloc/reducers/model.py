@@ -12,12 +12,13 @@ from jaxtyping import Float
 
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.exceptions import UnknownNameError
-from tolalloc.models.model import Model, Observer, Response, SettingDerivatives
+from tolalloc.models.model import Evaluation, Model, Observer, Response, SettingDerivatives, unobserved
 from tolalloc.models.settings import DrawnAmounts, Setting
 from tolalloc.reading.units import MICROMETRE, MILLIMETRE
 from tolalloc.reducers import DISC_TEMPERATURE, FRICTION_TORQUE, PEAK_TO_PEAK, PRELOAD, RADIAL_CLEARANCE, TORQUE
 from tolalloc.reducers.equivalent.hysteresis import HysteresisLoop
 from tolalloc.reducers.equivalent.perfect import exact_loop, preload, rated_pin_force
+from tolalloc.reducers.load_case import Combined, LoadCase, at, combined_outputs
 from tolalloc.reducers.reducer.design import (
     MODIFICATION_CONVENTION,
     ROTATION_CONVENTION,
@@ -38,6 +39,7 @@ from tolalloc.reducers.response.kernel import (
 from tolalloc.reducers.response.outputs import (
     DIFFERENTIABLE,
     WITH_FRICTION,
+    LoadCasesResponse,
     OutputsResponse,
     limited_outputs,
     output_derivatives,
@@ -45,7 +47,7 @@ from tolalloc.reducers.response.outputs import (
     wave_outputs,
     with_orders,
 )
-from tolalloc.reducers.settings import at, clearance_settings, temperature_condition, torque_condition
+from tolalloc.reducers.settings import clearance_settings, temperature_condition, torque_condition
 from tolalloc.reducers.unit_file import BuiltUnit
 from tolalloc.running.chunks import Mapper
 
@@ -70,7 +72,7 @@ class ReducerModel(Model):
     radial: tuple[float, float] | None = None
     turned: tuple[float, float] | None = None
     identified: IdentifiedStiffness | None = None  # Stiffnesses that replaced the reducer's own, if any
-    further_disc_temperatures: tuple[float, ...] = ()  # At which outputs may be limited beside that in force [K]
+    load_cases: tuple[LoadCase, ...] = ()  # Under which outputs may be limited beside the conditions in force
     # Values of the settings in force; those of the reducer's own modification unless given [µm]
     clearances: tuple[float, ...] | None = None
     unit: BuiltUnit | None = None  # Built unit whose curve is shown beside others, if any
@@ -105,40 +107,49 @@ class ReducerModel(Model):
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """All that requirements may limit, the peak-to-peak first, and the same at the further temperatures."""
-        return (*self._own_outputs, *(name for own in self._at_temperatures.values() for name in own))
+        """All that requirements may limit, the peak-to-peak first, then load cases, their worst and mean."""
+        return (*self._own_outputs, *(name for own in self._under_cases.values() for name in own), *self._combined)
 
     @cached_property
     def _own_outputs(self) -> tuple[str, ...]:
-        """Outputs at the temperature in force."""
+        """Outputs under the conditions in force."""
         return limited_outputs(self.reducer)
 
     @cached_property
-    def _at_temperatures(self) -> Mapping[float, Mapping[str, str]]:
-        """Further temperature of the discs [K] → output under it → its name at the temperature in force."""
+    def _under_cases(self) -> Mapping[LoadCase, Mapping[str, str]]:
+        """Load case → output under it → its name under the conditions in force."""
         return {
-            warmer: {at(name, disc_temperature=warmer): name for name in self._own_outputs}
-            for warmer in self.further_disc_temperatures
+            case: {at(name, case): name for name in self._own_outputs if case.felt_by(name)} for case in self.load_cases
         }
 
-    def _under(self, output: str) -> tuple[ReducerModel, str]:
-        """Return the model at the temperature that an output names, and the output there."""
-        for warmer, names in self._at_temperatures.items():
-            if output in names:
-                kernel = self.kernel.at_disc_temperature(warmer)
-                return replace(self, kernel=kernel, further_disc_temperatures=()), names[output]
-        return self, output
+    @cached_property
+    def _combined(self) -> Mapping[str, Combined]:
+        """Output over all load cases → what it is made of."""
+        return combined_outputs(self.load_cases, self._own_outputs)
+
+    def _under(self, case: LoadCase) -> ReducerModel:
+        """Return the model under a load case."""
+        return replace(self, kernel=self.kernel.under(case), load_cases=())
 
     def _everywhere(self, outputs: tuple[str, ...]) -> tuple[str, ...]:
-        """Return outputs at the temperature in force and at the further ones."""
-        further = self.further_disc_temperatures
-        return (*outputs, *(at(name, disc_temperature=warmer) for warmer in further for name in outputs))
+        """Return outputs under the conditions in force, under load cases, and over all of them.
+
+        The transmission error of a part of the turn is searched without derivatives.
+        """
+        cases = [
+            name
+            for case, names in self._under_cases.items()
+            for name, own in names.items()
+            if own in outputs and not (case.output_angles and own == PEAK_TO_PEAK)
+        ]
+        combined = [name for name, own in self._combined.items() if {*own.of} <= {*cases}]
+        return (*outputs, *cases, *combined)
 
     @property
     def ranked(self) -> tuple[str, ...]:
         """All but those with friction, which ask for more than twice the equilibria of the other outputs of a loop.
 
-        Those at further temperatures double the equilibria too.
+        Those under load cases multiply the equilibria too.
         """
         return tuple(name for name in self._own_outputs if name not in WITH_FRICTION)
 
@@ -150,20 +161,38 @@ class ReducerModel(Model):
         UnknownNameError
             An output that the model does not have.
         """
-        if outputs == (PEAK_TO_PEAK,):
-            return self.kernel
-        waves = {name: order for order, names in self.spectra.items() for name in names}
+        waves = {name for names in self.spectra.values() for name in names}
         for name in outputs:
             if name not in self.outputs and name not in waves:
                 raise UnknownNameError.among(self.name, "output", name, self.outputs)
-        orders = tuple(dict.fromkeys(waves[name] for name in outputs if name in waves))
-        readings = (
-            with_orders(readings_of(self.reducer, outputs), orders) if orders else readings_of(self.reducer, outputs)
+        in_force = {*self._own_outputs, *waves}
+        if in_force.issuperset(outputs):
+            return self._reading(outputs)
+        combined = self._combined
+        asked = dict.fromkeys(part for name in outputs for part in (combined[name].of if name in combined else (name,)))
+        named = [(self, {name: name for name in asked if name in in_force})] + [
+            (self._under(case), {name: own for name, own in names.items() if name in asked})
+            for case, names in self._under_cases.items()
+        ]
+        present = [(model, names) for model, names in named if names]
+        responses = [model._reading(tuple(names.values())) for model, names in present[:1]]
+        # A unit is counted once, as it ended under the first of them.
+        responses += [model.observed(unobserved)._reading(tuple(names.values())) for model, names in present[1:]]
+        return LoadCasesResponse(
+            responses=tuple(responses),
+            read=tuple(name for _, names in present for name in names),
+            outputs=outputs,
+            combined=combined,
         )
-        for warmer, names in self._at_temperatures.items():
-            own = readings_of(self.reducer, tuple(names[name] for name in outputs if name in names))
-            readings = (*readings, *(reading.at(warmer) for reading in own))
-        response = OutputsResponse(kernel=self.kernel, readings=readings)
+
+    def _reading(self, outputs: tuple[str, ...]) -> Response:
+        """Return the response of outputs and waves under the conditions in force."""
+        if outputs == (PEAK_TO_PEAK,):
+            return self.kernel
+        waves = {name: order for order, names in self.spectra.items() for name in names}
+        orders = tuple(dict.fromkeys(waves[name] for name in outputs if name in waves))
+        readings = readings_of(self.reducer, outputs)
+        response = OutputsResponse(kernel=self.kernel, readings=with_orders(readings, orders) if orders else readings)
         return response if response.outputs == outputs else replace(response, chosen=outputs)
 
     @property
@@ -206,7 +235,7 @@ class ReducerModel(Model):
 
     @property
     def exact(self) -> tuple[str, ...]:
-        """The peak-to-peak alone, at every temperature."""
+        """The peak-to-peak alone, under every load case of the whole turn."""
         return self._everywhere((PEAK_TO_PEAK,))
 
     @property
@@ -221,12 +250,14 @@ class ReducerModel(Model):
 
     def derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
         """Return the peak-to-peak, or an output of `differentiable`, of every sample with its derivatives."""
-        model, name = self._under(output)
-        if model is not self:
-            return model.derivatives(name, x)
-        if output in self.differentiable:
+        if output in self._combined:
+            return self._combined_derivatives(self._combined[output], x)
+        for case, names in self._under_cases.items():
+            if output in names and output in (*self.exact, *self.differentiable):
+                return self._under(case).derivatives(names[output], x)
+        if output in DIFFERENTIABLE:
             return self._output_derivatives(output, x)
-        if output not in self.exact:
+        if output != PEAK_TO_PEAK:
             known = (*self.exact, *self.differentiable)
             raise UnknownNameError.among(f"derivatives of {self.name}", "output", output, known)
         found = self.kernel.with_derivatives(x)
@@ -234,6 +265,20 @@ class ReducerModel(Model):
             evaluation=found.evaluation,
             by_column=found.by_column,
             by_setting=found.by_modification[:, : len(self._amounts)] @ self._modification_by_clearance * MICROMETRE,
+        )
+
+    def _combined_derivatives(self, combined: Combined, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+        """Return the derivatives of what is made of an output under several load cases."""
+        parts = [self.derivatives(name, x) for name in combined.of]
+        values = np.hstack([part.evaluation.values for part in parts])
+        weights = combined.weights(values)
+        by_column = sum(weights[:, [at]] * part.by_column for at, part in enumerate(parts))
+        by_setting = sum(weights[:, [at]] * part.by_setting for at, part in enumerate(parts))
+        status = np.max([part.evaluation.status for part in parts], axis=0)
+        return SettingDerivatives(
+            evaluation=Evaluation(values=(weights * values).sum(axis=1, keepdims=True), status=np.asarray(status)),
+            by_column=np.asarray(by_column),
+            by_setting=np.asarray(by_setting),
         )
 
     def _output_derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
@@ -305,8 +350,8 @@ class ReducerModel(Model):
         own = (*own, self.reducer.form) if self.reducer.form else own
         crowning = self.reducer.cycloid_stage.crowning
         own = (*own, crowning) if crowning else own
-        warm = (self.kernel.disc_temperature, self.further_disc_temperatures)
-        return (*own, *warm) if any(warm) else own
+        further = (self.kernel.disc_temperature, self.load_cases)
+        return (*own, *further) if any(further) else own
 
     @property
     def uncertain(self) -> tuple[CorrelatedSource, ...]:

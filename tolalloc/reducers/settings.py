@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
 
-from tolalloc.exceptions import InputError
 from tolalloc.models.settings import Setting
-from tolalloc.reading.named_fields import is_number
+from tolalloc.reading.named_fields import number
 from tolalloc.reducers import DISC_TEMPERATURE, TORQUE
 
 FLANK = "flank clearance [µm]"
@@ -46,41 +44,7 @@ def temperature_condition(present: float) -> Setting:
     return Setting(name=DISC_TEMPERATURE, value=present, lower=-largest, upper=largest, step=0.1)
 
 
-def require_temperature(place: str, field: str, warmer: Any) -> None:
-    """Raise unless a difference of temperature between discs and ring can be meant.
-
-    Raises
-    ------
-    InputError
-        What is no number, or beyond 50 K.
-    """
-    if not (is_number(warmer) and abs(warmer) <= FARTHEST_TEMPERATURE):
-        allowed = f"−{FARTHEST_TEMPERATURE:g} to {FARTHEST_TEMPERATURE:g} K"
-        raise InputError.of_argument(place, field, warmer, allowed)
-
-
-def at(output: str, *, disc_temperature: float) -> str:
-    """Return the name of an output under an operating condition of its own, to be limited beside the same under others.
-
-    Parameters
-    ----------
-    output
-        Output of a reducer, such as `PEAK_TO_PEAK`.
-    disc_temperature
-        Temperature of the discs less that of the ring; one of ``further_disc_temperatures`` of `reducer` [K].
-
-    Raises
-    ------
-    InputError
-        An output without a unit, or a temperature that cannot be meant.
-
-    Examples
-    --------
-    >>> at("lost motion [arcmin]", disc_temperature=-5)
-    'lost motion, discs −5 K [arcmin]'
-    """
-    require_temperature("at", "disc_temperature", disc_temperature)
-    what, found, unit = output.rpartition(" [") if isinstance(output, str) else ("", "", "")
-    if not found:
-        raise InputError.of_argument("at", "output", output, "an output of a reducer, such as ta.PEAK_TO_PEAK")
-    return f"{what}, discs {f'{disc_temperature:+g}'.replace('-', '−')} K [{unit}"
+TEMPERATURE = number(
+    f"−{FARTHEST_TEMPERATURE:g} to {FARTHEST_TEMPERATURE:g} K", least=-FARTHEST_TEMPERATURE, most=FARTHEST_TEMPERATURE
+)
+"""Rule of a difference of temperature between discs and ring."""

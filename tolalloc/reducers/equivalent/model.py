@@ -246,6 +246,30 @@ class EquivalentModel:
         """Return the refined extremes of every sample over one output turn."""
         return self._searched(errors, torque, np.empty((errors.shape[0], 0)))
 
+    def extremes_within(
+        self, errors: Float[np.ndarray, "sample column"], torque: float, window: tuple[float, float]
+    ) -> Extremes:
+        """Return the extremes of every sample over part of the output turn, at the tabulated angles within it [rad].
+
+        No finer angles are searched: what they may add, `remaining`, is not known.
+        """
+        step = self.search.node_step
+        angle = np.linspace(*window, max(2, 1 + round((window[1] - window[0]) / step)))
+        found = self.equilibria(errors, torque, angle)
+        curve, sample = found.transmission_error, np.arange(len(errors))
+        status, good = found.status.max(axis=1), np.isfinite(found.transmission_error).all(axis=1)
+        where = np.stack([np.where(good, own, 0) for own in (curve.argmax(axis=1), curve.argmin(axis=1))], axis=1)
+        extreme = np.where(good[:, np.newaxis], curve[sample[:, np.newaxis], where], np.nan)
+        return Extremes(
+            largest=extreme[:, 0],
+            smallest=extreme[:, 1],
+            carrier_angle=angle[where],
+            remaining=np.full(len(errors), np.nan),
+            solves=np.full(len(errors), angle.size),
+            status=status,
+            residual=found.residual.max(axis=1),
+        )
+
     def exact_extremes(self, errors: Float[np.ndarray, "1 column"], torque: float) -> Extremes:
         """Return the extremes of one unit, solved again at their angles with tables of just these angles.
 

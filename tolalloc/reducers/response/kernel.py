@@ -19,8 +19,9 @@ from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.model import Evaluation, Observer, Response, unobserved
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers import PEAK_TO_PEAK
-from tolalloc.reducers.equivalent.model import Derivatives, EquivalentModel, Extremes
-from tolalloc.reducers.reducer.design import Modification, Reducer, thermal_shift
+from tolalloc.reducers.equivalent.model import Derivatives, EquivalentModel, Extremes, cached_model
+from tolalloc.reducers.load_case import LoadCase
+from tolalloc.reducers.reducer.design import Modification, Reducer, at_torque, thermal_shift
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.running.chunks import Mapper, map_chunks
 
@@ -57,6 +58,10 @@ class KernelResponse:
     fixed: Mapping[str, float]
     offsets: Mapping[str, float] = field(default_factory=dict)  # Added to columns that are fixed [m, angles rad]
     disc_temperature: float = 0.0  # Of the discs less that of the ring [K]
+    load: float | None = None  # Torque of what pins and bearings carry, the rated one as the torque unless given [N·m]
+    window: tuple[float, float] | None = (
+        None  # Of the output turn that the peak-to-peak is taken of, all unless given [rad]
+    )
     observe: Observer = unobserved  # Told the statuses of each chunk
     mapper: Mapper = map  # What solves the chunks, `tolalloc.running.chunks.map_chunks`
 
@@ -84,6 +89,23 @@ class KernelResponse:
     def at_disc_temperature(self, warmer: float) -> KernelResponse:
         """Return the response of the same reducer whose discs are warmer than the ring by so much [K]."""
         return replace(self, disc_temperature=warmer)
+
+    def under(self, case: LoadCase) -> KernelResponse:
+        """Return the response of the same reducer under a load case, which keeps what it does not state."""
+        kernel = self if case.disc_temperature is None else self.at_disc_temperature(case.disc_temperature)
+        kernel = replace(kernel, window=case.window)
+        if case.torque is None:
+            return kernel
+        own = self.model
+        # The next chunk under the same load case finds the tables as they are.
+        model = cached_model(at_torque(own.reducer, case.torque), own.search, own.orders)
+        return replace(kernel, model=model, torque=case.torque, load=case.torque)
+
+    @property
+    def load_torque(self) -> float:
+        """Torque under which pins and bearings are looked at, the rated one unless a load case states another [N·m]."""
+        rated = float(np.copysign(self.model.reducer.load.rated_torque, self.torque))
+        return rated if self.load is None else self.load
 
     def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
         """Return the peak-to-peak of every sample [arcsec]."""
@@ -124,8 +146,14 @@ class KernelResponse:
         """Let go of the model's tables."""
         self.model.release()
 
+    def extremes(self, errors: Float[np.ndarray, "chunk all_columns"]) -> Extremes:
+        """Return the extremes of the transmission error at errors in the order of the model's columns."""
+        if self.window is None:
+            return self.model.extremes(errors, self.torque)
+        return self.model.extremes_within(errors, self.torque, self.window)
+
     def _extremes(self, x: Float[np.ndarray, "chunk column"]) -> Extremes:
-        return self.model.extremes(self.errors(x), self.torque)
+        return self.extremes(self.errors(x))
 
     def _derivatives(self, x: Float[np.ndarray, "chunk column"]) -> tuple[Extremes, Derivatives]:
         """Return the extremes of a chunk and their derivatives, of the columns those that vary and the amounts alone.

@@ -5,14 +5,14 @@ Exact derivatives of all but the peak-to-peak that have them: off torque against
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from tolalloc.models.model import Evaluation
+from tolalloc.models.model import Evaluation, Response
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, MEGAPASCAL, MICROMETRE, MILLIMETRE
 from tolalloc.reducers import (
     BACKLASH,
@@ -39,9 +39,9 @@ from tolalloc.reducers.equivalent.outputs import (
     waves,
 )
 from tolalloc.reducers.equivalent.perfect import friction_torque_derivatives, pin_force_derivatives, preload
+from tolalloc.reducers.load_case import Combined
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.response.kernel import KernelResponse
-from tolalloc.reducers.settings import at
 from tolalloc.running.chunks import map_chunks
 
 Answer = tuple[Float[np.ndarray, "chunk output"], UInt8[np.ndarray, " chunk"]]
@@ -52,27 +52,21 @@ class Reading:
     """One solve and the outputs that are read off it."""
 
     outputs: tuple[str, ...]  # Names of the outputs with their units
-    # From model, errors in the order of its columns, and test torque, the outputs and the status of every sample
-    read: Callable[[EquivalentModel, Float[np.ndarray, "chunk column"], float], Answer]
-    disc_temperature: float | None = None  # At which it is read, that of the kernel unless said [K]
-
-    def at(self, disc_temperature: float) -> Reading:
-        """Return the same at a temperature of the discs above the ring, its outputs named after it [K]."""
-        outputs = tuple(at(name, disc_temperature=disc_temperature) for name in self.outputs)
-        return replace(self, outputs=outputs, disc_temperature=disc_temperature)
+    # From the kernel and errors in the order of its model's columns, the outputs and the status of every sample
+    read: Callable[[KernelResponse, Float[np.ndarray, "chunk all_columns"]], Answer]
 
 
-def _peak_to_peak(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
-    found = model.extremes(errors, torque)
+def _peak_to_peak(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+    found = kernel.extremes(errors)
     return found.peak_to_peak[:, np.newaxis] / ARCSECOND, found.status
 
 
-def _loop(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:  # noqa: ARG001
-    return _found(_read_off(hysteresis_loop(model, errors, TURN_ANGLES)))
+def _loop(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+    return _found(_read_off(hysteresis_loop(kernel.model, errors, TURN_ANGLES)))
 
 
-def _friction_loop(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:  # noqa: ARG001
-    loop = friction_loop(model, errors, TURN_ANGLES)
+def _friction_loop(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+    loop = friction_loop(kernel.model, errors, TURN_ANGLES)
     own = [100.0 * loop.rated.efficiency, loop.lost_motion / ARCMINUTE, loop.hysteresis_loss / ARCMINUTE]
     return _found([*_read_off(loop.plain), *own])
 
@@ -89,9 +83,9 @@ def _found(columns: list[Float[np.ndarray, " chunk"]]) -> Answer:
     return values, status.astype(np.uint8)
 
 
-def _rated_load(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
-    rated = float(np.copysign(model.reducer.load.rated_torque, torque))
-    solved = Solved.of(model.at_torque(rated).equilibria(errors, rated, TURN_ANGLES))
+def _load(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+    model, torque = kernel.model, kernel.load_torque
+    solved = Solved.of(model.at_torque(torque).equilibria(errors, torque, TURN_ANGLES))
     every = outputs_of(model.reducer)
     own = [every[name][1](solved) for name in _FORCES[model.reducer.family]]
     values = np.stack([*own, *_pin_stress(solved)], axis=1)
@@ -108,16 +102,16 @@ def _pin_stress(solved: Solved) -> tuple[Float[np.ndarray, " chunk"], Float[np.n
     return line_load.max(axis=(1, 2, 3)) * MILLIMETRE, pressure.max(axis=(1, 2, 3)) / MEGAPASCAL
 
 
-def _preload(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:  # noqa: ARG001
-    found = preload(model, errors)
+def _preload(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+    found = preload(kernel.model, errors)
     return np.stack([found.pin_force, found.friction_torque], axis=1), found.status
 
 
-def _radial_clearance(
-    model: EquivalentModel,
-    errors: Float[np.ndarray, "chunk column"],
-    torque: float,  # noqa: ARG001
-) -> Answer:
+def _radial_clearance(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+    return _clearance_of(kernel.model, errors)
+
+
+def _clearance_of(model: EquivalentModel, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
     clearance = radial_clearance(model, errors)[:, np.newaxis] / MICROMETRE
     status = np.where(np.isfinite(clearance[:, 0]), Status.CONVERGED, Status.NOT_FINITE)
     return clearance, status.astype(np.uint8)
@@ -146,7 +140,7 @@ _REQUIREMENTS = {
                 "largest line load, rated torque [N/mm]",
                 "peak pressure, rated torque [MPa]",
             ),
-            read=_rated_load,
+            read=_load,
         ),
         Reading(outputs=(PRELOAD, FRICTION_TORQUE), read=_preload),
         Reading(outputs=(RADIAL_CLEARANCE,), read=_radial_clearance),
@@ -201,8 +195,8 @@ def orders_reading(orders: tuple[int, ...]) -> Reading:
     ('order 2 cosine [arcsec]', 'order 2 sine [arcsec]')
     """
 
-    def read(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
-        found = model.equilibria(errors, torque)
+    def read(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+        found = kernel.model.equilibria(errors, kernel.torque)
         return _waves(orders, found.transmission_error), found.status.max(axis=1)
 
     return Reading(outputs=tuple(name for order in orders for name in wave_outputs(order)), read=read)
@@ -219,8 +213,8 @@ def with_orders(readings: tuple[Reading, ...], orders: tuple[int, ...]) -> tuple
     ['order 3 cosine [arcsec]', 'order 3 sine [arcsec]']
     """
 
-    def read(model: EquivalentModel, errors: Float[np.ndarray, "chunk column"], torque: float) -> Answer:
-        found, curve = model.extremes_and_curve(errors, torque)
+    def read(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+        found, curve = kernel.model.extremes_and_curve(errors, kernel.torque)
         return np.hstack([found.peak_to_peak[:, np.newaxis] / ARCSECOND, _waves(orders, curve)]), found.status
 
     apart = orders_reading(orders)
@@ -269,17 +263,45 @@ class OutputsResponse:
 
     def read(self, x: Float[np.ndarray, "chunk column"]) -> Answer:
         """Return the outputs of one chunk and the worst status of every sample."""
-        errors = {
-            warmer: (self.kernel if warmer is None else self.kernel.at_disc_temperature(warmer)).errors(x)
-            for warmer in {reading.disc_temperature for reading in self.readings}
-        }
-        answers = [
-            reading.read(self.kernel.model, errors[reading.disc_temperature], self.kernel.torque)
-            for reading in self.readings
-        ]
+        errors = self.kernel.errors(x)
+        answers = [reading.read(self.kernel, errors) for reading in self.readings]
         return np.concatenate([values for values, _ in answers], axis=1), np.asarray(
             np.max([status for _, status in answers], axis=0)
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadCasesResponse:
+    """Outputs under several load cases, and what is made of them, one row per sample."""
+
+    responses: tuple[Response, ...]  # Of each load case, whose units are counted under the first alone
+    # Outputs of the responses together, in their order, as they are named under their load cases
+    read: tuple[str, ...]
+    outputs: tuple[str, ...]  # What is answered, of `read` or `combined`
+    combined: Mapping[str, Combined]
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Those of every load case."""
+        return self.responses[0].columns
+
+    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+        """Return the outputs of every sample; a sample fails where one of its load cases does."""
+        found = [response(x) for response in self.responses]
+        values, place = np.hstack([own.values for own in found]), {name: at for at, name in enumerate(self.read)}
+        chosen = [
+            values[:, place[name]] if name in place else self._combined(self.combined[name], values, place)
+            for name in self.outputs
+        ]
+        status = np.max([own.status for own in found], axis=0)
+        return Evaluation(values=np.stack(chosen, axis=1), status=np.asarray(status))
+
+    @staticmethod
+    def _combined(
+        combined: Combined, values: Float[np.ndarray, "sample output"], place: Mapping[str, int]
+    ) -> Float[np.ndarray, " sample"]:
+        own = values[:, [place[name] for name in combined.of]]
+        return np.asarray((combined.weights(own) * own).sum(axis=1))
 
 
 Derived = tuple[Float[np.ndarray, " chunk"], Float[np.ndarray, "chunk all_columns"], UInt8[np.ndarray, " chunk"]]
@@ -331,7 +353,7 @@ def _friction_derivatives(model: EquivalentModel, errors: Float[np.ndarray, "chu
 
 
 def _clearance_derivatives(model: EquivalentModel, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
-    clearance, status = _radial_clearance(model, errors, 0.0)
+    clearance, status = _clearance_of(model, errors)
     return clearance[:, 0], radial_clearance_derivatives(model, errors) / MICROMETRE, status
 
 

@@ -1,0 +1,223 @@
+"""Load cases: conditions under which outputs are limited beside those in force, and the names of outputs there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.exceptions import InputError
+from tolalloc.reading.named_fields import NamedFields, Rule, is_number, number, or_none
+from tolalloc.reading.units import DEGREE
+from tolalloc.reducers import EFFICIENCY, PEAK_TO_PEAK, RADIAL_CLEARANCE, TORSIONAL_STIFFNESS
+from tolalloc.reducers.settings import TEMPERATURE
+
+_RATED = ", rated torque"
+"""What an output is called whose load is the rated torque, unless a load case states another."""
+_LEAST_IS_WORST = (TORSIONAL_STIFFNESS, EFFICIENCY, RADIAL_CLEARANCE)
+"""Outputs of which less is worse."""
+_NAME = Rule(
+    "a short name without brackets, such as 'warm'",
+    lambda value: isinstance(value, str) and bool(value.strip()) and not {*"[],"} & {*value},
+)
+_WINDOW = Rule(
+    "two angles of the output in degrees, the smaller one first and at most a turn apart, such as (-90, 90)",
+    lambda value: (
+        isinstance(value, Sequence)
+        and len(value) == 2
+        and all(map(is_number, value))
+        and -360 <= value[0] < value[1] <= 360
+        and value[1] - value[0] <= 360
+    ),
+)
+
+
+@dataclass(frozen=True)
+class LoadCase(NamedFields):
+    """Conditions under which a reducer's outputs may be limited beside those of the study.
+
+    What is not stated is as in the study.
+
+    Parameters
+    ----------
+    name
+        What outputs under it are called after.
+    torque
+        On the carrier, negative where it resists the rotation: of the transmission error, and of what pins and bearings
+        carry in place of the rated torque; lost motion, backlash and stiffness have torques of their own [N·m].
+    disc_temperature
+        Of the discs less that of the ring [K].
+    output_angles
+        Part of the output turn within which the transmission error counts, all of it unless given [°].
+    speed
+        Of the output, which lives of bearings, wear and heat follow from [r/min].
+    share
+        Share of the time, the shares of all load cases of any sum [-].
+    """
+
+    called: ClassVar[str] = "load case"
+    by_position: ClassVar[int] = 1
+
+    name: Annotated[str, _NAME]
+    _: KW_ONLY
+    torque: Annotated[float | None, or_none(number("a torque in N·m, but not 0"))] = None
+    disc_temperature: Annotated[float | None, or_none(TEMPERATURE)] = None
+    output_angles: Annotated[tuple[float, float] | None, or_none(_WINDOW)] = None
+    speed: Annotated[float | None, or_none(number("a speed in r/min above 0", above=0, most=1e4))] = None
+    share: Annotated[float, number("a share of the time above 0", above=0, most=1e6)] = 1.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.torque == 0:
+            raise InputError.at(f"load case {self.name}", "torque", self.torque, "a torque in N·m, but not 0")
+
+    @property
+    def window(self) -> tuple[float, float] | None:
+        """Part of the output turn within which the transmission error counts [rad]."""
+        return None if self.output_angles is None else tuple(DEGREE * own for own in self.output_angles)  # type: ignore[return-value]
+
+    @property
+    def changes(self) -> bool:
+        """Whether it states anything that outputs feel."""
+        return not (self.torque is None and self.disc_temperature is None and self.output_angles is None)
+
+    def felt_by(self, output: str) -> bool:
+        """Return whether an output may differ from that in force."""
+        return (
+            self.disc_temperature is not None
+            or (self.torque is not None and (output == PEAK_TO_PEAK or _RATED in output))
+            or (self.output_angles is not None and output == PEAK_TO_PEAK)
+        )
+
+
+def _split(place: str, output: Any) -> tuple[str, str]:
+    """Return what an output is and its unit.
+
+    Raises
+    ------
+    InputError
+        What is no output with a unit.
+    """
+    what, found, unit = output.rpartition(" [") if isinstance(output, str) else ("", "", "")
+    if not found:
+        raise InputError.of_argument(place, "output", output, "an output of a reducer, such as ta.PEAK_TO_PEAK")
+    return what, unit
+
+
+def at(output: str, case: LoadCase) -> str:
+    """Return the name of an output under a load case of its own, to be limited beside the same under others.
+
+    Parameters
+    ----------
+    output
+        Output of a reducer, such as `PEAK_TO_PEAK`.
+    case
+        One of the ``load_cases`` of `reducer`.
+
+    Raises
+    ------
+    InputError
+        An output without a unit, or a load case that is none.
+
+    Examples
+    --------
+    >>> at("lost motion [arcmin]", LoadCase("cold", disc_temperature=-5))
+    'lost motion, cold [arcmin]'
+    >>> at("peak pressure, rated torque [MPa]", LoadCase("stop", torque=-800.0))
+    'peak pressure, stop [MPa]'
+    """
+    what, unit = _split("at", output)
+    if not isinstance(case, LoadCase):
+        raise InputError.of_argument(
+            "at", "case", case, "a load case, such as ta.LoadCase('cold', disc_temperature=-5)"
+        )
+    return f"{what.removesuffix(_RATED) if case.torque is not None else what}, {case.name} [{unit}"
+
+
+def worst(output: str) -> str:
+    """Return the name of the worst of an output over the load cases of a reducer, unit by unit.
+
+    The largest, but the least of stiffness, efficiency and radial clearance.
+
+    Raises
+    ------
+    InputError
+        An output without a unit.
+
+    Examples
+    --------
+    >>> worst("lost motion [arcmin]")
+    'lost motion, worst load case [arcmin]'
+    """
+    what, unit = _split("worst", output)
+    return f"{what.removesuffix(_RATED)}, worst load case [{unit}"
+
+
+def mean(output: str) -> str:
+    """Return the name of the mean of an output over the load cases of a reducer, weighted by their shares of the time.
+
+    Raises
+    ------
+    InputError
+        An output without a unit.
+
+    Examples
+    --------
+    >>> mean("lost motion [arcmin]")
+    'lost motion, mean of load cases [arcmin]'
+    """
+    what, unit = _split("mean", output)
+    return f"{what.removesuffix(_RATED)}, mean of load cases [{unit}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Combined:
+    """An output over all load cases: the worst of it, or its mean weighted by shares of the time."""
+
+    of: tuple[str, ...]  # Names of the output under every load case
+    shares: tuple[float, ...] | None  # Of the time, which a mean weighs by; none of the worst [-]
+    least: bool = False  # Whether less is worse
+
+    def weights(self, values: Float[np.ndarray, "sample case"]) -> Float[np.ndarray, "sample case"]:
+        """Return what every load case counts in a unit: its value is Σ weight·value, and so are its derivatives [-]."""
+        if self.shares is not None:
+            return np.broadcast_to(np.array(self.shares) / sum(self.shares), values.shape)
+        if not np.isfinite(values).all():
+            values = np.nan_to_num(values, nan=0.0)  # a failed unit; its status keeps it out
+        worst = values.argmin(axis=1) if self.least else values.argmax(axis=1)
+        return np.asarray(np.eye(values.shape[1])[worst])
+
+
+def combined_outputs(cases: Sequence[LoadCase], outputs: Sequence[str]) -> Mapping[str, Combined]:
+    """Return the worst and the mean of every output that two load cases or more feel, by their names."""
+    found: dict[str, Combined] = {}
+    for output in outputs:
+        felt = [case for case in cases if case.felt_by(output)]
+        if len(felt) > 1:
+            names = tuple(at(output, case) for case in felt)
+            shares = tuple(case.share for case in felt)
+            found[worst(output)] = Combined(of=names, shares=None, least=output in _LEAST_IS_WORST)
+            found[mean(output)] = Combined(of=names, shares=shares)
+    return found
+
+
+def require_load_cases(place: str, cases: Any) -> tuple[LoadCase, ...]:
+    """Return the load cases of a reducer.
+
+    Raises
+    ------
+    InputError
+        What is no list of load cases of different names.
+    """
+    good = isinstance(cases, Sequence) and all(isinstance(case, LoadCase) for case in cases)
+    if not good:
+        allowed = "a list of load cases, such as [ta.LoadCase('warm', disc_temperature=5)]"
+        raise InputError.of_argument(place, "load_cases", cases, allowed)
+    names = [case.name for case in cases]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InputError.of_argument(place, "load_cases", twice, "names that differ")
+    return tuple(cases)
