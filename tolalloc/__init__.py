@@ -156,6 +156,7 @@ _INQUIRIES = (
     "contact",
     "costs",
     "diagnose",
+    "duty",
     "identify",
     "lot",
     "modify",

@@ -22,6 +22,8 @@ COMPUTES_NOTHING = {
     # reads a file or a table
     "reducers.choice.reducer": "reads",
     "reducers.load_case.require_load_cases": "checks",
+    "reducers.load_case.load_cycle": "reads",
+    "reducers.duty.require_cycle": "checks",
     "reducers.reducer.files.load_identified_stiffness": "reads",
     "reducers.reducer.form.load_designed": "reads",
     "reducers.reducer.form.read_profile": "reads",

@@ -97,7 +97,21 @@ study = ta.Study(
 
 
 COMMANDS = (
-    *("new", "check", "open", "run", "rank", "allocate", "whatif", "series", "compare", "costs", "te", "contact"),
+    *(
+        "new",
+        "check",
+        "open",
+        "run",
+        "rank",
+        "allocate",
+        "whatif",
+        "series",
+        "compare",
+        "costs",
+        "te",
+        "contact",
+        "duty",
+    ),
     *("modify", "identify", "diagnose", "lot", "assemble", "mount", "simulate", "schema", "doctor"),
 )
 
@@ -196,6 +210,7 @@ LONGER = (
             "te --reducer rv20e --unit table4 --attribute --out @te",
             f"te {MINE}",
             f"contact {MINE} --out @contact",
+            f"duty @mine/cycle.csv {MINE} --out @duty",
             f"modify li2018 {MINE} --radial 15 --out @modify",
             "assemble @mine/chain.toml --measured @mine/angles.csv --out @assemble",
             "assemble bx40e",

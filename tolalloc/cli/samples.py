@@ -169,6 +169,9 @@ pin ground,6,µm,12.5
 pin ground,3,µm,18
 pin ground,2,µm,25
 """
+_CYCLE = (("start", 1.2, 10, 10), ("constant", 0.6, 20, 30), ("stop", -0.8, 10, 10), ("hold", 0.3, 1, 50))
+"""Load cases of a joint: name, torque over the rated one that resists [-], speed [rpm], share of the time [%]."""
+_CYCLE_HEADS = ("case", "torque [N·m]", "speed [rpm]", "share [%]")
 _CURVE = "# Simulated: a unit whose pitch of the housing is bad.\nangle [deg],transmission error [arcsec]\n"
 
 
@@ -188,6 +191,7 @@ class Samples:
             "processes": lambda: process_files(self.sources, family_of(self.reducer).new.priced),
             "cmm": lambda: {"pin_diameters.csv": self.measured_pins},
             "bench": lambda: bench_files(self.reducer, self._errors, self._units(_UNITS)),
+            "cycle": lambda: {"cycle.csv": self.cycle},
             "curve": lambda: {"unit7.csv": self.curve},
             "lot": lambda: {"lot.csv": self.lot},
             "parts": lambda: {"parts.csv": self.parts},
@@ -229,6 +233,13 @@ class Samples:
         found = kernel.model.equilibria(kernel.errors(x), kernel.torque, angle).transmission_error[0] / ARCSECOND
         read = found + _NOISE * SeedTree(1).child("readings").generator().standard_normal(_ANGLES)
         return _CURVE + "".join(f"{at:.1f},{value:.3f}\n" for at, value in zip(angle / DEGREE, read, strict=True))
+
+    @property
+    def cycle(self) -> str:
+        """Load cases of a robot's joint, for ``tolalloc duty``."""
+        rated = self.reducer.load.rated_torque
+        rows = [(name, float(f"{-share * rated:.4g}"), *rest) for name, share, *rest in _CYCLE]
+        return table_text(_CYCLE_HEADS, rows, ("Invented, for trying: replace it by your own.",))
 
     @property
     def lot(self) -> str:

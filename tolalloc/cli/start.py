@@ -381,6 +381,7 @@ _SAID = {
         "pin_diameters.csv": "measured pins, simulated: name it under `measured`, with `empirical` under `distribution`"
     },
     "bench": {"bench.toml": "curves and loops of two units, simulated; its tables are `bench_….csv`"},
+    "cycle": {"cycle.csv": "load cases of a joint, invented"},
     "curve": {"unit7.csv": "the curve of a bad unit, simulated"},
     "lot": {"lot.csv": "gauge readings of a lot of 25 units, simulated"},
     "parts": {"parts.csv": "measured parts of two units, simulated"},
@@ -394,6 +395,7 @@ _ASKED = {
     "costs": "tolalloc costs shop.csv",
     "processes": "tolalloc check with_processes.py",
     "bench": "tolalloc identify bench.toml --reducer reducer.toml",
+    "cycle": "tolalloc duty cycle.csv --reducer reducer.toml",
     "curve": "tolalloc diagnose unit7.csv --reducer reducer.toml --tolerances zones.csv",
     "lot": "tolalloc lot lot.csv zones.csv",
     "parts": "tolalloc mount parts.csv --reducer reducer.toml",

@@ -12,6 +12,7 @@ from tolalloc.drawings.sources import neglected_columns
 from tolalloc.drawings.tolerance_table import require_small_zones
 from tolalloc.exceptions import InputError
 from tolalloc.models.settings import require_settings
+from tolalloc.reading.files import found_from_here
 from tolalloc.reading.named_fields import is_number
 from tolalloc.reading.units import MICROMETRE, MILLIMETRE
 from tolalloc.reducers import DISC_TEMPERATURE, TORQUE
@@ -20,7 +21,7 @@ from tolalloc.reducers.equivalent.model import EquivalentModel, cached_model
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
 from tolalloc.reducers.equivalent.springs import HARMONICS
 from tolalloc.reducers.families.known import SOURCES
-from tolalloc.reducers.load_case import LoadCase, require_load_cases
+from tolalloc.reducers.load_case import LoadCase, load_cycle, require_load_cases
 from tolalloc.reducers.reducer.design import Modification, Reducer, at_torque
 from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
@@ -253,7 +254,7 @@ def reducer(
     radial_clearance: tuple[float, float] | None = None,
     rotation_clearance: tuple[float, float] | None = None,
     disc_temperature: float = 0.0,
-    load_cases: Sequence[LoadCase] = (),
+    load_cases: Sequence[LoadCase] | str | Path = (),
     neglected: tuple[str, ...] = NEGLECTED,
     unit: str | Path = "",
 ) -> ReducerChoice:
@@ -278,7 +279,7 @@ def reducer(
     load_cases
         Further conditions under which outputs may be limited as well, by names that `tolalloc.at`, `tolalloc.worst` and
         `tolalloc.mean` make, such as ``ta.at(ta.LOST_MOTION, cold)`` with
-        ``cold = ta.LoadCase("cold", disc_temperature=-5)``.
+        ``cold = ta.LoadCase("cold", disc_temperature=-5)``; or a duty cycle's file of them.
     neglected
         Sources that a drawing may leave out, taken as zero; ``*`` stands for anything. A bearing's or a mesh's
         clearance may always be left out: it is then the nominal one of the reducer file.
@@ -306,7 +307,8 @@ def reducer(
             allowed = "two numbers from -50 to 50 µm, the smaller one first"
             raise InputError.at(f"reducer {name}", f"{field}_clearance", own, allowed)
     TEMPERATURE.check(f"reducer {name}", "disc_temperature", disc_temperature, of_argument=True)
-    cases = require_load_cases(f"reducer {name}", load_cases)
+    stated = load_cycle(found_from_here(load_cases)) if isinstance(load_cases, str | Path) else load_cases
+    cases = require_load_cases(f"reducer {name}", stated)
     if isinstance(neglected, str) or not (
         isinstance(neglected, Sequence) and all(isinstance(pattern, str) for pattern in neglected)
     ):

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.drawings.table_file import read_rows
 from tolalloc.exceptions import InputError
+from tolalloc.reading.files import Record
 from tolalloc.reading.named_fields import NamedFields, Rule, is_number, number, or_none
 from tolalloc.reading.units import DEGREE
 from tolalloc.reducers import EFFICIENCY, PEAK_TO_PEAK, RADIAL_CLEARANCE, TORSIONAL_STIFFNESS
@@ -53,7 +56,9 @@ class LoadCase(NamedFields):
     output_angles
         Part of the output turn within which the transmission error counts, all of it unless given [°].
     speed
-        Of the output, which lives of bearings, wear and heat follow from [r/min].
+        Of the output, which lives of bearings, wear and heat follow from [rpm].
+    moment
+        External moment across the output's axis, which the main bearing alone feels [N·m].
     share
         Share of the time, the shares of all load cases of any sum [-].
     """
@@ -66,7 +71,8 @@ class LoadCase(NamedFields):
     torque: Annotated[float | None, or_none(number("a torque in N·m, but not 0"))] = None
     disc_temperature: Annotated[float | None, or_none(TEMPERATURE)] = None
     output_angles: Annotated[tuple[float, float] | None, or_none(_WINDOW)] = None
-    speed: Annotated[float | None, or_none(number("a speed in r/min above 0", above=0, most=1e4))] = None
+    speed: Annotated[float | None, or_none(number("a speed in rpm above 0", above=0, most=1e4))] = None
+    moment: Annotated[float, number("a moment in N·m")] = 0.0
     share: Annotated[float, number("a share of the time above 0", above=0, most=1e6)] = 1.0
 
     def __post_init__(self) -> None:
@@ -221,3 +227,37 @@ def require_load_cases(place: str, cases: Any) -> tuple[LoadCase, ...]:
     if twice is not None:
         raise InputError.of_argument(place, "load_cases", twice, "names that differ")
     return tuple(cases)
+
+
+class CycleRow(Record):
+    """A row of a duty cycle's file."""
+
+    case: str
+    torque: float
+    speed: float
+    share: float
+    disc_temperature: float | None = None
+    moment: float | None = None
+
+
+_UNITS = {"torque": "N·m", "speed": "rpm", "share": "%", "disc_temperature": "K", "moment": "N·m"}
+
+
+def load_cycle(path: Path) -> tuple[LoadCase, ...]:
+    """Return the load cases of a duty cycle's file, a CSV of ``case,torque [N·m],speed [rpm],share [%]``.
+
+    A column ``disc_temperature [K]`` and one ``moment [N·m]`` may stand there too.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        The file, row, field and value that are not allowed.
+    """
+    cases = []
+    for place, row in read_rows(path, CycleRow, "case", _UNITS):
+        stated = {name: value for name, value in row.model_dump().items() if name != "case" and value is not None}
+        try:
+            cases.append(LoadCase(row.case, **stated))
+        except InputError as error:
+            raise InputError(f"{place}: {error}") from None
+    return require_load_cases(str(path), cases)

@@ -25,6 +25,9 @@ from tolalloc.reducers.reducer.stiffness import Material
 _LINE = 35948.0
 """c_L of a steel roller of 1 mm effective length between both races, ISO/TS 16281 [N/mm^(10/9)]."""
 
+_ROLLERS, _BALLS = 207.9 * 0.83, 39.9 * 0.95
+"""Constants of f_c by Lundberg and Palmgren with the reductions that ISO 281 tabulates f_c with [N, mm]."""
+
 _LARGEST = 1e-3
 """Displacement within which every force of a bearing is looked for [m]."""
 
@@ -72,6 +75,32 @@ class RollingBearing(ABC):
     @abstractmethod
     def exponent(self) -> float:
         """Exponent of the compression [-]."""
+
+    @property
+    @abstractmethod
+    def load_rating(self) -> float:
+        """Basic dynamic radial load rating C of all rows by ISO 281, theory page equation (92) [N]."""
+
+    @property
+    @abstractmethod
+    def life_exponent(self) -> float:
+        """Exponent p of load rating over load in the basic rating life, theory page equation (93) [-]."""
+
+    @property
+    def _slenderness(self) -> float:
+        """Element over pitch circle γ = D·cos α/d_m [-]."""
+        return self.diameter * cos(self.contact_angle) / self.pitch_diameter
+
+    def life(self, load: float | Float[np.ndarray, "*loads"]) -> Float[np.ndarray, "*loads"]:
+        """Return the basic rating life L10 under an equivalent radial load [N], in turns of one ring against the other.
+
+        Examples
+        --------
+        >>> needles = RollerBearing(rollers=13, roller_diameter=2.7e-3, roller_length=7e-3, pitch_diameter=13.4e-3)
+        >>> f"{float(needles.life(needles.load_rating)):.0f}"  # a million turns under the load rating
+        '1000000'
+        """
+        return np.asarray(1e6 * (self.load_rating / load) ** self.life_exponent)
 
     def _require_sound(self, names: str) -> None:
         """Raise for elements that overlap or are smaller than their clearance, and for preload of the other kind."""
@@ -217,6 +246,21 @@ class RollerBearing(RollingBearing):
         """c_L of a roller between both races [N/m^(10/9)]."""
         return float(_LINE * (self.roller_length / MILLIMETRE) ** (8.0 / 9.0) / MILLIMETRE**self.exponent)
 
+    @property
+    def load_rating(self) -> float:
+        """b_m·f_c·(i·L·cos α)^(7/9)·Z^(3/4)·D^(29/27) with b_m = 1.1 [N]."""
+        small = self._slenderness
+        races = (1.04 * ((1.0 - small) / (1.0 + small)) ** (143.0 / 108.0)) ** 4.5
+        geometry = small ** (2.0 / 9.0) * (1.0 - small) ** (29.0 / 27.0) / (1.0 + small) ** 0.25
+        factor = _ROLLERS * geometry * (1.0 + races) ** (-2.0 / 9.0)
+        carried = (self.rows * self.roller_length / MILLIMETRE * cos(self.contact_angle)) ** (7.0 / 9.0)
+        return float(1.1 * factor * carried * self.rollers**0.75 * (self.roller_diameter / MILLIMETRE) ** (29.0 / 27.0))
+
+    @property
+    def life_exponent(self) -> float:
+        """That of line contact [-]."""
+        return 10.0 / 3.0
+
 
 @dataclass(frozen=True, kw_only=True)
 class BallBearing(RollingBearing):
@@ -250,6 +294,21 @@ class BallBearing(RollingBearing):
         small = self.ball_diameter * cos(self.contact_angle) / self.pitch_diameter
         races = (self._race(-small / (1.0 + small)), self._race(small / (1.0 - small)))
         return float(sum(race ** (-2.0 / 3.0) for race in races) ** -1.5)
+
+    @property
+    def load_rating(self) -> float:
+        """b_m·f_c·(i·cos α)^0.7·Z^(2/3)·D^1.8 with b_m = 1.3, balls of up to 25.4 mm [N]."""
+        small, groove = self._slenderness, 2.0 * self.osculation
+        races = (1.04 * ((1.0 - small) / (1.0 + small)) ** 1.72) ** (10.0 / 3.0)
+        geometry = small**0.3 * (1.0 - small) ** 1.39 / (1.0 + small) ** (1.0 / 3.0)
+        factor = _BALLS * geometry * (groove / (groove - 1.0)) ** 0.41 * (1.0 + races) ** -0.3
+        carried = (self.rows * cos(self.contact_angle)) ** 0.7 * self.balls ** (2.0 / 3.0)
+        return float(1.3 * factor * carried * (self.ball_diameter / MILLIMETRE) ** 1.8)
+
+    @property
+    def life_exponent(self) -> float:
+        """That of point contact [-]."""
+        return 3.0
 
     def _race(self, rolling: float) -> float:
         """Return the coefficient at one race [N/m^1.5].
