@@ -156,7 +156,7 @@ def test_a_load_case_needs_a_name_that_an_output_can_bear(name):
         ta.LoadCase(name)
 
 
-@pytest.mark.parametrize("given", ["warm", [5.0], (RATED, RATED)])
+@pytest.mark.parametrize("given", [5, [5.0], (RATED, RATED)])
 def test_load_cases_of_a_reducer_are_refused_where_they_cannot_be(given):
     with pytest.raises(InputError, match="load_cases"):
         ta.reducer("rv20e", load_cases=given)
@@ -174,3 +174,25 @@ def test_an_output_without_a_unit_has_no_name_under_a_load_case(given):
             name()
     with pytest.raises(InputError, match="case"):
         ta.at(ta.PEAK_TO_PEAK, "warm")
+
+
+@pytest.mark.parametrize(
+    ("name", "table"), [("rv80e", "rv80e_drawing"), pytest.param("cd29", "cd29_drawing", marks=pytest.mark.slow)]
+)
+def test_three_cranks_and_a_single_stage_take_load_cases(name, table):
+    drawing = ta.drawing(table)
+    rated = ta.reducer(name).reducer.load.rated_torque
+    cases = (ta.LoadCase("rated", torque=-rated), ta.LoadCase("reversed", torque=rated, disc_temperature=3.0))
+    model = ta.reducer(name, neglected=("disc*.tilt",), load_cases=cases).bound(drawing.errors, "test")
+    names = (ta.worst(ta.PEAK_TO_PEAK), ta.at(ta.LOST_MOTION, cases[1]), ta.at(PRESSURE, cases[0]), PRESSURE)
+    errors = drawing.errors
+    uniform = np.concatenate(list(SeedTree(1).uniform_chunks(2, len(errors.columns))))
+    found = model.reading(names)(0.3 * errors.deviations(errors.standard_values(uniform), errors.zones))
+    assert found.good.all()
+    np.testing.assert_allclose(found.values[:, 2], found.values[:, 3], rtol=1e-12)
+
+
+def test_a_duty_cycle_file_gives_a_reducer_its_load_cases(tmp_path):
+    file = tmp_path / "cycle.csv"
+    file.write_text("case,torque [N·m],speed [rpm],share [%]\nup,-100,10,40\ndown,80,10,60\n")
+    assert [case.name for case in ta.reducer("rv20e", load_cases=file).load_cases] == ["up", "down"]
