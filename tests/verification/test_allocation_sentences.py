@@ -148,6 +148,16 @@ def test_the_modification_saves_only_what_the_searches_can_tell(results):
         assert not says(answer_of(same).sentences, "allocation.saves")
 
 
+def test_a_modification_that_was_not_confirmed_saves_nothing(results):
+    joint = costing(results.free, 10.0)
+    joint = replace(joint, chosen=replace(joint.chosen, accepted=False))
+    alone = costing(results.fixed, 11.0)
+    alone = replace(alone, chosen=replace(alone.chosen, accepted=True))
+    found = answer_of(replace(results, free=joint, fixed=alone, graded=None)).sentences
+    assert says(found, "allocation.not_confirmed", cost=10.0, alone=11.0)
+    assert not says(found, "allocation.saves")
+
+
 def test_a_search_that_missed_says_what(results):
     alone = answer_of(replace(results, fixed=missing(results.fixed))).sentences
     assert says(alone, "allocation.alone_missed")

@@ -372,6 +372,8 @@ def _modification(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     if saving < _SAME_COST:
         key = "nothing_cheaper_many" if word.endswith("s") else "nothing_cheaper"
         return (_say(key, word=word, cost=alone.cost, cost_unit=cost_unit),)
+    if result.chosen is alone:
+        return (_say("not_confirmed", word=word, cost=joint.cost, alone=alone.cost, cost_unit=cost_unit),)
     doubt = _say("saves_doubt") if max(result.fixed.gap, result.free.gap) > saving else ""
     gaps = {"saved": alone.cost - joint.cost, "share": saving, "alone": alone.cost, "doubt": doubt}
     return (_say("saves", word=word, cost_unit=cost_unit, **gaps),)
