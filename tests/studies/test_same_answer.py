@@ -150,6 +150,8 @@ def test_mount(mine):
         ("simulate", {"torque": 5}, "ta.simulate: torque is 5.0; allowed is -1670 N·m to below 0"),
         ("simulate", {"speed": 0}, "ta.simulate: speed is 0.0; allowed is a number above 0."),
         ("costs", {"shop": 3}, "ta.costs: shop is 3; allowed is a path."),
+        ("duty", {"cycle": 3}, "ta.duty: cycle is 3; allowed is a path."),
+        ("duty", {"cycle": "cycle.csv", "resistance": -1}, "ta.duty: resistance is -1.0; allowed is 0 to 10 K/W."),
         (
             "identify",
             {"data": "bench.toml", "parameters": "K_pd"},
@@ -180,6 +182,13 @@ def test_a_refusal_names_the_argument(word, given, said):
     with pytest.raises(InputError) as error:
         getattr(ta, word)(**given)
     assert str(error.value).startswith(said)
+
+
+def test_a_reducer_may_be_a_path():
+    from tolalloc.reducers.reducer.files import PRESETS
+
+    found = ta.contact(reducer=PRESETS / "rv40e.reducer.toml", phases=1)
+    assert found.result.assessment.reducer.name == "RV-40E"
 
 
 def test_a_value_without_its_name_or_of_no_field_is_refused():

@@ -182,7 +182,7 @@ def _taken(place: str, name: str, kinds: tuple[Any, ...], value: Any) -> Any:
         (int, isinstance(value, Integral) and not isinstance(value, bool), int, "a whole number"),
         (float, is_number(value), float, "a number"),
         (Path, isinstance(value, str | os.PathLike), Path, "a path"),
-        (str, isinstance(value, str), str, "a text"),
+        (str, isinstance(value, str | os.PathLike), os.fspath, "a text"),
         (list[str], isinstance(value, list | tuple), list, "a list of texts"),
     ):
         if kind in kinds:
