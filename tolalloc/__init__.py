@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from tolalloc.reducers.choice import reducer as reducer
     from tolalloc.reducers.load_case import LoadCase as LoadCase
     from tolalloc.reducers.load_case import at as at
+    from tolalloc.reducers.load_case import change as change
     from tolalloc.reducers.load_case import mean as mean
     from tolalloc.reducers.load_case import worst as worst
     from tolalloc.reports.document import Document as Document
@@ -134,6 +135,7 @@ _WHERE = {
     "WorstCase": "allocation.space.requirement",
     "LoadCase": "reducers.load_case",
     "at": "reducers.load_case",
+    "change": "reducers.load_case",
     "mean": "reducers.load_case",
     "worst": "reducers.load_case",
     "check": "study.commands",

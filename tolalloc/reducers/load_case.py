@@ -61,6 +61,9 @@ class LoadCase(NamedFields):
         External moment across the output's axis, which the main bearing alone feels [N·m].
     share
         Share of the time, the shares of all load cases of any sum [-].
+    hours
+        Hours of turning after which everything is looked at, parts worn by those load cases that state a speed, each
+        for its share of them; parts as new unless given [h].
     """
 
     called: ClassVar[str] = "load case"
@@ -74,6 +77,7 @@ class LoadCase(NamedFields):
     speed: Annotated[float | None, or_none(number("a speed in rpm above 0", above=0, most=1e4))] = None
     moment: Annotated[float, number("a moment in N·m")] = 0.0
     share: Annotated[float, number("a share of the time above 0", above=0, most=1e6)] = 1.0
+    hours: Annotated[float | None, or_none(number("hours of turning, 0 or more", least=0, most=1e6))] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -85,15 +89,11 @@ class LoadCase(NamedFields):
         """Part of the output turn within which the transmission error counts [rad]."""
         return None if self.output_angles is None else tuple(DEGREE * own for own in self.output_angles)  # type: ignore[return-value]
 
-    @property
-    def changes(self) -> bool:
-        """Whether it states anything that outputs feel."""
-        return not (self.torque is None and self.disc_temperature is None and self.output_angles is None)
-
     def felt_by(self, output: str) -> bool:
         """Return whether an output may differ from that in force."""
         return (
             self.disc_temperature is not None
+            or self.hours is not None
             or (self.torque is not None and (output == PEAK_TO_PEAK or _RATED in output))
             or (self.output_angles is not None and output == PEAK_TO_PEAK)
         )
@@ -135,12 +135,31 @@ def at(output: str, case: LoadCase) -> str:
     >>> at("peak pressure, rated torque [MPa]", LoadCase("stop", torque=-800.0))
     'peak pressure, stop [MPa]'
     """
-    what, unit = _split("at", output)
+    return _under("at", output, case, "")
+
+
+def _under(place: str, output: Any, case: Any, further: str) -> str:
+    what, unit = _split(place, output)
     if not isinstance(case, LoadCase):
-        raise InputError.of_argument(
-            "at", "case", case, "a load case, such as ta.LoadCase('cold', disc_temperature=-5)"
-        )
-    return f"{what.removesuffix(_RATED) if case.torque is not None else what}, {case.name} [{unit}"
+        allowed = "a load case, such as ta.LoadCase('cold', disc_temperature=-5)"
+        raise InputError.of_argument(place, "case", case, allowed)
+    return f"{what.removesuffix(_RATED) if case.torque is not None else what}, {case.name}{further} [{unit}"
+
+
+def change(output: str, case: LoadCase) -> str:
+    """Return the name of what a load case adds to an output in force, such as wear to the lost motion of new parts.
+
+    Raises
+    ------
+    InputError
+        An output without a unit, or a load case that is none.
+
+    Examples
+    --------
+    >>> change("lost motion [arcmin]", LoadCase("old", hours=6000))
+    'lost motion, old less in force [arcmin]'
+    """
+    return _under("change", output, case, " less in force")
 
 
 def worst(output: str) -> str:
@@ -181,16 +200,16 @@ def mean(output: str) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Combined:
-    """An output over all load cases: the worst of it, or its mean weighted by shares of the time."""
+    """An output over several load cases: the worst of it, its mean weighted by shares of the time, or a change."""
 
     of: tuple[str, ...]  # Names of the output under every load case
-    shares: tuple[float, ...] | None  # Of the time, which a mean weighs by; none of the worst [-]
+    fixed: tuple[float, ...] | None  # What each counts, of a mean its share of the time; none of the worst [-]
     least: bool = False  # Whether less is worse
 
     def weights(self, values: Float[np.ndarray, "sample case"]) -> Float[np.ndarray, "sample case"]:
         """Return what every load case counts in a unit: its value is Σ weight·value, and so are its derivatives [-]."""
-        if self.shares is not None:
-            return np.broadcast_to(np.array(self.shares) / sum(self.shares), values.shape)
+        if self.fixed is not None:
+            return np.broadcast_to(self.fixed, values.shape)
         if not np.isfinite(values).all():
             values = np.nan_to_num(values, nan=0.0)  # a failed unit; its status keeps it out
         worst = values.argmin(axis=1) if self.least else values.argmax(axis=1)
@@ -198,15 +217,16 @@ class Combined:
 
 
 def combined_outputs(cases: Sequence[LoadCase], outputs: Sequence[str]) -> Mapping[str, Combined]:
-    """Return the worst and the mean of every output that two load cases or more feel, by their names."""
+    """Return what load cases change of every output, and its worst and mean over two or more, by their names."""
     found: dict[str, Combined] = {}
     for output in outputs:
         felt = [case for case in cases if case.felt_by(output)]
+        found |= {change(output, case): Combined(of=(at(output, case), output), fixed=(1.0, -1.0)) for case in felt}
         if len(felt) > 1:
             names = tuple(at(output, case) for case in felt)
-            shares = tuple(case.share for case in felt)
-            found[worst(output)] = Combined(of=names, shares=None, least=output in _LEAST_IS_WORST)
-            found[mean(output)] = Combined(of=names, shares=shares)
+            together = sum(case.share for case in felt)
+            found[worst(output)] = Combined(of=names, fixed=None, least=output in _LEAST_IS_WORST)
+            found[mean(output)] = Combined(of=names, fixed=tuple(case.share / together for case in felt))
     return found
 
 
@@ -226,6 +246,8 @@ def require_load_cases(place: str, cases: Any) -> tuple[LoadCase, ...]:
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise InputError.of_argument(place, "load_cases", twice, "names that differ")
+    if any(case.hours for case in cases):
+        require_duty(place, cases)
     return tuple(cases)
 
 
@@ -261,3 +283,18 @@ def load_cycle(path: Path) -> tuple[LoadCase, ...]:
         except InputError as error:
             raise InputError(f"{place}: {error}") from None
     return require_load_cases(str(path), cases)
+
+
+def require_duty(place: str, cases: Sequence[LoadCase]) -> tuple[LoadCase, ...]:
+    """Return those that state a speed: the duty cycle that wears a reducer.
+
+    Raises
+    ------
+    InputError
+        None of them does.
+    """
+    duty = tuple(case for case in cases if case.speed is not None)
+    if not duty:
+        allowed = "a list in which one states the speed that wears, such as ta.LoadCase('work', torque=-167, speed=15)"
+        raise InputError.of_argument(place, "load_cases", [case.name for case in cases], allowed)
+    return duty

@@ -18,6 +18,7 @@ from tolalloc.reading.units import MICROMETRE, MILLIMETRE
 from tolalloc.reducers import DISC_TEMPERATURE, FRICTION_TORQUE, PEAK_TO_PEAK, PRELOAD, RADIAL_CLEARANCE, TORQUE
 from tolalloc.reducers.equivalent.hysteresis import HysteresisLoop
 from tolalloc.reducers.equivalent.perfect import exact_loop, preload, rated_pin_force
+from tolalloc.reducers.equivalent.wear import wear_of
 from tolalloc.reducers.load_case import Combined, LoadCase, at, combined_outputs
 from tolalloc.reducers.reducer.design import (
     MODIFICATION_CONVENTION,
@@ -87,13 +88,18 @@ class ReducerModel(Model):
     @property
     def reducer_in_force(self) -> Reducer:
         """The same with the modification that leaves the clearances in force, and as warm discs shift it."""
-        warmer, own = self.kernel.disc_temperature, self.reducer.modification
-        if self.clearances is None and not warmer:
+        chosen, warmer = self._chosen, self.kernel.disc_temperature
+        if not warmer:
+            return chosen
+        shift = chosen.modification.shift + thermal_shift(chosen.cycloid_stage, warmer)
+        return replace(chosen, modification=replace(chosen.modification, shift=shift))
+
+    @property
+    def _chosen(self) -> Reducer:
+        """The reducer with the modification that leaves the clearances in force."""
+        if self.clearances is None:
             return self.reducer
-        if self.clearances is not None:
-            own = self.modification(np.array(self.clearances))
-        shift = own.shift + thermal_shift(self.reducer.cycloid_stage, warmer)
-        return replace(self.reducer, modification=replace(own, shift=shift))
+        return replace(self.reducer, modification=self.modification(np.array(self.clearances)))
 
     @property
     def name(self) -> str:
@@ -128,21 +134,26 @@ class ReducerModel(Model):
         return combined_outputs(self.load_cases, self._own_outputs)
 
     def _under(self, case: LoadCase) -> ReducerModel:
-        """Return the model under a load case."""
-        return replace(self, kernel=self.kernel.under(case), load_cases=())
+        """Return the model under a load case, its parts worn by the others if it states hours."""
+        kernel, own = self.kernel.under(case), self.kernel
+        if case.hours:
+            worn = wear_of(self._chosen, self.load_cases, case.hours, own.torque, own.disc_temperature)
+            kernel = kernel.worn(worn)
+        return replace(self, kernel=kernel, load_cases=())
 
     def _everywhere(self, outputs: tuple[str, ...]) -> tuple[str, ...]:
         """Return outputs under the conditions in force, under load cases, and over all of them.
 
-        The transmission error of a part of the turn is searched without derivatives.
+        The transmission error of a part of the turn is searched without derivatives, and wear follows its errors by
+        steps that have none.
         """
         cases = [
             name
             for case, names in self._under_cases.items()
             for name, own in names.items()
-            if own in outputs and not (case.output_angles and own == PEAK_TO_PEAK)
+            if own in outputs and not case.hours and not (case.output_angles and own == PEAK_TO_PEAK)
         ]
-        combined = [name for name, own in self._combined.items() if {*own.of} <= {*cases}]
+        combined = [name for name, own in self._combined.items() if {*own.of} <= {*outputs, *cases}]
         return (*outputs, *cases, *combined)
 
     @property

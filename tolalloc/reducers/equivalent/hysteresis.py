@@ -95,9 +95,7 @@ class Play:
 MESH, PINS = "gear_mesh", "pins"
 
 
-def _angles_of_pins(
-    reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"]
-) -> Float[np.ndarray, "angle disc pin"]:
+def angles_of_pins(reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle disc pin"]:
     """Return the angle of every pin from the crank direction of every disc [rad].
 
     φ_k − β_j, theory page (2) and (13), own derivation.
@@ -105,7 +103,7 @@ def _angles_of_pins(
     Examples
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> found = _angles_of_pins(load_reducer("rv20e_liu2020"), np.zeros(1))
+    >>> found = angles_of_pins(load_reducer("rv20e_liu2020"), np.zeros(1))
     >>> np.degrees(found[0, :, 0]).round(6).tolist()  # disc 1's crank points at pin 1, disc 2's away from it [°]
     [0.0, -180.0]
     """
@@ -131,7 +129,7 @@ def sliding_ways(reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"]) -
     >>> round(1e3 * float(found.min()), 3)  # R_p·(1 − K1) − r_rp, at the root [mm/rad]
     9.0
     """
-    stage, angle = reducer.cycloid_stage, _angles_of_pins(reducer, carrier_angle)
+    stage, angle = reducer.cycloid_stage, angles_of_pins(reducer, carrier_angle)
     root = np.sqrt(1.0 + stage.shortening**2 - 2.0 * stage.shortening * np.cos(angle))
     return np.asarray(stage.pin_circle_radius * root - stage.pin_radius)
 
@@ -507,7 +505,7 @@ def _disc_ways(
     stage, discs = reducer.cycloid_stage, reducer.disc_count
     moved = (own.retained - before.equilibria.retained)[:, :, : 3 * discs]
     moved = moved.reshape(*moved.shape[:2], discs, 3)
-    into = normals(stage.shortening, _angles_of_pins(reducer, own.carrier_angle))
+    into = normals(stage.shortening, angles_of_pins(reducer, own.carrier_angle))
     turning = into.towards_crank - sliding_ways(reducer, own.carrier_angle) / stage.disc_pitch_radius
     by_disc = own.tables.contact_by_disc
     along = np.stack([by_disc[:, :, 1], -by_disc[:, :, 0], turning], axis=2)

@@ -162,6 +162,7 @@ class Form:
     # Number of a disc or pin, from 0 → what it has beyond its drawing
     discs: tuple[tuple[int, FlankForm], ...] = ()
     pins: tuple[tuple[int, PinForm], ...] = ()
+    worn: FlankForm | None = None  # What wear has taken off all discs, inward negative
 
     @property
     def is_measured(self) -> bool:
@@ -176,7 +177,7 @@ class Form:
     def of_flank(self, disc: int, angle: Float[np.ndarray, "*angles"]) -> Float[np.ndarray, "*angles"]:
         """Return how far the flanks of a disc stand out at angles φ that go on around it [m]."""
         found = np.zeros_like(angle)
-        for form in (self.designed, dict(self.discs).get(disc)):
+        for form in (self.designed, self.worn, dict(self.discs).get(disc)):
             if form is not None:
                 found += form.at(angle)
         return found

@@ -20,6 +20,7 @@ from tolalloc.models.model import Evaluation, Observer, Response, unobserved
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers import PEAK_TO_PEAK
 from tolalloc.reducers.equivalent.model import Derivatives, EquivalentModel, Extremes, cached_model
+from tolalloc.reducers.equivalent.wear import Wear
 from tolalloc.reducers.load_case import LoadCase
 from tolalloc.reducers.reducer.design import Modification, Reducer, at_torque, thermal_shift
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
@@ -62,6 +63,7 @@ class KernelResponse:
     window: tuple[float, float] | None = (
         None  # Of the output turn that the peak-to-peak is taken of, all unless given [rad]
     )
+    wear: Wear | None = None  # What hours have taken off the parts, none of new ones
     observe: Observer = unobserved  # Told the statuses of each chunk
     mapper: Mapper = map  # What solves the chunks, `tolalloc.running.chunks.map_chunks`
 
@@ -100,6 +102,13 @@ class KernelResponse:
         # The next chunk under the same load case finds the tables as they are.
         model = cached_model(at_torque(own.reducer, case.torque), own.search, own.orders)
         return replace(kernel, model=model, torque=case.torque, load=case.torque)
+
+    def worn(self, wear: Wear) -> KernelResponse:
+        """Return the response of the same reducer after hours of turning."""
+        own = self.model
+        # The next chunk finds the tables as they are, as under a torque.
+        model = cached_model(replace(own.reducer, form=wear.form), own.search, own.orders)
+        return replace(self, model=model, wear=wear)
 
     @property
     def load_torque(self) -> float:
@@ -169,7 +178,8 @@ class KernelResponse:
     def errors(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample all_columns"]:
         """Return the varied columns and the fixed ones together, in the order of the model [m].
 
-        A column that is both deviates from its fixed value, and warmer discs shift their teeth, `thermal_shift`.
+        A column that is both deviates from its fixed value, worn pins are thinner, each unit's by its own forces, and
+        warmer discs shift their teeth, `thermal_shift`.
         """
         where = {name: at for at, name in enumerate(self.model.columns)}
         errors = np.zeros((x.shape[0], len(where)))
@@ -178,6 +188,8 @@ class KernelResponse:
         errors[:, [where[name] for name in self.columns]] += x
         for name, offset in self.offsets.items():
             errors[:, where[name]] += offset
+        if self.wear is not None:
+            errors = self.wear.aged(self.model, errors)
         if self.disc_temperature:
             stage = self.model.reducer.cycloid_stage
             errors[:, where["modification.shift"]] += thermal_shift(stage, self.disc_temperature)
