@@ -21,7 +21,7 @@ from tolalloc.reducers.load_case import LoadCase, require_duty
 from tolalloc.reducers.reducer.design import CycloidStage, Reducer, thermal_shift
 from tolalloc.reducers.reducer.form import LARGEST_FREE, FlankForm, Form
 
-STEP = 2.0 * MICROMETRE
+STEP = 1.0 * MICROMETRE
 """Largest wear in one step of the hours, of a flank or across a pin; what halving it changes is on page validation."""
 
 _TOGETHER = 8
@@ -117,7 +117,7 @@ def flank_depth_per_force(reducer: Reducer, angle: Float[np.ndarray, "*angles"])
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> found = flank_depth_per_force(load_reducer("rv20e"), np.radians([0.0, 46.0, 180.0]))
     >>> (1e6 * 1e6 * 500.0 * found).round(3).tolist()  # a million passes under 500 N: root, flank, tip [µm]
-    [0.004, 0.01, 0.022]
+    [0.001, 0.01, 0.016]
     """
     stage = reducer.cycloid_stage
     rolling = stage.pin_radius / (stage.pin_circle_radius * _root(stage, angle))
@@ -194,7 +194,7 @@ def wear_of(
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> found = wear_of(load_reducer("rv20e"), (LoadCase("rated", torque=-167, speed=15),), 6000)
     >>> round(1e6 * found.largest_depth, 2), round(1e6 * found.pin_depth, 2)  # off the flanks, off pins' radius [µm]
-    (2.22, 0.12)
+    (2.27, 0.12)
     """
     duty = require_duty(f"wear of {reducer.name}", cases)
     default = reducer.load.test_torque if torque is None else torque
