@@ -72,7 +72,7 @@ def test_depth_grows_with_hours_and_coefficient_and_half_steps_change_little(red
     assert all(np.diff(depths) > 0)
     fine = wear_of(reducer, (WORK,), 6000.0, step=5e-7)
     assert fine.largest_depth == pytest.approx(depths[-1], rel=0.01)
-    harder = replace(reducer, friction=replace(reducer.friction, wear=reducer.friction.wear / 2))
+    harder = replace(reducer, friction=replace(reducer.friction, wear_mm3_per_nm=1e-10))
     assert wear_of(harder, (WORK,), 6000.0).largest_depth == pytest.approx(depths[2], rel=1e-6)
 
 

@@ -356,9 +356,9 @@ Coefficient = Annotated[float, Field(ge=0, le=0.5)]
 SLIDING_FRICTION = 0.05
 """Coefficient of a disc that slides on pins in their half grooves, oil between them; an assumption [-]."""
 
-WEAR = 2e-19
-"""Volume that either of two lubricated hardened steel surfaces loses over force times sliding way, 2e-10 mm³/(N·m); an
-assumption, as mild wear differs by powers of ten [m³/(N·m)]."""
+WEAR = 2e-10
+"""Volume that either of two lubricated hardened steel surfaces loses over force times sliding way; an assumption, as
+mild wear differs by powers of ten [mm³/(N·m)]."""
 
 LARGEST_CONTACT_RATIO = 2.0
 """Contact ratio up to which the friction of a gear mesh is known here [-]."""
@@ -378,11 +378,16 @@ class Friction:
     crank_carrier_bearing: Coefficient = 0.0018
     carrier_bearing: Coefficient = 0.0020
     gear_mesh: Coefficient = 0.06  # µ_z, mean over the path of contact [-]
-    # Volume that a disc or a pin loses over force times way where they slide, Archard's k [m³/(N·m)]
-    wear: Annotated[float, Field(alias="wear_mm3_per_nm", ge=0, le=1e-4), times(MILLIMETRE**3)] = WEAR
+    # Volume that a disc or a pin loses over force times way where they slide, Archard's k [mm³/(N·m)]
+    wear_mm3_per_nm: Annotated[float, Field(ge=0, le=1e-4)] = WEAR
     # What seals and grease take at the output whatever the load, where measured; else by a rule, `IdleTorque` [N·m]
     seals: Annotated[float | None, Field(alias="seals_nm", ge=0, le=1e4)] = None
     grease: Annotated[float | None, Field(alias="grease_nm", ge=0, le=1e4)] = None
+
+    @property
+    def wear(self) -> float:
+        """Archard's k [m³/(N·m)]."""
+        return self.wear_mm3_per_nm * MILLIMETRE**3
 
     @property
     def coefficients(self) -> dict[str, float]:
