@@ -16,7 +16,7 @@ from tolalloc.reducers.equivalent.wear import wear_of
 
 hours = (1000.0, 3000.0, 6000.0)
 work = ta.LoadCase("work", torque=-167.0, speed=15.0)
-cases = [ta.LoadCase(f"{own:,.0f} h", hours=own) for own in hours]
+cases = [ta.LoadCase(f"{own:.0f} h", hours=own) for own in hours]
 drawing = ta.drawing("rv20e_drawing")
 errors = drawing.errors
 model = ta.reducer("rv20e", neglected=("disc*.tilt",), load_cases=(work, *cases)).bound(errors, "gallery")
