@@ -91,7 +91,7 @@ def test_derivatives_are_those_at_the_temperature(model, drawing, output):
 
 def test_rankings_leave_further_temperatures_out_until_they_are_limited(model):
     assert not [name for name in model.ranked if "warm" in name or "cold" in name]
-    assert len(model.outputs) == 5 * len(replace(model, load_cases=()).outputs)
+    assert len(model.outputs) == 7 * len(replace(model, load_cases=()).outputs)
 
 
 def test_a_study_limits_cold_and_warm_discs_at_once(drawing):

@@ -63,7 +63,7 @@ def test_a_sample_keeps_its_bits_in_other_company(response, x):
 
 
 def test_a_failed_reading_fails_its_sample_alone(prepared, x):
-    def broken(model, errors, torque):
+    def broken(_, errors):
         status = np.zeros(errors.shape[0], np.uint8)
         status[3] = 2
         return np.ones((errors.shape[0], 1)), status

@@ -44,7 +44,7 @@ def units(drawing: ta.Drawing, count: int) -> np.ndarray:
 
 
 def test_one_contact_wears_as_archard_says(reducer):
-    stage, angle, force = reducer.cycloid_stage, np.radians(60.0), 500.0
+    stage, angle, force = reducer.cycloid_stage, np.array(np.radians(60.0)), 500.0
     root = np.sqrt(1 + stage.shortening**2 - 2 * stage.shortening * np.cos(angle))
     # A disc that turns by a radian about its pole: way of sliding, and way of the contact along the flank [m].
     to_pin = stage.pin_circle_radius * root
