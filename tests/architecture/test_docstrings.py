@@ -116,6 +116,7 @@ COMPUTES_NOTHING = {
     "reducers.reducer.bearings.friction_assumptions": "orders",
     "reducers.scene.places_of": "orders",
     "reducers.settings.clearance_settings": "orders",
+    "reducers.reducer.idle_torque.number_and_turns": "orders",
     "reducers.load_case.at": "orders",
     "reducers.load_case.change": "orders",
     "reducers.load_case.worst": "orders",

@@ -150,7 +150,9 @@ def test_a_load_case_that_cannot_be_is_refused(given, named):
         ta.LoadCase("own", **given)
 
 
-@pytest.mark.parametrize("name", ["", "a [b]", 5])
+@pytest.mark.parametrize(
+    "name", ["", "a [b]", 5, "worst load case", "mean of load cases", "rated torque", "old less in force"]
+)
 def test_a_load_case_needs_a_name_that_an_output_can_bear(name):
     with pytest.raises(InputError, match="name"):
         ta.LoadCase(name)

@@ -16,9 +16,9 @@ from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import Solved, peak_line_load, unit_pressure
 from tolalloc.reducers.equivalent.perfect import exact_unit
 from tolalloc.reducers.load_case import LoadCase
-from tolalloc.reducers.reducer.bearings import CRANK_BEARINGS, RollingBearing
-from tolalloc.reducers.reducer.design import Reducer, at_torque, thermal_shift
-from tolalloc.reducers.reducer.idle_torque import IdleTorque
+from tolalloc.reducers.reducer.bearings import RollingBearing
+from tolalloc.reducers.reducer.design import Reducer, at_torque
+from tolalloc.reducers.reducer.idle_torque import IdleTorque, number_and_turns
 from tolalloc.reducers.settings import FARTHEST_TEMPERATURE
 
 _ANGLES = 2.0 * pi * np.arange(97) / 97
@@ -66,7 +66,7 @@ class BearingLife:
     count: int  # Bearings of the kind [-]
     load_rating: float  # C of ISO 281 [N]
     load: float  # Equivalent load over the duty cycle [N]
-    turns: float  # Turns of one ring against the other per turn of the output [-]
+    turns: int  # Turns of one ring against the other per turn of the output [-]
     life: float  # L10 [h]
     shares: tuple[float, ...]  # Share of the damage that each load case does [-]
 
@@ -168,19 +168,7 @@ def duty_of(reducer: Reducer, cases: Sequence[LoadCase], resistance: float | Non
     require_cycle(cases, reducer)
     if resistance is None:
         resistance = RESISTANCE * (_PIN_CIRCLE / reducer.cycloid_stage.pin_circle_radius) ** 2
-    temperatures, loads = [0.0], _loads(reducer, cases, 0.0)
-    while len(temperatures) < _STEPS:
-        warmer = resistance * sum(own.share * own.loss for own in loads)
-        if warmer > FARTHEST_TEMPERATURE:
-            raise SolveError(
-                f"reducer {reducer.name}: the discs do not settle below {FARTHEST_TEMPERATURE:g} K above the ring; "
-                "give the duty cycle less torque or speed, the teeth more clearance, or a smaller thermal resistance."
-            )
-        settled = abs(warmer - temperatures[-1]) < _SETTLED
-        temperatures.append(warmer)
-        if settled:
-            break
-        loads = _loads(reducer, cases, warmer)
+    temperatures, loads = _settled(reducer, cases, resistance)
     weights = np.array([own.share * (own.case.speed or 0.0) for own in loads])
     torques = np.abs([case.torque or 0.0 for case in cases])
     return DutyResult(
@@ -195,6 +183,24 @@ def duty_of(reducer: Reducer, cases: Sequence[LoadCase], resistance: float | Non
     )
 
 
+def _settled(
+    reducer: Reducer, cases: Sequence[LoadCase], resistance: float
+) -> tuple[list[float], tuple[CaseLoads, ...]]:
+    """Return the temperatures of the discs above the ring, from cold until they settle, and the loads there [K]."""
+    temperatures, loads = [0.0], _loads(reducer, cases, 0.0)
+    for _ in range(_STEPS):
+        temperatures.append(resistance * sum(own.share * own.loss for own in loads))
+        if temperatures[-1] > FARTHEST_TEMPERATURE:
+            break
+        if abs(temperatures[-1] - temperatures[-2]) < _SETTLED:
+            return temperatures, loads
+        loads = _loads(reducer, cases, temperatures[-1])
+    raise SolveError(
+        f"reducer {reducer.name}: the discs do not settle below {FARTHEST_TEMPERATURE:g} K above the ring; "
+        "give the duty cycle less torque or speed, the teeth more clearance, or a smaller thermal resistance."
+    )
+
+
 def _loads(reducer: Reducer, cases: Sequence[LoadCase], warmer: float) -> tuple[CaseLoads, ...]:
     """Return the loads of every load case, its discs warmer than the ring unless it states a temperature [K]."""
     idle = IdleTorque.of(reducer).turning if reducer.first_stage else 0.0
@@ -204,11 +210,11 @@ def _loads(reducer: Reducer, cases: Sequence[LoadCase], warmer: float) -> tuple[
 
 def _loads_of(reducer: Reducer, case: LoadCase, share: float, warmer: float, idle: float) -> CaseLoads:
     warmer = warmer if case.disc_temperature is None else case.disc_temperature
-    torque, own = case.torque or 0.0, reducer.modification
-    shift = own.shift + thermal_shift(reducer.cycloid_stage, warmer)
-    warm = at_torque(replace(reducer, modification=replace(own, shift=shift)), torque)
-    model = EquivalentModel(warm)
+    torque = case.torque or 0.0
+    model = EquivalentModel(at_torque(reducer.with_warmer_discs(warmer), torque))
     solved = Solved.of(model.equilibria(exact_unit(model), torque, _ANGLES))
+    if solved.equilibria.status.any():
+        raise SolveError(f"load case {case.name} of {reducer.name}: no equilibrium under {torque:g} N·m.")
     line_load = peak_line_load(solved.equilibria, solved.forces)
     pressure = unit_pressure(solved.equilibria) * np.sqrt(line_load)
     loads = {
@@ -272,9 +278,7 @@ def _bearings(reducer: Reducer, loads: Sequence[CaseLoads]) -> tuple[BearingLife
     """Return the lives of all kinds of bearings that are known."""
     found = []
     for kind, bearing in _known(reducer).items():
-        turns = float(reducer.cycloid_stage.pin_count if kind in CRANK_BEARINGS else 1)
-        journals = reducer.disc_count if kind == "crank_disc_bearing" else 1
-        count = reducer.crank_count * journals if kind in CRANK_BEARINGS else 1
+        count, turns = number_and_turns(reducer, kind)
         load = np.array([own.bearing_load[kind] for own in loads])
         # One row at each end carries the moment, so that the most loaded row is looked at.
         rated = replace(bearing, rows=1) if kind == MAIN and any(own.case.moment for own in loads) else bearing

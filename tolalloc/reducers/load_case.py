@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -22,10 +23,20 @@ _RATED = ", rated torque"
 """What an output is called whose load is the rated torque, unless a load case states another."""
 _LEAST_IS_WORST = (TORSIONAL_STIFFNESS, EFFICIENCY, RADIAL_CLEARANCE)
 """Outputs of which less is worse."""
+_WORST, _MEAN, _CHANGE = "worst load case", "mean of load cases", "less in force"
+"""What is said of an output over load cases."""
 _NAME = Rule(
-    "a short name without brackets, such as 'warm'",
-    lambda value: isinstance(value, str) and bool(value.strip()) and not {*"[],"} & {*value},
+    f"a short name without brackets and commas, such as 'warm', and none of '{_WORST}', '{_MEAN}', 'rated torque' and "
+    f"'… {_CHANGE}'",
+    lambda value: (
+        isinstance(value, str)
+        and bool(value.strip())
+        and not {*"[],"} & {*value}
+        and value not in (_WORST, _MEAN, _RATED[2:])
+        and not value.endswith(_CHANGE)
+    ),
 )
+_TORQUE = Rule("a torque in N·m, but not 0", lambda value: is_number(value) and isfinite(value) and value != 0)
 _WINDOW = Rule(
     "two angles of the output in degrees, the smaller one first and at most a turn apart, such as (-90, 90)",
     lambda value: (
@@ -71,18 +82,13 @@ class LoadCase(NamedFields):
 
     name: Annotated[str, _NAME]
     _: KW_ONLY
-    torque: Annotated[float | None, or_none(number("a torque in N·m, but not 0"))] = None
+    torque: Annotated[float | None, or_none(_TORQUE)] = None
     disc_temperature: Annotated[float | None, or_none(TEMPERATURE)] = None
     output_angles: Annotated[tuple[float, float] | None, or_none(_WINDOW)] = None
     speed: Annotated[float | None, or_none(number("a speed in rpm above 0", above=0, most=1e4))] = None
     moment: Annotated[float, number("a moment in N·m")] = 0.0
     share: Annotated[float, number("a share of the time above 0", above=0, most=1e6)] = 1.0
     hours: Annotated[float | None, or_none(number("hours of turning, 0 or more", least=0, most=1e6))] = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.torque == 0:
-            raise InputError.at(f"load case {self.name}", "torque", self.torque, "a torque in N·m, but not 0")
 
     @property
     def window(self) -> tuple[float, float] | None:
@@ -159,7 +165,7 @@ def change(output: str, case: LoadCase) -> str:
     >>> change("lost motion [arcmin]", LoadCase("old", hours=6000))
     'lost motion, old less in force [arcmin]'
     """
-    return _under("change", output, case, " less in force")
+    return _under("change", output, case, f" {_CHANGE}")
 
 
 def worst(output: str) -> str:
@@ -177,8 +183,7 @@ def worst(output: str) -> str:
     >>> worst("lost motion [arcmin]")
     'lost motion, worst load case [arcmin]'
     """
-    what, unit = _split("worst", output)
-    return f"{what.removesuffix(_RATED)}, worst load case [{unit}"
+    return _over_all("worst", output, _WORST)
 
 
 def mean(output: str) -> str:
@@ -194,8 +199,12 @@ def mean(output: str) -> str:
     >>> mean("lost motion [arcmin]")
     'lost motion, mean of load cases [arcmin]'
     """
-    what, unit = _split("mean", output)
-    return f"{what.removesuffix(_RATED)}, mean of load cases [{unit}"
+    return _over_all("mean", output, _MEAN)
+
+
+def _over_all(place: str, output: Any, said: str) -> str:
+    what, unit = _split(place, output)
+    return f"{what.removesuffix(_RATED)}, {said} [{unit}"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -25,7 +25,6 @@ from tolalloc.reducers.reducer.design import (
     ROTATION_CONVENTION,
     Modification,
     Reducer,
-    thermal_shift,
 )
 from tolalloc.reducers.reducer.idle_torque import IdleTorque
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
@@ -88,11 +87,7 @@ class ReducerModel(Model):
     @property
     def reducer_in_force(self) -> Reducer:
         """The same with the modification that leaves the clearances in force, and as warm discs shift it."""
-        chosen, warmer = self._chosen, self.kernel.disc_temperature
-        if not warmer:
-            return chosen
-        shift = chosen.modification.shift + thermal_shift(chosen.cycloid_stage, warmer)
-        return replace(chosen, modification=replace(chosen.modification, shift=shift))
+        return self._chosen.with_warmer_discs(self.kernel.disc_temperature)
 
     @property
     def _chosen(self) -> Reducer:

@@ -260,13 +260,13 @@ def _rates(
     pins: float,
 ) -> tuple[Float[np.ndarray, " point"], float, float]:
     """Return what an hour takes off the flanks and off the pins' radius, and the volume off all flanks [m, m, m³]."""
-    stage, drawn = reducer.cycloid_stage, reducer.modification
+    stage = reducer.cycloid_stage
     flank, work = np.zeros(depth.size), 0.0
     for phase in phases:
         # Pins that are thinner by so much are teeth that are ground by so much larger ones.
-        shift = drawn.shift + thermal_shift(stage, phase.disc_temperature)
-        modification = replace(drawn, equidistant=drawn.equidistant + 2.0 * pins, shift=shift)
-        worn = replace(reducer, modification=modification, form=_form(reducer, angle, depth))
+        warm = reducer.with_warmer_discs(phase.disc_temperature)
+        modification = replace(warm.modification, equidistant=warm.modification.equidistant + 2.0 * pins)
+        worn = replace(warm, modification=modification, form=_form(reducer, angle, depth))
         solved = perfect_reducer(worn, phase.torque)
         if solved.equilibria.status.any():
             raise SolveError(f"Wear of {reducer.name}: no equilibrium under {phase.torque:g} N·m.")

@@ -341,6 +341,13 @@ class Reducer:
         diameter, modulus = 2 * self.cycloid_stage.pin_radius, self.pin_material.elastic_modulus
         return replace(self, stiffness=replace(self.stiffness, pin_bending=pin_bending(diameter, span, modulus)))
 
+    def with_warmer_discs(self, warmer: float) -> Reducer:
+        """Return the reducer whose discs are warmer than the ring by so much [K], by the shift of `thermal_shift`."""
+        if not warmer:
+            return self
+        shift = self.modification.shift + thermal_shift(self.cycloid_stage, warmer)
+        return replace(self, modification=replace(self.modification, shift=shift))
+
     def torque_on_carrier(self, asked: float | None, place: str) -> float:
         """Return the torque to use, the test torque unless one is asked for; negative resists the rotation [N·m].
 

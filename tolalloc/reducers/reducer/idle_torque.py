@@ -51,7 +51,7 @@ class IdleTorque:
         (0.55, 1.09, 0.049)
         """
         stated, dimensions = reducer.friction, reducer.friction_dimensions
-        bearings = {name: (getattr(dimensions, name), *_turning(reducer, name)) for name in _LUBRICATION}
+        bearings = {name: (getattr(dimensions, name), *number_and_turns(reducer, name)) for name in _LUBRICATION}
         known = {name: own for name, own in bearings.items() if own[0] is not None}
         main = dimensions.carrier_bearing
         return cls(
@@ -79,8 +79,8 @@ class IdleTorque:
         return self.turning + self.preload
 
 
-def _turning(reducer: Reducer, name: str) -> tuple[int, int]:
-    """Return how many bearings of a kind there are, and how fast they turn over the output [-]."""
+def number_and_turns(reducer: Reducer, name: str) -> tuple[int, int]:
+    """Return how many bearings of a kind there are, and how often one turns in a turn of the output [-]."""
     if name not in CRANK_BEARINGS:
         return 1, 1
     journals = reducer.disc_count if name == "crank_disc_bearing" else 1

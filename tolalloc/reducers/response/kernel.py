@@ -60,9 +60,8 @@ class KernelResponse:
     offsets: Mapping[str, float] = field(default_factory=dict)  # Added to columns that are fixed [m, angles rad]
     disc_temperature: float = 0.0  # Of the discs less that of the ring [K]
     load: float | None = None  # Torque of what pins and bearings carry, the rated one as the torque unless given [N·m]
-    window: tuple[float, float] | None = (
-        None  # Of the output turn that the peak-to-peak is taken of, all unless given [rad]
-    )
+    # Part of the output turn that the peak-to-peak is taken of, all of it unless given [rad]
+    window: tuple[float, float] | None = None
     wear: Wear | None = None  # What hours have taken off the parts, none of new ones
     observe: Observer = unobserved  # Told the statuses of each chunk
     mapper: Mapper = map  # What solves the chunks, `tolalloc.running.chunks.map_chunks`
