@@ -25,9 +25,11 @@ from tolalloc.sensitivity.saltelli import SaltelliDesign, SaltelliIndices, salte
 BLOCKS = 8192
 ANGLES = 2 * np.pi * np.arange(468) / 468
 CIRCLE, HOLES, PINS = range(3)
+PRINTED_TOGETHER = 0.08
+"""Second-order index of circle and holes [-]."""
 
 
-def indices(grade: str) -> SaltelliIndices:
+def indices(grade: str, blocks: int = BLOCKS) -> SaltelliIndices:
     """Return the indices of the peak-to-peak with zones of a grade."""
     reducer = load_reducer("rv80e")
     reducer = replace(reducer, stiffness=replace(reducer.stiffness, pin_contact_law="constant"))
@@ -42,7 +44,7 @@ def indices(grade: str) -> SaltelliIndices:
     ]
     errors = Drawing.of_rows(rows).errors
     design = SaltelliDesign(factor_groups=errors.block_of_column, seed=7, second_order=True)
-    uniform = np.clip(np.concatenate(list(design.chunks(0, BLOCKS))), 2.0**-31, None)
+    uniform = np.clip(np.concatenate(list(design.chunks(0, blocks))), 2.0**-31, None)
     units = np.zeros((uniform.shape[0], len(model.columns)))
     units[:, [model.columns.index(name) for name in errors.columns]] = errors.deviations(
         errors.standard_values(uniform), errors.zones
@@ -55,6 +57,13 @@ def indices(grade: str) -> SaltelliIndices:
     return saltelli_indices(answered, 3, SeedTree(3), second_order=True)
 
 
+@pytest.mark.parametrize(("grade", "first"), [("IT6", HOLES), ("IT8", CIRCLE)])
+def test_which_of_circle_and_holes_is_first_is_a_matter_of_their_grade(grade, first):
+    """Its lead is above 0 with 97.5 % confidence: zones of 25 and 9 µm, and of 63 and 22 µm."""
+    resamples = indices(grade, 1024).total_resamples[0]
+    assert np.quantile(resamples[:, first] - resamples[:, CIRCLE + HOLES - first], 0.025) > 0
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("grade", "total", "together"),
@@ -62,10 +71,11 @@ def indices(grade: str) -> SaltelliIndices:
         ("IT5", (0.167, 0.826, 0.160), 0.017),
         ("IT6", (0.314, 0.620, 0.337), 0.053),
         ("IT7", (0.413, 0.456, 0.443), 0.063),
+        ("IT8", (0.486, 0.388, 0.436), 0.068),
     ],
 )
-def test_circle_and_holes_act_together_by_less_than_printed_and_the_circle_is_not_first(grade, total, together):
-    """The pair's index is 2 to 6 % where 8 % are printed; the holes have the largest total index at every grade."""
+def test_what_is_printed_holds_at_the_coarsest_grade_alone(grade, total, together):
+    """Circle first and 8 % within the pair's interval at IT8; up to IT7 the holes are first."""
     found = indices(grade)
     assert found.dropped == 0
     assert found.total[0] == pytest.approx(total, abs=0.03)
@@ -73,4 +83,6 @@ def test_circle_and_holes_act_together_by_less_than_printed_and_the_circle_is_no
     low, high = np.quantile(found.second_resamples[0, :, pair], [0.05, 0.95])
     assert low < together < high
     assert found.second[0, pair] == pytest.approx(together, abs=0.03)
-    assert found.total[0].argmax() == HOLES
+    coarse = grade == "IT8"
+    assert found.total[0].argmax() == (CIRCLE if coarse else HOLES)
+    assert not coarse or low < PRINTED_TOGETHER < high

@@ -1,6 +1,6 @@
 """Single-stage drives of three sources with geometry and a force or a backlash.
 
-Krol et al. 2019 (Optimization of the one stage cycloidal gearbox as a non-linear least squares problem; their program,
+Król et al. 2019 (Optimization of the one stage cycloidal gearbox as a non-linear least squares problem; their program,
 DOI 10.5281/zenodo.2166718): 15 teeth, 16 pins of 3.3 mm, e = 3 mm, shortening 0.56, width 10 mm, eight output pins of
 5 mm in holes of 8 mm on 40 mm, 1.55 N·m at the input, steel of 200 GPa; forces and stresses by closed forms.
 Vijayanathan 2025 (a drive of printed parts, 29:1, its program and readings public): 30 pins of 2.5 mm on 40 mm,
