@@ -38,10 +38,10 @@ class Interface:
 
 
 _STANDS_OFF = Characteristic("coaxiality", "how far an assembly stands off is drawn as coaxiality")
-_ECCENTRIC = Characteristic("coaxiality", "the eccentricity of a gear is drawn as its coaxiality")
+ECCENTRIC = Characteristic("coaxiality", "the eccentricity of a gear is drawn as its coaxiality")
 
 
-def _clearance(
+def clearance_source(
     element: str, *, neglected: str = "*.clearance", first_stage: bool = False, fixed: bool = False
 ) -> ErrorSource:
     """Return the deviations of the clearances of an interface's elements."""
@@ -111,7 +111,8 @@ def gear_mesh(at: Positions) -> SpringGroup:
     ``sun.eccentricity`` and ``sun.pitch`` turn with the sun, ``planet{i}.eccentricity`` and ``planet{i}.pitch`` with
     the crankshaft; ``mesh{i}.deviation`` is what the pair adds along its line of action (tooth thickness) [m].
 
-    δ = n·(x_sun − x_planet) + r_b2·θp + errors along the line of action γ = P + π/2 − α [m]; involute teeth in mesh.
+    δ = n·(x_sun − x_planet) + r_b2·θp + errors along the line of action γ = P + π/2 − α [m]; involute teeth in mesh. A
+    sun on a centre gear, whose rotation is not given, adds r_b1·θs.
 
     References
     ----------
@@ -134,6 +135,8 @@ def gear_mesh(at: Positions) -> SpringGroup:
         displacement[:, crank, coordinates.input : coordinates.input + 2] = normal
         displacement[:, crank, planet : planet + 2] = -normal
         displacement[:, crank, planet + 2] = reducer.planet_base_radius
+        if reducer.centre_gear:
+            displacement[:, crank, coordinates.input + 2] = reducer.sun_base_radius
         meshes.append(columns)
     names = tuple(dict.fromkeys(name for columns in meshes for name in columns))
     nothing = np.zeros(angles)
@@ -152,11 +155,11 @@ def gear_mesh(at: Positions) -> SpringGroup:
 GEAR_MESH = Interface(
     rows=gear_mesh,
     sources=(
-        ErrorSource(name="sun.eccentricity", characteristic=_ECCENTRIC, shape="vector", place="sun", first_stage=True),
+        ErrorSource(name="sun.eccentricity", characteristic=ECCENTRIC, shape="vector", place="sun", first_stage=True),
         ErrorSource(name="sun.pitch", shape="waves", place="sun.teeth", neglected="sun.pitch", first_stage=True),
         ErrorSource(
             name="planet{i}.eccentricity",
-            characteristic=_ECCENTRIC,
+            characteristic=ECCENTRIC,
             shape="vector",
             place="planet{i}",
             first_stage=True,
@@ -165,7 +168,7 @@ GEAR_MESH = Interface(
             name="planet{i}.pitch", shape="waves", place="planet{i}.teeth", neglected="planet*.pitch", first_stage=True
         ),
         ErrorSource(name="mesh{i}.deviation", place="mesh{i}", neglected="mesh*", first_stage=True),
-        _clearance("mesh{i}", neglected="mesh*", first_stage=True),
+        clearance_source("mesh{i}", neglected="mesh*", first_stage=True),
     ),
 )
 
@@ -295,7 +298,7 @@ CRANK_DISC = Interface(
             characteristic=TILT,
             fine=True,
         ),
-        _clearance("crank{i}.journal{j}"),
+        clearance_source("crank{i}.journal{j}"),
     ),
 )
 
@@ -347,7 +350,7 @@ CRANK_CARRIER = Interface(
     rows=crank_carrier,
     sources=(
         ErrorSource(name="carrier.bore{i}.position", shape="vector", place="carrier.bore{i}"),
-        _clearance("carrier.bore{i}"),
+        clearance_source("carrier.bore{i}"),
     ),
 )
 
@@ -378,7 +381,7 @@ CARRIER_SUPPORT = Interface(
     rows=carrier_support,
     sources=(
         ErrorSource(name="carrier.assembly", fixed=True, characteristic=_STANDS_OFF, shape="vector", place="carrier"),
-        _clearance("carrier", fixed=True),
+        clearance_source("carrier", fixed=True),
     ),
 )
 
