@@ -68,8 +68,8 @@ class Plain:
     def vector(self, name: str, turned: float = 0.0) -> complex:
         return complex(self.own[f"{name}.x"], self.own[f"{name}.y"]) * np.exp(1j * turned)
 
-    def forces(self, q: np.ndarray, torque: float, glued: bool = False) -> np.ndarray:
-        """Forces and moments left on centre gear, planets, discs and carrier [N, N·m]; pins hold both ways if glued."""
+    def forces(self, q: np.ndarray, torque: float, glued: float = 0.0) -> np.ndarray:
+        """Forces and moments left on centre gear, planets, discs and carrier [N, N·m]; glued pins pull over gaps."""
         drive, spring = self.drive, self.drive.stiffness
         body = q.reshape(-1, 3)
         left = np.zeros_like(body)
@@ -124,21 +124,21 @@ class Plain:
                 # All pins of one size on a circle that is ground narrower: outward is away from the disc.
                 stands = larger - self.own["modification.shift"] * (pin * into.conjugate()).real
                 deep = stands - (way(discs[disc - 1], at) * into.conjugate()).real
-                if glued or deep > 0:
-                    push(discs[disc - 1], at, spring.pin_contact * deep * into)
+                push(discs[disc - 1], at, spring.pin_contact * (deep if deep > 0 else glued * deep) * into)
         return left.ravel()
 
     def solved(self, torque: float) -> np.ndarray:
-        """Return the coordinates in equilibrium by Newton's method on differences, from glued pins on [m, rad]."""
+        """Return the coordinates in equilibrium by Newton's method on differences, the glue let go step by step."""
         q = np.zeros(18)
-        for step in range(40):
-            glued = step == 0
-            left = self.forces(q, torque, glued)
-            slope = np.stack([self.forces(q + 1e-9 * e, torque, glued) - left for e in np.eye(18)], axis=1) / 1e-9
-            change = np.linalg.solve(slope, left)
-            q = q - change
-            if np.abs(change).max() < 1e-15:
-                break
+        for glued in (*0.1 ** np.arange(0.0, 7.0, 0.5), 0.0):
+            for _ in range(30):
+                left = self.forces(q, torque, glued)
+                slope = np.stack([self.forces(q + 1e-9 * e, torque, glued) - left for e in np.eye(18)], axis=1) / 1e-9
+                change = np.linalg.solve(slope, left)
+                q = q - change
+                if np.abs(change).max() < 1e-14:
+                    break
+        assert np.abs(self.forces(q, torque)).max() < 1e-6  # [N, N·m]
         return q
 
 
@@ -275,7 +275,6 @@ def test_a_shaft_of_the_pinion_yields_in_series_with_its_teeth(tmp_path):
     [
         ("pinion_teeth = 24", "pinion_teeth = 4", "centre_gear.pinion_teeth is 4"),
         ("centre_mesh = { contact_ratio = 1.6, face_width_mm = 10 }\n", "", "centre_mesh"),
-        ("[centre_gear]\npinion_teeth = 24\nteeth = 72\nmodule_mm = 1.25\npressure_angle_deg = 20\n", "", "centre_mesh"),
         ("face_width_mm = 10 }", "face_width_mm = 10, sun_virtual_teeth = 30 }", "sun_virtual_teeth"),
     ],
 )
