@@ -95,7 +95,10 @@ class Plain:
         for number, planet in enumerate(planets, start=1):
             direction = np.exp(1j * (self.angle + np.pi * (number - 1)))
             along = direction * np.exp(1j * (np.pi / 2 - first.pressure_angle))
-            rim, other = first.module * first.sun_teeth / 2 * direction, -first.module * first.planet_teeth / 2 * direction
+            rim, other = (
+                first.module * first.sun_teeth / 2 * direction,
+                -first.module * first.planet_teeth / 2 * direction,
+            )
             ahead = way(sun, rim) + self.vector("sun.eccentricity", on_sun) - way(planet, other)
             ahead -= self.vector(f"planet{number}.eccentricity", crank)
             pressed = spring.gear_mesh * ((ahead * along.conjugate()).real + self.own[f"mesh{number}.deviation"])

@@ -22,7 +22,7 @@ from tolalloc.reducers.reducer.design import Reducer
 
 
 def centre_mesh(at: Positions) -> SpringGroup:
-    """Return the spring of input pinion and centre gear along its line of action, theory page equation (93).
+    """Return the spring of input pinion and centre gear along its line of action, theory page equations (92) to (94).
 
     The pinion stands at the right of the centre gear and turns against it. ``pinion.eccentricity`` turns with the
     pinion, ``centre.eccentricity``, of the outer toothing against the bearing, with the centre gear [m].
@@ -112,7 +112,6 @@ CENTRE_GEAR: ReducerFamily = replace(
         presets=("rv27c",),
         table="rv27c_drawing",
         diameter=136.0,
-        samples=tuple(kind for kind in RV.new.samples if kind != "assembly"),
         schema="rv-centre-gear",
     ),
 )

@@ -292,8 +292,10 @@ class CentreGearStiffnessRecord(StiffnessRecord):
         found, shaft = super().parts(reducer), self.pinion_support
         if shaft is None:
             return found
-        own = shaft if isinstance(shaft, float) else shaft_support(
-            **vars(shaft), elastic_modulus=reducer.disc_material.elastic_modulus
+        own = (
+            shaft
+            if isinstance(shaft, float)
+            else shaft_support(**vars(shaft), elastic_modulus=reducer.disc_material.elastic_modulus)
         )
         mesh = Part("centre_mesh", "centre mesh", 1.0 / reducer.stiffness.centre_mesh)
         return (*found, mesh, Part("centre_mesh", "pinion shaft", 1.0 / own))
