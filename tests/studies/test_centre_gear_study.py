@@ -1,4 +1,4 @@
-"""An RV reducer with centre gear and hollow shaft through whole commands: folder, ranking, allocation, report, picture."""
+"""An RV reducer with centre gear and hollow shaft through whole commands: folder, ranking, allocation, picture."""
 
 from __future__ import annotations
 
@@ -16,19 +16,28 @@ from tolalloc.reports.moving_picture import draw_still
 from tolalloc.reports.scene_record import scene_record
 
 SMALL = ta.Effort(
+    ranking=ta.RankingEffort(
+        units=1000,
+        sobol=ta.SobolEffort(start=8, limit=8, resamples=50),
+        trajectories=2,
+        moment_units=100,
+        derivative_units=10,
+        inverse_units=1,
+        surrogate_units=96,
+        level_units=100,
+        level_runs=2,
+        widened_units=100,
+    ),
     allocation=ta.AllocationEffort(
-        verification_units=512,
-        confirmation_units=1024,
+        verification_units=256,
+        confirmation_units=512,
         shared_units=16,
-        graded_steps=2,
         exact_points=8,
         setting_steps=(2, 2),
-        changed_costs=4,
         share_blocks=8,
         error=0.5,
         search=ta.SearchEffort(steps=2),
     ),
-    ranking=ta.RankingEffort(sobol=ta.SobolEffort(start=8, limit=8)),
     is_quick=True,
 )
 
@@ -46,7 +55,7 @@ def test_a_study_is_ranked_allocated_and_drawn(folder, tmp_path):
     study = ta.Study(
         ta.reducer(folder / "reducer.toml", flank_clearance=(1.0, 12.0), radial_clearance=(5.0, 30.0)),
         ta.drawing(folder / "zones.csv"),
-        limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0, show=ta.AtYield(0.95))},
+        limits={ta.PEAK_TO_PEAK: ta.Limit(upper=40.0, show=ta.AtYield(0.9)), ta.PRELOAD: None},
         questions=[ta.Allocation(front=False, what_if=False), ta.Ranking()],
         name="drive",
         effort=SMALL,

@@ -21,11 +21,11 @@ from tolalloc.reducers.reducer.files import PRESETS, load_reducer
 
 RIGID = 1e13
 VECTORS = (
-    ("pinion.eccentricity", "centre.eccentricity", "sun.eccentricity", "sun.assembly", "carrier.assembly")
-    + tuple(f"planet{i}.eccentricity" for i in (1, 2))
-    + tuple(f"carrier.bore{i}.position" for i in (1, 2))
-    + tuple(f"crank{i}.journal{j}.eccentricity" for i in (1, 2) for j in (1, 2))
-    + tuple(f"disc{j}.bore{i}.position" for i in (1, 2) for j in (1, 2))
+    *("pinion.eccentricity", "centre.eccentricity", "sun.eccentricity", "sun.assembly", "carrier.assembly"),
+    *(f"planet{i}.eccentricity" for i in (1, 2)),
+    *(f"carrier.bore{i}.position" for i in (1, 2)),
+    *(f"crank{i}.journal{j}.eccentricity" for i in (1, 2) for j in (1, 2)),
+    *(f"disc{j}.bore{i}.position" for i in (1, 2) for j in (1, 2)),
 )
 NUMBERS = ("mesh1.deviation", "mesh2.deviation", "pin.diameter", "housing.groove.radius")
 

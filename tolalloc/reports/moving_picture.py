@@ -218,8 +218,8 @@ def _views(outline: Mapping[str, Any]) -> list[tuple[Callable[[_Pen, Pose], None
     """Return what is drawn beside the discs, and what is said above it."""
     if "output_pin_count" in outline:
         return [(_draw_output, "output and input shaft")]
-    first = [(_draw_first_stage, "carrier, planets and sun")]
-    return [*first, (_draw_centre_gear, "centre gear and input pinion")] if "centre_teeth" in outline else first
+    centre = [(_draw_centre_gear, "centre gear and input pinion")] if "centre_teeth" in outline else []
+    return [(_draw_first_stage, "carrier, planets and sun"), *centre]
 
 
 def draw_still(

@@ -41,7 +41,7 @@ _STANDS_OFF = Characteristic("coaxiality", "how far an assembly stands off is dr
 ECCENTRIC = Characteristic("coaxiality", "the eccentricity of a gear is drawn as its coaxiality")
 
 
-def clearance_source(
+def _clearance(
     element: str, *, neglected: str = "*.clearance", first_stage: bool = False, fixed: bool = False
 ) -> ErrorSource:
     """Return the deviations of the clearances of an interface's elements."""
@@ -168,7 +168,7 @@ GEAR_MESH = Interface(
             name="planet{i}.pitch", shape="waves", place="planet{i}.teeth", neglected="planet*.pitch", first_stage=True
         ),
         ErrorSource(name="mesh{i}.deviation", place="mesh{i}", neglected="mesh*", first_stage=True),
-        clearance_source("mesh{i}", neglected="mesh*", first_stage=True),
+        _clearance("mesh{i}", neglected="mesh*", first_stage=True),
     ),
 )
 
@@ -298,7 +298,7 @@ CRANK_DISC = Interface(
             characteristic=TILT,
             fine=True,
         ),
-        clearance_source("crank{i}.journal{j}"),
+        _clearance("crank{i}.journal{j}"),
     ),
 )
 
@@ -350,7 +350,7 @@ CRANK_CARRIER = Interface(
     rows=crank_carrier,
     sources=(
         ErrorSource(name="carrier.bore{i}.position", shape="vector", place="carrier.bore{i}"),
-        clearance_source("carrier.bore{i}"),
+        _clearance("carrier.bore{i}"),
     ),
 )
 
@@ -381,7 +381,7 @@ CARRIER_SUPPORT = Interface(
     rows=carrier_support,
     sources=(
         ErrorSource(name="carrier.assembly", fixed=True, characteristic=_STANDS_OFF, shape="vector", place="carrier"),
-        clearance_source("carrier", fixed=True),
+        _clearance("carrier", fixed=True),
     ),
 )
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from tolalloc.reading.units import MILLIMETRE
-from tolalloc.reducers.equivalent.interfaces import ECCENTRIC, Interface, clearance_source
+from tolalloc.reducers.equivalent.interfaces import ECCENTRIC, Interface
 from tolalloc.reducers.equivalent.sources import ErrorSource
 from tolalloc.reducers.equivalent.springs import Positions, SpringGroup, turned, vector_columns, with_play
 from tolalloc.reducers.families.family import Place, ReducerFamily
@@ -68,7 +68,9 @@ CENTRE_MESH = Interface(
             )
             for gear in ("pinion", "centre")
         ),
-        clearance_source("centre.mesh", first_stage=True),
+        ErrorSource(
+            name="centre.mesh.clearance", place="centre.mesh", neglected="*.clearance", fine=True, first_stage=True
+        ),
     ),
 )
 

@@ -51,11 +51,6 @@ class CentreGear:
         """Base radius r_b4 of the outer toothing, m·Z4·cos(α)/2 [m]."""
         return self.module * self.teeth * cos(self.pressure_angle) / 2
 
-    @property
-    def ratio(self) -> float:
-        """Turns of the pinion per turn of the centre gear, −Z4/Z3 [-]."""
-        return -self.teeth / self.pinion_teeth
-
 
 @dataclass(frozen=True, kw_only=True)
 class OutputPins:
@@ -413,7 +408,8 @@ class Reducer:
 
         That of the sun, −Z4/Z3 times as many where a pinion drives it by a centre gear.
         """
-        return self.sun_ratio * self.centre_gear.ratio if self.centre_gear else self.sun_ratio
+        gear = self.centre_gear
+        return -self.sun_ratio * gear.teeth / gear.pinion_teeth if gear else self.sun_ratio
 
     @property
     def sun_ratio(self) -> float:
@@ -437,7 +433,7 @@ def interface_forces(reducer: Reducer, torque: float) -> dict[str, float]:
     first stage carries the torque over the ratio; the carrier bearing holds none.
 
     Crank–carrier T/(n_c·a_sp); crank–disc the mean over φ of |T/(n_c·n_d·a_sp) + e^(iφ)·T/(n_c·n_d·e·zp)|; mesh
-    T/(i·n_c·r_b1), that of a centre gear T/(i·r_b4), i that of the sun. Units N, N·m, m; 3 to 4 % above the solved mean.
+    T/(i·n_c·r_b1), that of a centre gear T/(i·r_b4), i that of the sun. Units N, N·m, m; 3 to 4 % above the mean.
 
     References
     ----------
