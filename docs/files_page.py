@@ -9,6 +9,10 @@ from tolalloc.cli.start import KINDS, schema
 
 TITLES = {
     "reducer": ("Reducer", "`NAME.reducer.toml`: sizes, stiffness, modification and load; `tolalloc new` writes one."),
+    "rv-centre-gear": (
+        "RV reducer with centre gear",
+        "`NAME.reducer.toml` with a table `[centre_gear]`; `tolalloc new --family rv-centre-gear` writes one.",
+    ),
     "single-stage": (
         "Single-stage drive",
         "`NAME.reducer.toml` with a table `[output_pins]`; `tolalloc new --family single-stage` writes one.",

@@ -79,7 +79,7 @@ def test_a_picture_shows_holes_and_output_pins():
     ("arguments", "says"),
     [
         (("--family", "single-stage", "--like", "rv20e"), "preset of the family single-stage 'rv20e' is not known"),
-        (("--family", "harmonic"), "family 'harmonic' is not known; known are rv, single-stage"),
+        (("--family", "harmonic"), "family 'harmonic' is not known; known are rv, rv-centre-gear, single-stage"),
         (("--like", "cd29", "--cranks", "2"), "cranks is 2; allowed is nothing: a single stage has none"),
         (("--like", "cd29", "--with", "assembly"), "sample 'assembly' is not known"),
     ],

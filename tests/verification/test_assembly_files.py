@@ -348,7 +348,7 @@ def test_a_reducers_file_stands_beside_the_chain_file(tmp_path):
             "precision = 2",
             'precision = 2\nreducer = "mine.toml"',
             "FOLDER/mine.toml: no such file; shipped reducer files are bx40e, cd29, rv110e, rv160e, rv20e, "
-            "rv20e_liu2020, rv40e, rv40e_xi2015, rv80e.",
+            "rv20e_liu2020, rv27c, rv40e, rv40e_xi2015, rv80e.",
         ),
     ],
 )

@@ -134,10 +134,11 @@ def places_of(reducer: Reducer) -> tuple[Place, ...]:
         owned=(("carrier.bore", "bore"),),
         turns=tuple(carrier_turn(reducer, bores) for bores in range(alike)),
     )
+    outer = (("centre.eccentricity", "outer.eccentricity"),) if reducer.centre_gear else ()
     sun = Place(
         name="sun",
         kind="sun",
-        owned=(("sun.eccentricity", "eccentricity"), ("sun.pitch", "pitch")),
+        owned=(("sun.eccentricity", "eccentricity"), ("sun.pitch", "pitch"), *outer),
         turns=tuple(sun_turn(reducer, teeth) for teeth in range(first.sun_teeth)),
     )
     # The planets' teeth meet the sun's alike at crank positions that lie whole numbers of (Z1 + Z2)/n_crank apart.

@@ -14,9 +14,15 @@ from tolalloc.exceptions import InputError
 
 def new(
     name: Annotated[Path | None, typer.Argument(help="The new folder, whose name becomes that of the study.")] = None,
-    family: Annotated[str, typer.Option(help="Family of reducers: rv or single-stage; that of the preset.")] = "",
+    family: Annotated[
+        str, typer.Option(help="Family of reducers: rv, rv-centre-gear or single-stage; that of the preset.")
+    ] = "",
     like: Annotated[
-        str, typer.Option(help="Preset that it is like: rv20e, rv40e, rv80e, rv110e, rv160e; single-stage: cd29.")
+        str,
+        typer.Option(
+            help="Preset that it is like: rv20e, rv40e, rv80e, rv110e, rv160e; rv-centre-gear: rv27c; "
+            "single-stage: cd29."
+        ),
     ] = "",
     cranks: Annotated[int | None, typer.Option(help="Cranks, 2 to 4; those of the preset unless given.")] = None,
     discs: Annotated[int | None, typer.Option(help="Discs, 1 to 3; those of the preset unless given.")] = None,
@@ -54,7 +60,10 @@ def new(
 
 def schema(
     kind: Annotated[
-        str, typer.Argument(help="Kind of TOML file: reducer, single-stage, unit, stiffness, bench or chain.")
+        str,
+        typer.Argument(
+            help="Kind of TOML file: reducer, rv-centre-gear, single-stage, unit, stiffness, bench or chain."
+        ),
     ],
 ) -> None:
     """Print the JSON schema of a kind of TOML file: its fields, their units and ranges."""

@@ -33,7 +33,13 @@ from tolalloc.reducers.families.family import NewRows
 from tolalloc.reducers.families.known import FAMILIES, SOURCES, family_of
 from tolalloc.reducers.families.rv import RV
 from tolalloc.reducers.reducer.design import Modification, Reducer
-from tolalloc.reducers.reducer.files import IdentifiedStiffnessRecord, ReducerRecord, SingleStageRecord, load_reducer
+from tolalloc.reducers.reducer.files import (
+    CentreGearRecord,
+    IdentifiedStiffnessRecord,
+    ReducerRecord,
+    SingleStageRecord,
+    load_reducer,
+)
 from tolalloc.reducers.unit_file import UnitRecord
 
 
@@ -56,6 +62,7 @@ def _bench() -> type[BaseModel]:
 
 KINDS: dict[str, Callable[[], type[BaseModel]]] = {
     "reducer": lambda: ReducerRecord,
+    "rv-centre-gear": lambda: CentreGearRecord,
     "single-stage": lambda: SingleStageRecord,
     "unit": lambda: UnitRecord,
     "stiffness": lambda: IdentifiedStiffnessRecord,

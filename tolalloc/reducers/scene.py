@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cached_property, lru_cache
-from math import gcd, pi
+from math import lcm, pi
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ from tolalloc.reducers.equivalent.outputs import Forces, forces
 from tolalloc.reducers.equivalent.springs import Coordinates, Positions, SpringGroup
 from tolalloc.reducers.families.family import Place
 from tolalloc.reducers.families.known import SOURCES, family_of
-from tolalloc.reducers.reducer.design import FirstStage, Reducer
+from tolalloc.reducers.reducer.design import Reducer
 
 
 def place_of(source: str) -> str:
@@ -365,8 +366,10 @@ def _output_turns(reducer: Reducer) -> int:
     """Return after how many turns of the output everything is where it was [-]."""
     if reducer.first_stage is None:
         return 1
-    gears = reducer.first_stage
-    return gears.sun_teeth // gcd(gears.sun_teeth, gears.planet_teeth * reducer.cycloid_stage.pin_count)
+    gears, centre = reducer.first_stage, reducer.centre_gear
+    turns = Fraction(gears.planet_teeth * reducer.cycloid_stage.pin_count, gears.sun_teeth)
+    pinion = (1 + turns) * Fraction(centre.teeth, centre.pinion_teeth) if centre else turns
+    return lcm(turns.denominator, pinion.denominator)
 
 
 def _as_modified(reducer: Reducer, own: Mapping[str, float]) -> Reducer:
@@ -392,7 +395,10 @@ def _motion(reducer: Reducer) -> tuple[dict[str, float], dict[str, list[float]]]
         "crank": [float(still.disc_direction(disc)[0]) for disc in discs],
         "disc": [float(-still.disc_direction(disc)[0] / stage.disc_teeth) for disc in discs],
         "pin": [float(direction) for direction in still.pin_direction],
-        "planet": [_first_tooth(reducer.gears, float(still.crank_position(crank)[0])) for crank in cranks],
+        "planet": [
+            _first_tooth(reducer.gears.sun_teeth, reducer.gears.planet_teeth, float(still.crank_position(crank)[0]))
+            for crank in cranks
+        ],
         "sun": [float(still.sun_angle[0])],
     }
     rates = {
@@ -403,13 +409,19 @@ def _motion(reducer: Reducer) -> tuple[dict[str, float], dict[str, list[float]]]
         "planet": turns(lambda at: at.crank_angle),
         "sun": turns(lambda at: at.sun_angle),
     }
+    if centre := reducer.centre_gear:
+        start |= {"centre": start["sun"], "pinion": [_first_tooth(centre.teeth, centre.pinion_teeth, 0.0)]}
+        rates |= {"centre": rates["sun"], "pinion": turns(lambda at: at.pinion_angle)}
     return rates, start
 
 
-def _first_tooth(gears: FirstStage, direction: float) -> float:
-    """Return where a planet's first tooth stands that meshes with the sun from a direction [rad]."""
-    ahead = direction * gears.sun_teeth / (2 * pi) % 1.0
-    return direction + pi + (ahead - 0.5) * 2 * pi / gears.planet_teeth
+def _first_tooth(teeth: int, others: int, direction: float) -> float:
+    """Return where the first tooth of a gear stands that meshes with another, such as the sun, from a direction [rad].
+
+    The gear has the number of others, the one in the middle, whose first tooth stands at 0, that of teeth.
+    """
+    ahead = direction * teeth / (2 * pi) % 1.0
+    return direction + pi + (ahead - 0.5) * 2 * pi / others
 
 
 def _coordinates(reducer: Reducer) -> dict[str, list[int]]:

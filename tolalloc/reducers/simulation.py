@@ -188,7 +188,7 @@ def prepare_simulation(asked: SimulationRequest) -> PreparedSimulation:
     '0.2374 s, 2 whole crank turns'
     """
     unit, designed = load_unit(asked.unit), load_reducer(asked.reducer)
-    _ = designed.gears  # masses and speeds are those of sun and planets, so a single stage is refused first
+    _ = inertia_of(designed)  # a single stage or a centre gear, of which no masses are known, is refused first
     reducer = unit.as_built(designed)
     if asked.engine == "exudyn":
         multibody_engine()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -190,10 +190,36 @@ def _draw_first_stage(pen: _Pen, pose: Pose) -> None:
     pen.output(pose)
 
 
+def _draw_centre_gear(pen: _Pen, pose: Pose) -> None:
+    """Draw the centre gear on its hollow shaft and the input pinion beside it."""
+    outline, centre, module = pose.outline, pose.shift("sun"), pose.outline["centre_module"]
+    beside = complex(module * (outline["centre_teeth"] + outline["pinion_teeth"]) / 2)
+    pen.circle(0j, outline["housing_radius"], "", _PAPER, fill=False, alpha=0.5)
+    for name, axis, bore in (("centre", centre, outline["hollow_radius"]), ("pinion", beside, 2 * module)):
+        teeth, angle = outline[f"{name}_teeth"], float(pose.at(name)[0])
+        at = axis + pose.offset(name, angle - pose.record["start"][name][0])
+        shape = gear(teeth, module, outline["centre_pressure_angle"]) * np.exp(1j * angle) + at
+        pen.polygon(shape, pen.colour(name, _GEAR), _LINE, 0.7)
+        pen.circle(axis, bore, "", _PAPER)
+        mark = np.exp(1j * angle) * module * teeth / 2
+        pen.lines(np.array([[at + share * mark for share in (0.7, 0.9)]]), _INK, 1.4)
+    if pen.shares.get("centre.mesh", 0.0) > 0:
+        pen.ring(complex(module * outline["centre_teeth"] / 2), 1.1 * module, "centre.mesh")
+    pen.output(pose)
+
+
 def longest_arrow(record: Mapping[str, Any]) -> float:
     """Return the force to which the longest arrow belongs, the largest of the turn either way round [N]."""
     largest = max(float(values_of(record[direction]["force"]).max()) for direction in ("forward", "backward"))
     return max(largest, 1e-12)
+
+
+def _views(outline: Mapping[str, Any]) -> list[tuple[Callable[[_Pen, Pose], None], str]]:
+    """Return what is drawn beside the discs, and what is said above it."""
+    if "output_pin_count" in outline:
+        return [(_draw_output, "output and input shaft")]
+    centre = [(_draw_centre_gear, "centre gear and input pinion")] if "centre_teeth" in outline else []
+    return [(_draw_first_stage, "carrier, planets and sun"), *centre]
 
 
 def draw_still(
@@ -225,8 +251,9 @@ def draw_still(
     """
     pose, shown = Pose(record, carrier_angle), (*discs,) or (*range(record["outline"]["disc_count"]),)
     largest = largest or longest_arrow(record)
-    canvas = Canvas(figsize=(3.6 * (len(shown) + 1), 4.2), layout="constrained")
-    views = np.atleast_1d(canvas.subplots(1, len(shown) + 1))
+    others = _views(record["outline"])
+    canvas = Canvas(figsize=(3.6 * (len(shown) + len(others)), 4.2), layout="constrained")
+    views = np.atleast_1d(canvas.subplots(1, len(shown) + len(others)))
     reach = 1.02 * record["outline"]["housing_radius"]
     for axes in views:
         axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
@@ -234,13 +261,9 @@ def draw_still(
     for disc, axes in zip(shown, views, strict=False):
         _draw_disc(_Pen(axes, shares, turned), pose, disc, largest)
         axes.set_title(f"disc {disc + 1} on the pins", fontsize=10, color=_INK)
-    draw, what = (
-        (_draw_output, "output and input shaft")
-        if "output_pin_count" in record["outline"]
-        else (_draw_first_stage, "carrier, planets and sun")
-    )
-    draw(_Pen(views[-1], shares, turned), pose)
-    views[-1].set_title(what, fontsize=10, color=_INK)
+    for axes, (draw, what) in zip(views[len(shown) :], others, strict=True):
+        draw(_Pen(axes, shares, turned), pose)
+        axes.set_title(what, fontsize=10, color=_INK)
     stated = f"errors and gaps {record['magnification']:g} times larger, longest arrow {largest:,.0f} N"
     canvas.suptitle(f"{title}: {stated}" if title else stated, fontsize=10, color=_INK)
     return canvas

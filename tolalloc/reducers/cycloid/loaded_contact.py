@@ -613,7 +613,7 @@ def pin_moment(reducer: Reducer, torque: float) -> float:
     161.274
     """
     stage = reducer.cycloid_stage
-    return torque * (1.0 - 1.0 / reducer.ratio) * stage.disc_teeth / stage.pin_count
+    return torque * (1.0 - 1.0 / reducer.sun_ratio) * stage.disc_teeth / stage.pin_count
 
 
 def assess(

@@ -96,12 +96,6 @@ class Steps:
         """Number of meshes with play; they are the first elements of all that can have play [-]."""
         return self.reducer.crank_count if self.reducer.clearance_of("gear_mesh") else 0
 
-    @property
-    def sun_base_radius(self) -> float:
-        """Base radius of the sun gear [m]."""
-        gears = self.reducer.gears
-        return self.reducer.planet_base_radius * gears.sun_teeth / gears.planet_teeth
-
     def parts(self) -> Iterator[tuple[int, CondensedAngles, StepTables]]:
         """Yield the first step and the tables of each part of the steps; memory holds one part at a time.
 
@@ -136,9 +130,10 @@ class Steps:
             damping += delay * between
             load[:, :, own] = -(weighted @ group.error)
             if group.stiffness_name == "gear_mesh":
-                by_coordinate[:] = self.sun_base_radius * weighted.sum(axis=2)
+                by_coordinate[:] = self.reducer.sun_base_radius * weighted.sum(axis=2)
                 by_velocity[:] = delay * by_coordinate
-                by_load[:, own] = self.sun_base_radius * (group.stiffness[..., np.newaxis] * group.error).sum(axis=1)
+                force_by_error = (group.stiffness[..., np.newaxis] * group.error).sum(axis=1)
+                by_load[:, own] = self.reducer.sun_base_radius * force_by_error
         rotation = self.coordinates.carrier + 2
         load[:, rotation, -1] = self.scale[rotation]
         return {
@@ -284,7 +279,7 @@ def simulate(
     state = State(nothing[0], nothing[1], nothing[2], nothing[3], np.zeros(samples, np.uint8))
     scale, given = steps.scale, np.ascontiguousarray(errors)
     parts = Parts(
-        steps.mass, steps.retained, rotation, float(scale[rotation]), steps.played_meshes, steps.sun_base_radius
+        steps.mass, steps.retained, rotation, float(scale[rotation]), steps.played_meshes, model.reducer.sun_base_radius
     )
     own = (columns.layout, columns.map, model.design, given)
     for first, angles, tables in steps.parts():

@@ -93,6 +93,8 @@ def rotation_scale(reducer: Reducer, coordinates: Coordinates) -> Float[np.ndarr
     27.0
     """
     scale = np.ones(coordinates.count)
+    if reducer.centre_gear:
+        scale[coordinates.input + 2] = 1 / reducer.sun_base_radius
     for crank in range(reducer.crank_count):
         scale[coordinates.planet(crank) + 2] = 1 / reducer.planet_base_radius
     for disc in range(reducer.disc_count):

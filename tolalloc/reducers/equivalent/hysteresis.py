@@ -28,7 +28,7 @@ from jaxtyping import Float, Int
 from tolalloc.reducers.cycloid.tooth_profile import normals, pin_angles
 from tolalloc.reducers.equivalent.condensation import CondensedAngles, bilateral_groups
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import Forces, Solved, forces
+from tolalloc.reducers.equivalent.outputs import SINGLE, Forces, Solved, forces
 from tolalloc.reducers.equivalent.springs import Positions
 from tolalloc.reducers.reducer.bearings import CRANK_BEARINGS, FrictionDimensions, Part, RollingBearing, loss_factor
 from tolalloc.reducers.reducer.design import Reducer
@@ -153,7 +153,8 @@ def friction_torques(solved: Solved) -> dict[str, Float[np.ndarray, "sample angl
     It is that at the output: the coefficient times the sum of force times sliding way per radian of the output, the
     sun turning. Forces are those of the equilibria, which have no friction.
 
-    T_f = Σ µ·F·way; Coulomb's friction, no seals and no grease (`IdleTorque`); mesh µ·H_v·F·r_b1·(i − 1).
+    T_f = Σ µ·F·way; Coulomb's friction, no seals and no grease (`IdleTorque`); mesh µ·H_v·F·r_b1·(i − 1), of a centre
+    gear µ·H_v·F·r_b4·i besides, i the turns of the sun.
 
     References
     ----------
@@ -177,12 +178,15 @@ def friction_torques(solved: Solved) -> dict[str, Float[np.ndarray, "sample angl
         if getattr(dimensions, name) is not None:
             torques[name] = _bearing(reducer, dimensions, found, name)
     if MESH not in dimensions.unknown and dimensions.contact_ratio is not None:
-        first = reducer.gears
-        sun_base = reducer.planet_base_radius * first.sun_teeth / first.planet_teeth
+        first, own = reducer.gears, reducer.centre_gear
         loss = loss_factor(first.sun_teeth, first.planet_teeth, dimensions.contact_ratio)
         # Seen from the carrier the sun turns by ratio − 1 per radian of the output.
-        transmitted = found.of(MESH).sum(axis=2) * sun_base * (reducer.ratio - 1.0)
+        transmitted = found.of(MESH).sum(axis=2) * reducer.sun_base_radius * (reducer.sun_ratio - 1.0)
         torques[MESH] = reducer.friction.gear_mesh * loss * transmitted
+        if own and (contact_ratio := dimensions.centre_contact_ratio):
+            loss = loss_factor(own.pinion_teeth, own.teeth, contact_ratio)
+            transmitted = found.of("centre_mesh").sum(axis=2) * own.base_radius * reducer.sun_ratio
+            torques[MESH] += reducer.friction.gear_mesh * loss * transmitted
     return torques
 
 
@@ -513,18 +517,18 @@ def _disc_ways(
 
 
 def _mesh_force(solved: Solved) -> Float[np.ndarray, "sample angle mesh"]:
-    """Return the force of every mesh along its line of action, with its sign [N]."""
+    """Return the force of every mesh along its line of action, with its sign, that of a centre gear last [N]."""
     found = solved.forces
-    own, bilateral = found.rows_of_stiffness[MESH], found.rows.shape[2]
-    if own.start < bilateral:
-        return np.asarray(found.rows[:, :, own])
-    return np.asarray(found.elements[:, :, own.start - bilateral : own.stop - bilateral, 0])
+    return np.concatenate([found.vectors(name)[..., 0] for name in SINGLE if name in found.rows_of_stiffness], axis=2)
 
 
 def _mesh_way(solved: Solved) -> Float[np.ndarray, "sample angle mesh"]:
     """Return how far every mesh yields, its nominal clearance included [m]."""
     reducer, force = solved.equilibria.reducer, _mesh_force(solved)
-    return np.asarray(force / reducer.stiffness.gear_mesh + np.sign(force) * reducer.clearance_of("gear_mesh"))
+    names = (["gear_mesh"] * reducer.crank_count + ["centre_mesh"])[: force.shape[2]]
+    stiffness = np.array([getattr(reducer.stiffness, name) for name in names])
+    clearance = np.array([reducer.clearance_of(name) for name in names])
+    return np.asarray(force / stiffness + np.sign(force) * clearance)
 
 
 _PLACES = {

@@ -38,7 +38,7 @@ class Interface:
 
 
 _STANDS_OFF = Characteristic("coaxiality", "how far an assembly stands off is drawn as coaxiality")
-_ECCENTRIC = Characteristic("coaxiality", "the eccentricity of a gear is drawn as its coaxiality")
+ECCENTRIC = Characteristic("coaxiality", "the eccentricity of a gear is drawn as its coaxiality")
 
 
 def _clearance(
@@ -111,7 +111,8 @@ def gear_mesh(at: Positions) -> SpringGroup:
     ``sun.eccentricity`` and ``sun.pitch`` turn with the sun, ``planet{i}.eccentricity`` and ``planet{i}.pitch`` with
     the crankshaft; ``mesh{i}.deviation`` is what the pair adds along its line of action (tooth thickness) [m].
 
-    δ = n·(x_sun − x_planet) + r_b2·θp + errors along the line of action γ = P + π/2 − α [m]; involute teeth in mesh.
+    δ = n·(x_sun − x_planet) + r_b2·θp + errors along the line of action γ = P + π/2 − α [m]; involute teeth in mesh. A
+    sun on a centre gear, whose rotation is not given, adds r_b1·θs.
 
     References
     ----------
@@ -134,6 +135,8 @@ def gear_mesh(at: Positions) -> SpringGroup:
         displacement[:, crank, coordinates.input : coordinates.input + 2] = normal
         displacement[:, crank, planet : planet + 2] = -normal
         displacement[:, crank, planet + 2] = reducer.planet_base_radius
+        if reducer.centre_gear:
+            displacement[:, crank, coordinates.input + 2] = reducer.sun_base_radius
         meshes.append(columns)
     names = tuple(dict.fromkeys(name for columns in meshes for name in columns))
     nothing = np.zeros(angles)
@@ -152,11 +155,11 @@ def gear_mesh(at: Positions) -> SpringGroup:
 GEAR_MESH = Interface(
     rows=gear_mesh,
     sources=(
-        ErrorSource(name="sun.eccentricity", characteristic=_ECCENTRIC, shape="vector", place="sun", first_stage=True),
+        ErrorSource(name="sun.eccentricity", characteristic=ECCENTRIC, shape="vector", place="sun", first_stage=True),
         ErrorSource(name="sun.pitch", shape="waves", place="sun.teeth", neglected="sun.pitch", first_stage=True),
         ErrorSource(
             name="planet{i}.eccentricity",
-            characteristic=_ECCENTRIC,
+            characteristic=ECCENTRIC,
             shape="vector",
             place="planet{i}",
             first_stage=True,

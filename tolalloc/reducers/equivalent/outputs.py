@@ -26,7 +26,7 @@ from tolalloc.reducers.equivalent.springs import Positions, harmonic_waves
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.form import Form
 
-SINGLE = ("gear_mesh",)
+SINGLE = ("gear_mesh", "centre_mesh")
 """Interfaces that carry along one direction; the others carry x and y."""
 
 
@@ -220,7 +220,8 @@ def bearings_of(reducer: Reducer) -> dict[str, str]:
 
 def outputs_of(reducer: Reducer) -> dict[str, Quantity]:
     """Return every output of one solve, largest forces of those interfaces that the reducer has."""
-    mesh = {"mesh": "gear_mesh"} if reducer.stiffness.gear_mesh else {}
+    named = {"mesh": "gear_mesh", "centre gear mesh": "centre_mesh"}
+    mesh = {own: name for own, name in named.items() if getattr(reducer.stiffness, name)}
     return {
         "mean transmission error": ("arcsec", _mean),
         "pins in contact, least": ("-", _fewest),

@@ -21,38 +21,42 @@ HARMONICS = (1, 2, 4)
 
 @dataclass(frozen=True)
 class Coordinates:
-    """Index of every displacement in the vector q: 2 + 3·cranks + 3·discs + 3 of them; a single stage has no crank."""
+    """Index of every displacement in the vector q: 2 + 3·cranks + 3·discs + 3 of them; a single stage has no crank.
+
+    A centre gear adds the rotation of the sun, which is given without one.
+    """
 
     crank_count: int
     disc_count: int
+    input_count: int = 2  # Of the sun or the input shaft
 
     @classmethod
     def of(cls, reducer: Reducer) -> Coordinates:
         """Return the layout of a reducer's displacements."""
-        return cls(reducer.crank_count, reducer.disc_count)
+        return cls(reducer.crank_count, reducer.disc_count, 2 if reducer.centre_gear is None else 3)
 
     @property
     def count(self) -> int:
         """Number of coordinates, 17 for two cranks and two discs."""
-        return 5 + 3 * self.crank_count + 3 * self.disc_count
+        return self.carrier + 3
 
     @property
     def input(self) -> int:
-        """First of the two of the sun gear, Xs and Ys, or of a single stage's input shaft [m]."""
+        """First of the sun gear's, Xs and Ys, or of a single stage's input shaft [m], with a centre gear θs [rad]."""
         return 0
 
     def planet(self, crank: int) -> int:
         """First of a planet's three, Xp and Yp [m] and θp [rad]."""
-        return 2 + 3 * crank
+        return self.input_count + 3 * crank
 
     def disc(self, disc: int) -> int:
         """First of a disc's three, xd and yd [m] and θd [rad]."""
-        return 2 + 3 * self.crank_count + 3 * disc
+        return self.planet(self.crank_count) + 3 * disc
 
     @property
     def carrier(self) -> int:
         """First of the carrier's three, Xca and Yca [m] and θca [rad]."""
-        return 2 + 3 * self.crank_count + 3 * self.disc_count
+        return self.disc(self.disc_count)
 
 
 @dataclass(frozen=True)
@@ -91,7 +95,12 @@ class Positions:
 
     @cached_property
     def sun_angle(self) -> Float[np.ndarray, " angle"]:
-        """θs = i·θc [rad]."""
+        """θs = i·θc, i the turns of the sun per turn of the carrier [rad]."""
+        return self.reducer.sun_ratio * self.carrier_angle
+
+    @cached_property
+    def pinion_angle(self) -> Float[np.ndarray, " angle"]:
+        """θ of the shaft of the motor, which a pinion on it has [rad]."""
         return self.reducer.ratio * self.carrier_angle
 
     @cached_property

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from tolalloc.reducers.equivalent.sources import ErrorSources
+from tolalloc.reducers.families.centre_gear import CENTRE_GEAR
 from tolalloc.reducers.families.family import ReducerFamily
 from tolalloc.reducers.families.rv import RV
 from tolalloc.reducers.families.single_stage import SINGLE_STAGE
 from tolalloc.reducers.reducer.design import Reducer
 
-FAMILIES = {own.name: own for own in (RV, SINGLE_STAGE)}
+FAMILIES = {own.name: own for own in (RV, CENTRE_GEAR, SINGLE_STAGE)}
 """Name → family."""
 
 SOURCES = ErrorSources(dict.fromkeys(kind for own in FAMILIES.values() for kind in own.sources.kinds))

@@ -411,12 +411,15 @@ class FrictionDimensions:
     crank_carrier_bearing: RollingBearing | None = None  # Both of one crankshaft as rows of one
     carrier_bearing: RollingBearing | None = None
     contact_ratio: float | None = None  # Of a sun–planet mesh [-]
+    # Of input pinion and centre gear, 0 in a reducer without one [-]
+    centre_contact_ratio: float | None = 0.0
 
     @property
     def unknown(self) -> tuple[str, ...]:
         """Kinds of contact whose friction does not follow from what the file states."""
-        bearings = tuple(name for name, value in vars(self).items() if value is None and name != "contact_ratio")
-        known = self.contact_ratio is not None and self.contact_ratio <= LARGEST_CONTACT_RATIO
+        meshes = (self.contact_ratio, self.centre_contact_ratio)
+        bearings = tuple(name for name, value in vars(self).items() if value is None and "contact_ratio" not in name)
+        known = all(ratio is not None and ratio <= LARGEST_CONTACT_RATIO for ratio in meshes)
         return bearings if known else (*bearings, "gear_mesh")
 
     @property

@@ -36,6 +36,23 @@ class FirstStage:
 
 
 @dataclass(frozen=True, kw_only=True)
+class CentreGear:
+    """Input pinion and outer toothing of the gear on a hollow shaft that carries the sun; table ``[centre_gear]``."""
+
+    # Numbers of teeth Z3 and Z4 [-]
+    pinion_teeth: Teeth
+    teeth: Teeth
+    # Module and pressure angle of the pair, spur gears [m, rad]
+    module: Annotated[float, Field(alias="module_mm", ge=0.1, le=20), times(MILLIMETRE)]
+    pressure_angle: Annotated[float, Field(alias="pressure_angle_deg", ge=5, le=45), times(DEGREE)]
+
+    @property
+    def base_radius(self) -> float:
+        """Base radius r_b4 of the outer toothing, m·Z4·cos(α)/2 [m]."""
+        return self.module * self.teeth * cos(self.pressure_angle) / 2
+
+
+@dataclass(frozen=True, kw_only=True)
 class OutputPins:
     """Pins or rollers of the output in holes of the discs; table ``[output_pins]`` of a reducer file."""
 
@@ -210,6 +227,14 @@ class Clearances:
 
 
 @dataclass(frozen=True, kw_only=True)
+class CentreGearClearances(Clearances):
+    """Those of an RV reducer with a centre gear; table ``[clearances]``."""
+
+    # Half the normal backlash of input pinion and centre gear [m]
+    centre_mesh: Annotated[float, Field(alias="centre_mesh_um", ge=0, le=200), times(MICROMETRE)] = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
 class SingleStageClearances:
     """Nominal radial clearances of the bearings of a single stage, half the diametral ones; table ``[clearances]``."""
 
@@ -261,6 +286,7 @@ class Reducer:
     catalogue: Catalogue | None = None
     # Sun and planets of an RV reducer, pins of the output of a single stage: a reducer has the one or the other
     first_stage: FirstStage | None = None
+    centre_gear: CentreGear | None = None  # Between motor and sun, of an RV reducer that has one
     output_pins: OutputPins | None = None
     assumptions: tuple[str, ...] = field(default=())
     # Free profile of the flanks, form of measured discs and pins; none unless stated
@@ -269,7 +295,9 @@ class Reducer:
     @property
     def family(self) -> str:
         """Name of the family, `tolalloc.reducers.families`."""
-        return "RV" if self.output_pins is None else "single stage"
+        if self.output_pins is not None:
+            return "single stage"
+        return "RV" if self.centre_gear is None else "RV centre gear"
 
     @property
     def gears(self) -> FirstStage:
@@ -285,6 +313,19 @@ class Reducer:
                 f"reducer {self.name}: a single stage has neither sun nor planets; this needs an RV reducer."
             )
         return self.first_stage
+
+    @property
+    def centre_pair(self) -> CentreGear:
+        """Input pinion and centre gear.
+
+        Raises
+        ------
+        InputError
+            A reducer without them.
+        """
+        if self.centre_gear is None:
+            raise InputError(f"reducer {self.name}: there is no centre gear; this needs a table [centre_gear].")
+        return self.centre_gear
 
     @property
     def holes(self) -> OutputPins:
@@ -322,6 +363,11 @@ class Reducer:
     def planet_base_radius(self) -> float:
         """Base radius r_b2 of the planet gear, m·Z2·cos(α)/2 [m]."""
         return self.gears.module * self.gears.planet_teeth * cos(self.gears.pressure_angle) / 2
+
+    @property
+    def sun_base_radius(self) -> float:
+        """Base radius r_b1 of the sun gear, r_b2·Z1/Z2 [m]."""
+        return self.planet_base_radius * self.gears.sun_teeth / self.gears.planet_teeth
 
     @property
     def contact_modulus(self) -> float:
@@ -365,7 +411,16 @@ class Reducer:
 
     @property
     def ratio(self) -> float:
-        """Turns of the input per turn of the carrier, the pin housing fixed [-].
+        """Turns of the motor's shaft per turn of the carrier, the pin housing fixed [-].
+
+        That of the sun, −Z4/Z3 times as many where a pinion drives it by a centre gear.
+        """
+        gear = self.centre_gear
+        return -self.sun_ratio * gear.teeth / gear.pinion_teeth if gear else self.sun_ratio
+
+    @property
+    def sun_ratio(self) -> float:
+        """Turns of the sun, or of a single stage's shaft, per turn of the carrier, the pin housing fixed [-].
 
         1 + (Z2/Z1)·zp of an RV reducer's sun; −zc of a single stage's shaft, which turns against its output.
         """
@@ -385,7 +440,7 @@ def interface_forces(reducer: Reducer, torque: float) -> dict[str, float]:
     first stage carries the torque over the ratio; the carrier bearing holds none.
 
     Crank–carrier T/(n_c·a_sp); crank–disc the mean over φ of |T/(n_c·n_d·a_sp) + e^(iφ)·T/(n_c·n_d·e·zp)|; mesh
-    T/(i·n_c·r_b1). Units N, N·m, m; 3 to 4 % above the solved mean.
+    T/(i·n_c·r_b1), that of a centre gear T/(i·r_b4), i that of the sun. Units N, N·m, m; 3 to 4 % above the mean.
 
     References
     ----------
@@ -402,12 +457,12 @@ def interface_forces(reducer: Reducer, torque: float) -> dict[str, float]:
     crank = size / (reducer.crank_count * reducer.crank_circle_radius)
     tangential = crank / reducer.disc_count
     pins = size / (reducer.disc_count * reducer.crank_count * stage.eccentricity * stage.pin_count)
-    first = reducer.gears
-    sun_base = reducer.planet_base_radius * first.sun_teeth / first.planet_teeth
+    centre = reducer.centre_gear
     return {
         "crank_carrier_bearing": crank,
         "crank_disc_bearing": float(np.abs(tangential + pins * np.exp(1j * _PHASES)).mean()),
-        "gear_mesh": size / (reducer.ratio * reducer.crank_count * sun_base),
+        "gear_mesh": size / (reducer.sun_ratio * reducer.crank_count * reducer.sun_base_radius),
+        **({"centre_mesh": size / (reducer.sun_ratio * centre.base_radius)} if centre else {}),
         "sun_support": 0.0,
         "carrier_bearing": 0.0,
     }

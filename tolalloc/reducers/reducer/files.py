@@ -31,6 +31,8 @@ from tolalloc.reducers.reducer.bearings import (
 )
 from tolalloc.reducers.reducer.design import (
     Catalogue,
+    CentreGear,
+    CentreGearClearances,
     Clearances,
     CycloidStage,
     FirstStage,
@@ -88,14 +90,20 @@ class Rollers:
 
 
 @dataclass(frozen=True, kw_only=True)
-class GearPair:
+class SpurPair:
+    """Data of a pair of spur gears from which Table 2 of liu2020, that is ISO 6336-1, gives the mesh stiffness."""
+
+    contact_ratio: Annotated[float, Field(ge=1, le=2.5)]
+    face_width: Annotated[float, Field(alias="face_width_mm", gt=0, le=500), times(MILLIMETRE)]  # [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class GearPair(SpurPair):
     """Data of the gear pair from which Table 2 of liu2020, that is ISO 6336-1, gives the mesh stiffness.
 
     Virtual teeth that are not given are those of the first stage, as spur gears have them; helical gears have more.
     """
 
-    contact_ratio: Annotated[float, Field(ge=1, le=2.5)]
-    face_width: Annotated[float, Field(alias="face_width_mm", gt=0, le=500), times(MILLIMETRE)]  # [m]
     sun_virtual_teeth: Annotated[float, Field(ge=5)] | None = None
     planet_virtual_teeth: Annotated[float, Field(ge=5)] | None = None
 
@@ -260,6 +268,39 @@ class StiffnessRecord(Record):
         return tuple(found)
 
 
+class CentreGearStiffnessRecord(StiffnessRecord):
+    """Table ``[stiffness]`` with a centre gear; a pinion without ``pinion_support`` stands on a rigid shaft."""
+
+    centre_mesh: NewtonPerMetre | SpurPair
+    pinion_support: NewtonPerMetre | Shaft | None = None
+
+    def mesh(self, gear: CentreGear, elastic_modulus: float) -> float:
+        """Return the stiffness of pinion and centre gear, given or by formula [N/m]."""
+        if isinstance(self.centre_mesh, float):
+            return self.centre_mesh
+        teeth = (float(gear.pinion_teeth), float(gear.teeth))
+        return gear_mesh(self.centre_mesh.contact_ratio, *teeth, self.centre_mesh.face_width, elastic_modulus)
+
+    @property
+    def friction_dimensions(self) -> FrictionDimensions:
+        """Bearings and gears that are given by their dimensions, the mesh of the centre gear too."""
+        known = self.centre_mesh.contact_ratio if isinstance(self.centre_mesh, SpurPair) else None
+        return replace(super().friction_dimensions, centre_contact_ratio=known)
+
+    def parts(self, reducer: Reducer) -> tuple[Part, ...]:
+        """Return the parts that yield in series, the pinion's shaft along the line of action as one of them."""
+        found, shaft = super().parts(reducer), self.pinion_support
+        if shaft is None:
+            return found
+        own = (
+            shaft
+            if isinstance(shaft, float)
+            else shaft_support(**vars(shaft), elastic_modulus=reducer.disc_material.elastic_modulus)
+        )
+        mesh = Part("centre_mesh", "centre mesh", 1.0 / reducer.stiffness.centre_mesh)
+        return (*found, mesh, Part("centre_mesh", "pinion shaft", 1.0 / own))
+
+
 class SingleStageStiffnessRecord(Record):
     """Table ``[stiffness]`` of a single stage: N/m; without ``pin_contact`` it is πbE*/2, and so is ``output_pin``."""
 
@@ -320,8 +361,8 @@ class IdentifiedStiffnessRecord(Record):
 
 IDENTIFIABLE = tuple(
     field
-    for field in dict.fromkeys((*StiffnessRecord.model_fields, *SingleStageStiffnessRecord.model_fields))
-    if field not in ("pin_contact_law", "pin_span_mm", "crankshaft", "pillars")
+    for field in dict.fromkeys((*CentreGearStiffnessRecord.model_fields, *SingleStageStiffnessRecord.model_fields))
+    if field not in ("pin_contact_law", "pin_span_mm", "crankshaft", "pillars", "pinion_support")
 )
 """Fields of `tolalloc.reducers.reducer.stiffness.Stiffness` that a file of identified stiffnesses may hold."""
 
@@ -490,16 +531,19 @@ class ReducerRecord(_AnyReducerRecord):
 
     def reducer(self) -> Reducer:
         """Return the reducer in SI units."""
-        disc, stage = self.material, self.cycloid_stage
         reducer = Reducer(
             crank_count=self.crank_count,
             first_stage=self.first_stage,
-            stiffness=self.stiffness.stiffness(disc, self.pin_material or disc, self.first_stage, stage),
+            stiffness=self._stiffness(),
             friction_dimensions=self.stiffness.friction_dimensions,
             **self._stated(),
         )
         reducer = replace(reducer, parts=self.stiffness.parts(reducer), clearances=self._clearances())
         return at_torque(reducer, reducer.load.rated_torque)
+
+    def _stiffness(self) -> Stiffness:
+        disc = self.material
+        return self.stiffness.stiffness(disc, self.pin_material or disc, self.first_stage, self.cycloid_stage)
 
     def _clearances(self) -> Clearances:
         """Return the clearances, those of bearings that are given by their dimensions included."""
@@ -511,6 +555,21 @@ class ReducerRecord(_AnyReducerRecord):
                     raise ValueError(f"clearances.{name}_um is given twice: the bearing in [stiffness] has one too")
                 own[name] = bearing.play
         return replace(self.clearances, **own)
+
+
+class CentreGearRecord(ReducerRecord):
+    """A whole file of an RV reducer with centre gear and hollow shaft, which has a table ``[centre_gear]``."""
+
+    centre_gear: CentreGear
+    stiffness: CentreGearStiffnessRecord
+    clearances: CentreGearClearances = CentreGearClearances()
+
+    def _stated(self) -> dict[str, Any]:
+        return {**super()._stated(), "centre_gear": self.centre_gear}
+
+    def _stiffness(self) -> Stiffness:
+        own = self.stiffness.mesh(self.centre_gear, self.material.elastic_modulus)
+        return replace(super()._stiffness(), centre_mesh=own)
 
 
 def load_reducer(name: str | Path) -> Reducer:
@@ -533,8 +592,10 @@ def load_reducer(name: str | Path) -> Reducer:
 
 
 def _record_of(content: Mapping[str, Any]) -> type[SingleStageRecord] | type[ReducerRecord]:
-    """Return what a file must hold: that of a single stage where it has output pins."""
-    return SingleStageRecord if "output_pins" in content else ReducerRecord
+    """Return what a file must hold: that of a single stage where it has output pins, or that with a centre gear."""
+    if "output_pins" in content:
+        return SingleStageRecord
+    return CentreGearRecord if "centre_gear" in content else ReducerRecord
 
 
 _MODIFICATION = re.compile(r"^\[modification\].*?(?=^\[|\Z)", re.MULTILINE | re.DOTALL)

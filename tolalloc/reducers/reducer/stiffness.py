@@ -42,6 +42,7 @@ class Stiffness:
     gear_mesh: float = 0.0  # K_sp, one sun–planet mesh along its line of action [N/m]
     crank_disc_bearing: float = 0.0  # K_pd, one crank journal in a disc bore [N/m]
     crank_carrier_bearing: float = 0.0  # K_b, one crankshaft in the carrier [N/m]
+    centre_mesh: float = 0.0  # Input pinion with a centre gear, where there is one [N/m]
     # Of a single stage, 0 in an RV reducer
     shaft_support: float = 0.0  # The input shaft in its bearings [N/m]
     eccentric_bearing: float = 0.0  # One eccentric of the shaft in the bore of its disc [N/m]

@@ -118,8 +118,10 @@ def _clearance_of(model: EquivalentModel, errors: Float[np.ndarray, "chunk all_c
 
 
 _SHARE = "share of the pin force on the most loaded disc"
+_RV = ("largest pin force", "largest crank–disc bearing force", _SHARE)
 _FORCES = {
-    "RV": ("largest pin force", "largest crank–disc bearing force", _SHARE),
+    "RV": _RV,
+    "RV centre gear": _RV,
     "single stage": ("largest pin force", "largest eccentric bearing force", "largest output pin force", _SHARE),
 }
 """Family → outputs of one solve that a requirement may limit under the rated torque."""

@@ -27,6 +27,7 @@ export function positions(scene, carrierAngle) {
   return {
     carrier: all("carrier"), crank: crankDirection, disc: all("disc"), planet: all("planet"), sun: all("sun"),
     cranks, discs, pins: start.pin.map(around(outline.pin_circle_radius)),
+    ...(start.pinion ? { centre: all("centre"), pinion: all("pinion") } : {}),
     journals: cranks.map(([x, y]) => discs.map(([dx, dy]) => [x + dx, y + dy])),
   };
 }
@@ -304,6 +305,7 @@ export class Mechanism {
     }
     if (scene.outline.output_pin_count) this.buildView(views, "Output and input shaft", (view) => this.buildOutput(view));
     else this.buildView(views, "Carrier, planets and sun", (view) => this.buildFirstStage(view));
+    if (scene.outline.centre_teeth) this.buildView(views, "Centre gear and input pinion", (view) => this.buildCentreGear(view));
     this.buildLegend();
     this.shade(this.shares);
     this.light([...this.lit]);
@@ -526,6 +528,28 @@ export class Mechanism {
     });
   }
 
+  buildCentreGear(view) {
+    const { outline } = this.scene, { centre_module: module, pin_circle_radius: circle, housing_radius: end } = outline;
+    made("circle", { class: "outline", r: outline.housing_radius }, view);
+    const gearOf = (name, bore) => {
+      const teeth = outline[`${name}_teeth`], turning = made("g", {}, view), pitch = (module * teeth) / 2;
+      this.place(name, "path", { class: "gear-teeth", d: gear(teeth, module, outline.centre_pressure_angle) }, turning);
+      made("path", { class: "mark", d: `M${0.7 * pitch} 0L${0.9 * pitch} 0` }, turning);
+      return { turning, hole: made("circle", { class: "hole", r: bore }, view), pitch };
+    };
+    const centre = gearOf("centre", outline.hollow_radius), pinion = gearOf("pinion", 2 * module);
+    this.place("centre.mesh", "circle", { class: "mesh", r: 1.1 * module, cx: centre.pitch }, view);
+    const inner = circle + 1.6 * outline.pin_radius;
+    const output = made("path", { class: "output", d: `M${0.995 * end} 0L${inner} ${0.035 * end}L${inner} ${-0.035 * end}Z` }, view);
+    this.painters.push((pose) => {
+      centre.turning.setAttribute("transform", moved(pose.centre, pose.at.centre[0]));
+      centre.hole.setAttribute("transform", moved(pose.centreAxis));
+      pinion.turning.setAttribute("transform", moved(pose.pinion, pose.at.pinion[0]));
+      pinion.hole.setAttribute("transform", moved([centre.pitch + pinion.pitch, 0]));
+      output.setAttribute("transform", moved([0, 0], pose.output));
+    });
+  }
+
   buildLegend() {
     const legend = html("ul", "mechanism-legend", "", this.element);
     for (const [className, text] of [
@@ -575,6 +599,12 @@ export class Mechanism {
       planets: onCranks(at.cranks).map((own, crank) => sum(own, shift(planetOf(crank)), turned(`planet${crank + 1}`, crankAngle))),
       sun: sum([0, 0], shift(coordinates.sun[0]), turned("sun", at.sun[0] - scene.start.sun[0])),
       contacts: at.discs.map((centre, disc) => this.contacts(at, centre, disc, state)),
+      ...(at.pinion ? {
+        centreAxis: sum([0, 0], shift(coordinates.sun[0])),
+        centre: sum([0, 0], shift(coordinates.sun[0]), turned("centre", at.centre[0] - scene.start.centre[0])),
+        pinion: sum([(outline.centre_module * (outline.centre_teeth + outline.pinion_teeth)) / 2, 0],
+          turned("pinion", at.pinion[0] - scene.start.pinion[0])),
+      } : {}),
     };
   }
 
@@ -608,7 +638,8 @@ export class Mechanism {
       `torque ${short(pose.state.torque)} N·m, transmission error ${seconds.toFixed(1).replace("-", "−")}″, ${touching} pins carry; ` +
       `the longest arrow of the turn is ${short(this.largest)} N. In one output turn ` +
       (this.scene.outline.output_pin_count ? "the input shaft turns " : `the sun turns ${short(Math.abs(this.scene.turns.sun))} times the same way, the cranks `) +
-      `${short(Math.abs(this.scene.turns.crank))} times the other way.`;
+      `${short(Math.abs(this.scene.turns.crank))} times the other way` +
+      (this.scene.turns.pinion ? `, and the input pinion ${short(Math.abs(this.scene.turns.pinion))} times.` : ".");
     if (!this.withControls) return;
     if (document.activeElement !== this.angleInput) this.angleInput.value = String(this.phase);
     this.angleInput.setAttribute("aria-valuetext", `${turn.toFixed(1)} degrees`);

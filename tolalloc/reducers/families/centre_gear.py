@@ -1,0 +1,120 @@
+"""The RV reducer with centre gear and hollow shaft: the motor's pinion drives a gear whose second toothing is the sun.
+
+The centre gear turns in the support of the sun. Its rotation, which is given without one, is a coordinate more, and the
+mesh of the pinion a spring group more; all behind the sun is the RV reducer as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from tolalloc.reading.units import MILLIMETRE
+from tolalloc.reducers.equivalent.interfaces import ECCENTRIC, Interface
+from tolalloc.reducers.equivalent.sources import ErrorSource
+from tolalloc.reducers.equivalent.springs import Positions, SpringGroup, turned, vector_columns, with_play
+from tolalloc.reducers.families.family import Place, ReducerFamily
+from tolalloc.reducers.families.rv import RV
+from tolalloc.reducers.reducer.design import Reducer
+
+
+def centre_mesh(at: Positions) -> SpringGroup:
+    """Return the spring of input pinion and centre gear along its line of action, theory page equations (100) to (102).
+
+    The pinion stands at the right of the centre gear and turns against it. ``pinion.eccentricity`` turns with the
+    pinion, ``centre.eccentricity``, of the outer toothing against the bearing, with the centre gear [m].
+
+    δ = n·(ε_pinion − x_sun − ε_centre) − r_b4·θs, n at π/2 + α in the housing [m]; involute spur gears in mesh. What
+    moves the pinion's axis in the housing turns the output by a constant angle, so it is no source.
+
+    References
+    ----------
+    Own derivation, as liu2020's of sun and planets.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> group = centre_mesh(Positions(load_reducer("rv27c"), np.zeros(1)))
+    >>> round(1e3 * float(group.displacement[0, 0, 2]), 2)  # −r_b4 = −45 mm·cos 20° [mm/rad]
+    -42.29
+    """
+    reducer, coordinates, angles = at.reducer, at.coordinates, at.carrier_angle.size
+    gear = reducer.centre_pair
+    line_of_action = np.pi / 2 + gear.pressure_angle
+    normal = np.array([np.cos(line_of_action), np.sin(line_of_action)])
+    displacement = np.zeros((angles, 1, coordinates.count))
+    displacement[:, 0, coordinates.input : coordinates.input + 3] = [*-normal, -gear.base_radius]
+    error = np.concatenate([normal @ turned(at.pinion_angle), -normal @ turned(at.sun_angle)], axis=-1)
+    group = SpringGroup(
+        name="centre gear mesh",
+        stiffness_name="centre_mesh",
+        displacement=displacement,
+        error=error[:, np.newaxis],
+        columns=(*vector_columns("pinion.eccentricity"), *vector_columns("centre.eccentricity")),
+        stiffness=np.full((angles, 1), reducer.stiffness.centre_mesh),
+    )
+    return with_play(group, reducer.clearance_of("centre_mesh"), ("centre.mesh",))
+
+
+CENTRE_MESH = Interface(
+    rows=centre_mesh,
+    sources=(
+        *(
+            ErrorSource(
+                name=f"{gear}.eccentricity", characteristic=ECCENTRIC, shape="vector", place=gear, first_stage=True
+            )
+            for gear in ("pinion", "centre")
+        ),
+        ErrorSource(
+            name="centre.mesh.clearance", place="centre.mesh", neglected="*.clearance", fine=True, first_stage=True
+        ),
+    ),
+)
+
+
+def _places(reducer: Reducer) -> Iterator[Place]:
+    yield from RV.places(reducer)
+    yield Place(id="centre", label="outer toothing of the centre gear", part="centre")
+    yield Place(id="centre.mesh", label="mesh of input pinion and centre gear", part="centre")
+    yield Place(id="pinion", label="input pinion", part="pinion")
+
+
+def _axes(reducer: Reducer) -> dict[str, str]:
+    return RV.axes(reducer) | {"centre": "centre.eccentricity", "pinion": "pinion.eccentricity"}
+
+
+def _outlines(reducer: Reducer) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return what the picture of an RV reducer needs, and pinion and centre gear with its hollow shaft [mm, -]."""
+    outline, assumed = RV.outlines(reducer)
+    gear = reducer.centre_pair
+    outline |= {
+        "centre_teeth": gear.teeth,
+        "pinion_teeth": gear.pinion_teeth,
+        "centre_module": float(gear.module / MILLIMETRE),
+        "centre_pressure_angle": float(gear.pressure_angle),
+        # The tube through the sun leaves a web of twice its module below the roots of the teeth.
+        "hollow_radius": outline["module"] * (outline["sun_teeth"] / 2 - 3.25),
+        "disc_hole_radius": max(outline["disc_hole_radius"], outline["module"] * outline["sun_teeth"] / 2),
+    }
+    return outline, (f"{assumed[0]}, hollow shaft", *assumed[1:])
+
+
+CENTRE_GEAR: ReducerFamily = replace(
+    RV,
+    name="RV centre gear",
+    interfaces=(RV.interfaces[0], CENTRE_MESH, *RV.interfaces[1:]),
+    places=_places,
+    axes=_axes,
+    outlines=_outlines,
+    new=replace(
+        RV.new,
+        presets=("rv27c",),
+        table="rv27c_drawing",
+        diameter=136.0,
+        schema="rv-centre-gear",
+    ),
+)
+"""An RV reducer whose sun is the second toothing of a centre gear; one mesh more, upstream of the sun."""
