@@ -20,6 +20,7 @@ from tolalloc.running.chunks import Mapper
 if TYPE_CHECKING:
     from tolalloc.drawings.correlation import CorrelatedSource
     from tolalloc.drawings.error_model import ErrorModel
+    from tolalloc.models.unit_bounds import ScaledUnits, UnitBounds
 
 Units = Mapping[str, tuple[Float[np.ndarray, " setting"], Float[np.ndarray, " column"]]]
 """Label → settings [units of their names] and deviations [m, angles rad] of one unit."""
@@ -253,6 +254,16 @@ class Model(ABC):
     def own_limits(self) -> Mapping[str, float]:
         """Output → largest value at which a unit works at all: a requirement of every study that does not lift it."""
         return {}
+
+    def unbounded(self, output: str) -> str:
+        """Return why nothing is certain of an output over a box of zones, empty where `unit_bounds` has its bounds."""
+        return f"{self.name} states no bound of {output}"
+
+    def unit_bounds(self, output: str, units: ScaledUnits, designs: Float[np.ndarray, "design variable"]) -> UnitBounds:
+        """Return what is certain of an output of random units, sharpest near some designs."""
+        raise ValueError(
+            f"{self.name} has no bound of {output} for {len(units.standard)} units, {len(designs)} designs"
+        )
 
     def examined(self, x: Float[np.ndarray, "sample column"]) -> Mapping[str, float]:  # noqa: ARG002
         """Return what is counted of some random units when a study is checked, units in the names."""
