@@ -23,6 +23,7 @@ from tolalloc.allocation.front.what_if import (
 from tolalloc.allocation.result import AllocationResult, AssembledDrawing, AssemblyChoice
 from tolalloc.allocation.search.candidates import ALONE, FREE, GRADES, TABLE, Candidates, NextCandidate
 from tolalloc.allocation.search.discrete import GradedAllocation, allocate_grades, group_options, with_shared_zones
+from tolalloc.allocation.search.proven_bound import BoundSearch, ProvenBound, require_bounded
 from tolalloc.allocation.search.zone_allocation import (
     ZoneAllocation,
     allocate,
@@ -59,6 +60,8 @@ from tolalloc.sensitivity.surrogate.control_variate import learnt
 
 _EXAMINED = 1000
 """Random units of the drawing that tell whether it can be built [-]."""
+_COUNTED = 2**15
+"""Most random units whose failures a proven bound counts [-]."""
 _EXACT = (0.85, 1.25)
 """Ends of the exact front over the limit asked for [-]."""
 
@@ -81,6 +84,7 @@ class DrawingQuestion:
     unit_price: UnitPrice | None
     quality_loss: QualityLoss | None
     place: str  # Where the question stands, for messages
+    boxes: int = 0  # Boxes of zones that a bound of the real optimum is looked for in, 0 for none [-]
     # Scales [-] and settings of a design of another question from which the search starts where it is cheaper
     start: Float[np.ndarray, " variable"] | None = None
 
@@ -110,6 +114,8 @@ class DrawingQuestion:
             What cannot be asked, before anything long runs.
         """
         require_groups(self.space, self.place)
+        if self.boxes:
+            require_bounded(self.model, self.space, self.requirements, self.place)
         if self.grades:
             group_options(with_shared_zones(self.space))
         if self.unit_price and not self.limits_one_side_above:
@@ -272,6 +278,24 @@ class DrawingQuestion:
         """Return the design variables with every setting free and the ratios of zones in a group that a design has."""
         return replace(self.space, errors=design.space.errors)
 
+    def proven(self, free: ZoneAllocation, record: RunRecord) -> ProvenBound | None:
+        """Return what no drawing with free zones costs less than on the real model, if the question asks for it."""
+        if not self.boxes:
+            return None
+        search = BoundSearch(
+            space=self.space,
+            model=self.model,
+            requirements=self.requirements,
+            seeds=self.seeds("proven bound"),
+            units=min(self.effort.confirmation_units, _COUNTED),
+            boxes=self.boxes,
+        )
+        own, alike = free.chosen, cheapest_met(free.proportional_tried)
+        scales = own.space.first_zones * own.scales / self.space.first_zones
+        designs = (np.concatenate([scales, own.settings]), alike.design)
+        with record.stage("proven bound"):
+            return search.prove(designs, own.cost if own.met else np.inf)
+
     def trade(self, free: ZoneAllocation) -> SettingTrade | None:
         """Return the cost of the cheapest zones over the last settings, those before them as they were chosen.
 
@@ -421,6 +445,7 @@ def allocate_drawing(
         if question.what_if:
             with record.stage("robustness"):
                 robust = question.robustness(free)
+        proven = question.proven(free, record)
         with record.stage("shares of variance"):
             chosen = Candidates(fixed=fixed, free=free, graded=graded).drawn
             shares, of_dimensions = question.shares(chosen.space, chosen.design)
@@ -446,6 +471,7 @@ def allocate_drawing(
         error=question.effort.error,
         examination=examination,
         statuses=statuses,
+        proven=proven,
     )
 
 

@@ -14,6 +14,7 @@ from tolalloc.allocation.front.pareto_front import Fronts
 from tolalloc.allocation.front.what_if import Robustness, SettingTrade
 from tolalloc.allocation.search.candidates import Candidates
 from tolalloc.allocation.search.discrete import GradedAllocation
+from tolalloc.allocation.search.proven_bound import ProvenBound
 from tolalloc.allocation.search.zone_allocation import ModelRange, ZoneAllocation, model_range
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.joint_yield import JointRequirement
@@ -127,6 +128,8 @@ class AllocationResult:
         Outcome → number of units that were solved for the answer, without those that the front was searched with [-].
     assembled
         What was compared of the ways to choose parts at assembly, if the question names any.
+    proven
+        What no drawing with free zones costs less than on the real model, if asked for.
     """
 
     name: str
@@ -148,6 +151,7 @@ class AllocationResult:
     statuses: Mapping[str, int]
     front_lacks: str = ""
     assembled: AssembledDrawing | None = None
+    proven: ProvenBound | None = None
 
     @property
     def leading(self) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from tolalloc.drawings.sources import LENGTHS, is_angular
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.model import ARRAY_RATE, Evaluation, Model, Observer, SettingDerivatives, unobserved
 from tolalloc.models.settings import Setting, require_settings
+from tolalloc.models.unit_bounds import ScaledUnits, SlopeBounds
 from tolalloc.models.user_function import UserFunction, identity
 from tolalloc.reading.units import MILLIMETRE
 
@@ -98,6 +99,9 @@ class FunctionModel:
     # Takes what the function takes and returns, for every output, the derivative by every input [unit of the output per
     # mm or in]; central differences unless given
     jacobian: Callable[..., Any] | None = None
+    # Output → input or setting → its least and largest derivative wherever the function is asked, which nobody checks
+    # [unit of the output per mm or in, per rad, per unit of the setting]
+    slopes: Mapping[str, Mapping[str, tuple[float, float]]] = field(default_factory=dict)
     step: float = _STEP  # Step of these differences to either side, over the zone [-]
     name: str = "own model"  # What a report calls the model
 
@@ -109,6 +113,22 @@ class FunctionModel:
             if not re.fullmatch(r".*\S \[\S.*\]", output):
                 allowed = f"a name with its unit, such as '{output} [mm]', or [-] for a plain number"
                 raise InputError.at(f"model {self.name}", "outputs", output, allowed)
+        self._require_slopes()
+
+    def _require_slopes(self) -> None:
+        """Raise unless slopes are stated of outputs of the model, by all of its inputs and settings, as two numbers."""
+        named = [*self.inputs, *(setting.name for setting in self.settings)]
+        for output, slopes in self.slopes.items():
+            if output not in self.outputs:
+                raise UnknownNameError.among(f"model {self.name}, slopes", "output", output, self.outputs)
+            for name in slopes:
+                if name not in named:
+                    raise UnknownNameError.among(f"model {self.name}, slopes of {output}", "input", name, named)
+            for name in named:
+                stated = slopes.get(name, (np.nan, np.nan))
+                if np.shape(stated) != (2,) or not stated[0] <= stated[1] or not np.isfinite(stated).all():
+                    allowed = "two finite numbers, its least and its largest derivative"
+                    raise InputError.at(f"model {self.name}, slopes of {output}", name, stated, allowed)
 
     def set_to(self, settings: Mapping[str, float]) -> FunctionModel:
         """Return the function with other values of its settings [units of their names].
@@ -274,6 +294,30 @@ class BoundFunction(Model):
             ]
         )
 
+    def unbounded(self, output: str) -> str:
+        """Return why nothing is certain of an output: its user states no slopes."""
+        said = f"model {self.name} states no slopes of {output}"
+        return "" if output in self.source.slopes else said
+
+    def unit_bounds(
+        self,
+        output: str,
+        units: ScaledUnits,
+        designs: Float[np.ndarray, "design variable"],  # noqa: ARG002
+    ) -> SlopeBounds:
+        """Return what the stated slopes say of an output of random units."""
+        slopes, own = self.source.slopes[output], self.reading((output,))
+        factors = dict(zip(self.source.inputs, self._per_input, strict=True))
+        names = (*self.varied, *(setting.name for setting in self.settings))
+        low, high = np.array([np.array(slopes[name]) * factors.get(name, 1.0) for name in names]).T
+
+        def respond(
+            x: Float[np.ndarray, "unit column"], settings: Float[np.ndarray, " setting"]
+        ) -> Float[np.ndarray, " unit"]:
+            return own.at(settings)(x).values[:, 0]
+
+        return SlopeBounds(units=units, respond=respond, low=low, high=high)
+
     def _called(
         self, function: Callable[..., Any], x: Float[np.ndarray, "sample column"], count: int
     ) -> Float[np.ndarray, "sample value"]:
@@ -300,6 +344,7 @@ def model(
     settings: Sequence[Setting] = (),
     jacobian: Callable[..., Any] | None = None,
     name: str = "",
+    slopes: Mapping[str, Mapping[str, tuple[float, float]]] | None = None,
 ) -> FunctionModel:
     """Return a model of your own: any function of the dimensions on a drawing.
 
@@ -312,9 +357,9 @@ def model(
     >>> gap.outputs
     ('gap [mm]',)
     """
-    for field, names in (("inputs", inputs), ("outputs", outputs)):
+    for field_name, names in (("inputs", inputs), ("outputs", outputs)):
         if isinstance(names, str):
-            raise InputError.at("ta.model", field, names, f"a sequence of names, such as ({names!r},)")
+            raise InputError.at("ta.model", field_name, names, f"a sequence of names, such as ({names!r},)")
     called = name or getattr(function, "__name__", "own model").replace("_", " ").replace("<lambda>", "own model")
     return FunctionModel(
         function=function,
@@ -323,6 +368,7 @@ def model(
         settings=tuple(settings),
         jacobian=jacobian,
         name=called,
+        slopes=slopes or {},
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
@@ -14,8 +14,10 @@ from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.models.model import Evaluation, Model, Observer, Response, SettingDerivatives, unobserved
 from tolalloc.models.settings import DrawnAmounts, Setting
+from tolalloc.models.unit_bounds import ScaledUnits
 from tolalloc.reading.units import MICROMETRE, MILLIMETRE
 from tolalloc.reducers import DISC_TEMPERATURE, FRICTION_TORQUE, PEAK_TO_PEAK, PRELOAD, RADIAL_CLEARANCE, TORQUE
+from tolalloc.reducers.cycloid.solvers import LINEAR
 from tolalloc.reducers.equivalent.hysteresis import HysteresisLoop
 from tolalloc.reducers.equivalent.perfect import exact_loop, preload, rated_pin_force
 from tolalloc.reducers.equivalent.wear import wear_of
@@ -50,6 +52,9 @@ from tolalloc.reducers.response.outputs import (
 from tolalloc.reducers.settings import clearance_settings, temperature_condition, torque_condition
 from tolalloc.reducers.unit_file import BuiltUnit
 from tolalloc.running.chunks import Mapper
+
+if TYPE_CHECKING:
+    from tolalloc.reducers.equivalent.peak_bounds import PeakBounds
 
 _MULTIPLES = 4
 """Multiples of pins and teeth whose waves are told apart [-]."""
@@ -382,6 +387,39 @@ class ReducerModel(Model):
     def accuracy(self) -> Mapping[str, float]:
         """That of the peak-to-peak, from the angles of its search [arcsec]."""
         return dict.fromkeys(self._everywhere((PEAK_TO_PEAK,)), SEEN)
+
+    def unbounded(self, output: str) -> str:
+        """Return why nothing is certain of an output: bounds are known of the peak-to-peak without play and tilt."""
+        if output != PEAK_TO_PEAK:
+            return f"only the peak-to-peak of a reducer has one, and the limit is one of {output}"
+        if self.kernel.model.design.law == LINEAR and any(".tilt" in name for name in self._disc_tilts):
+            return "discs of this drawing tilt, which moves contacts by no linear law"
+        layout = self.kernel.model.error_columns.layout
+        return "elements of the reducer have play" if layout.flank > layout.clearance else ""
+
+    @property
+    def _disc_tilts(self) -> tuple[str, ...]:
+        """Columns of tilted discs that vary or stand at something."""
+        standing = (name for name, value in self.kernel.fixed.items() if value)
+        return tuple(name for name in (*self.columns, *standing) if name.startswith("disc"))
+
+    def unit_bounds(
+        self,
+        output: str,
+        units: ScaledUnits,
+        designs: Float[np.ndarray, "design variable"],
+    ) -> PeakBounds:
+        """Return what is certain of the peak-to-peak of random units, by the angles of some designs."""
+        if reason := self.unbounded(output):
+            raise ValueError(reason)
+        from tolalloc.reducers.equivalent.peak_bounds import PeakBounds
+
+        def errors(
+            x: Float[np.ndarray, "unit column"], settings: Float[np.ndarray, " setting"]
+        ) -> Float[np.ndarray, "unit all_columns"]:
+            return (self.at(settings) if settings.size else self).kernel.errors(x)
+
+        return PeakBounds.of(self.kernel.model, self.kernel.torque, units, designs, errors)
 
     @property
     def _peak_with_stiffness(self) -> StiffnessResponse:

@@ -316,8 +316,29 @@ def _compared(result: AllocationResult) -> str:
 def _certificate(result: AllocationResult) -> tuple[str, ...]:
     """Return how far from optimal the answer can be."""
     if result.met and result.bound is None:
-        return (_say("no_bound"),)
-    return (*_free(result), *_graded(result))
+        return (_say("no_bound"), *_proven(result))
+    return (*_free(result), *_proven(result), *_graded(result))
+
+
+def _proven(result: AllocationResult) -> tuple[str, ...]:
+    """Return what no drawing costs less than on the real model, if that was asked for."""
+    found, free = result.proven, result.free.chosen
+    if found is None:
+        return ()
+    gaps = {
+        "bound": found.cost,
+        "confidence": found.confidence,
+        "units": found.units,
+        "allowed": " or ".join(dict.fromkeys(str(own) for own in found.allowed)),
+        "boxes": found.boxes,
+        "counted": ", ".join(short(own) for own in found.counted),
+    }
+    if not found.says_more:
+        return (_say("proven_nothing", bound=found.cost, boxes=found.boxes, counted=gaps["counted"]),)
+    if not free.met:
+        return (_say("proven_alone", **gaps),)
+    answer = _say("answer_free" if result.graded else "answer_drawing", cost=free.cost)
+    return (_say("proven", answer=answer, cost=free.cost, above=free.cost / found.cost - 1, **gaps),)
 
 
 def _free(result: AllocationResult) -> tuple[str, ...]:

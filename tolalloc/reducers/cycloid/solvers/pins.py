@@ -74,6 +74,13 @@ def pin_forces(law, stiffness, log_length, compression, force):
         force[k] = pin_force(law, stiffness[k], log_length[k], 0.0, compression[k])[0]
 
 
+@jit_in_place
+def pin_slopes(law, stiffness, log_length, compression, force, slope):
+    """Fill force and derivative of many pins that stand straight, [pin]."""
+    for k in range(compression.size):
+        force[k], slope[k] = pin_force(law, stiffness[k], log_length[k], 0.0, compression[k])
+
+
 # Fields of a design, `tolalloc.reducers.cycloid.clearance` fills them.
 CIRCLE, PIN, ECCENTRICITY, TEETH, GROUND_CIRCLE, GROUND_PIN, ROTATION, ROOT, TIP, BEND, FIELDS = range(11)
 
