@@ -41,7 +41,7 @@ SMALL = replace(
     graded_steps=2,
     exact_points=4,
     setting_steps=(1, 2),
-    changed_costs=1,
+    price_nodes=4,
     share_blocks=8,
 )
 

@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import tolalloc.allocation.front.what_if as module
 from tests.builders import prepared as baseline
 from tests.builders import verifier_of
 from tolalloc import PEAK_TO_PEAK
 from tolalloc.allocation.cost.model import Reciprocal, SumOfCosts, Weighted
+from tolalloc.allocation.front.price_region import PriceRange, WorstPrices
 from tolalloc.allocation.front.what_if import (
-    COST_CHANGE,
     QuantileResponse,
     Robustness,
     SettingTrade,
@@ -171,31 +170,18 @@ def test_costs_all_changed_alike_change_nothing(prepared, allocation):
 
 
 @pytest.mark.slow
-def test_under_changed_costs_no_drawing_is_cheaper_than_the_one_made_for_them(prepared, allocation):
-    found = robustness(verifier_of(prepared), allocation, (), SeedTree(1), 12)
-    assert len(found.costs) == 12
-    assert not found.uncertain
-    assert found.second_best is None
-    regrets = np.array([variant.regret for variant in found.costs])
-    assert regrets.min() > -1e-7
-    assert 1e-4 < regrets.max() < 0.05
-    assert all(variant.kept for variant in found.costs)
-    np.testing.assert_allclose(found.optimum, allocation.inside.zones)
-
-
-@pytest.mark.slow
-def test_costs_are_changed_to_corners_and_what_is_lost_counts_locked_zones(monkeypatch, prepared, allocation):
-    corners, made = [], module._with_costs
-    monkeypatch.setattr(module, "_with_costs", lambda *given: corners.append(given[2]) or made(*given))
-    plain = robustness(verifier_of(prepared), allocation, (), SeedTree(1), 8).costs
-    assert set(np.unique(corners)) == {1 - COST_CHANGE, 1 + COST_CHANGE}
-    assert len({tuple(corner) for corner in corners}) == 8
-    locked = robustness(
-        verifier_of(prepared), replace(allocation, locked_cost=allocation.locked_cost + 100), (), SeedTree(1), 8
-    ).costs
-    for before, now in zip(plain, locked, strict=True):
-        assert now.cost == pytest.approx(before.cost + 100)
-        assert now.regret * now.cost == pytest.approx(before.regret * before.cost, abs=1e-9)
+def test_what_is_lost_at_the_worst_prices_counts_locked_zones(prepared, allocation):
+    plain = robustness(verifier_of(prepared), allocation, (), nodes=4)
+    assert plain.at_worst.kept
+    assert not plain.uncertain
+    assert plain.second_best is None
+    assert 1e-4 < plain.at_worst.regret < 0.05
+    np.testing.assert_allclose(plain.optimum, allocation.inside.zones)
+    dearer = replace(allocation, locked_cost=allocation.locked_cost + 100)
+    locked = robustness(verifier_of(prepared), dearer, (), nodes=4)
+    assert locked.at_worst.cost == pytest.approx(plain.at_worst.cost + 100)
+    assert locked.worst.lost == pytest.approx(plain.worst.lost)
+    assert locked.at_worst.regret * locked.at_worst.cost == pytest.approx(plain.worst.lost)
 
 
 def uncertain_of(prepared) -> Verifier:
@@ -208,7 +194,7 @@ def uncertain_of(prepared) -> Verifier:
 def test_an_unchanged_kernel_changes_neither_what_is_kept_nor_the_cost(prepared, allocation):
     """The models come from other units than those of the optimum; their weights are uncertain by a few percent."""
     few = replace(uncertain_of(prepared), units=1110)  # so few show the yield only if not one is rejected
-    found = robustness(few, allocation, (prepared.model,), SeedTree(1), 1)
+    found = robustness(few, allocation, (prepared.model,), nodes=1)
     assert found.uncertain[0].kept
     assert found.uncertain[0].regret == pytest.approx(0.0, abs=0.03)
 
@@ -218,7 +204,7 @@ def test_a_reducer_that_breaks_the_limit_is_counted(prepared, allocation):
     model = prepared.model
     kernel = replace(model.kernel, fixed={**model.kernel.fixed, "planet1.eccentricity.x": 80e-6})
     worse = replace(model, kernel=kernel)
-    found = robustness(uncertain_of(prepared), allocation, (model, worse), SeedTree(1), 1).uncertain
+    found = robustness(uncertain_of(prepared), allocation, (model, worse), nodes=1).uncertain
     assert [variant.kept for variant in found] == [True, False]
     assert np.isnan(found[1].regret)
     assert found[1].cost > found[0].cost
@@ -232,7 +218,7 @@ def test_the_second_best_processes_are_other_ones_and_cost_more():
     space = replace(prepared.space, errors=replace(errors, sources=sources))
     verifier = replace(verifier_of(prepared), space=space)
     allocation = allocated(verifier, steps=1)
-    found = robustness(verifier, allocation, (), SeedTree(1), 1).second_best
+    found = robustness(verifier, allocation, (), nodes=1).second_best
     assert found is not None
     assert -0.5 < found.regret <= 1e-7
     named = found.name.removeprefix("second-best processes: ").split(", ")
@@ -247,20 +233,22 @@ def variant(scales):
     return Variant(name="x", scales=np.array(scales), cost=1.0, regret=0.0, kept=True)
 
 
-def test_a_zone_is_the_same_only_if_no_change_moves_it_by_more_than_a_tenth():
+def test_a_zone_is_the_same_only_if_no_change_moves_it_by_more_than_a_tenth(allocation):
+    free = PriceRange(low=0.5, high=np.inf)
     known = Robustness(
         groups=("a", "b", "c"),
         optimum=np.array([1.0, 1.0, 2.0]),
-        costs=(variant([1.05, 0.92, 2.0]), variant([0.95, 1.0, 2.19])),
+        prices=(free, free, free),
+        worst=WorstPrices(factors=np.ones(3), cheapest=allocation.inside, lost=0.0, most=0.0),
+        at_worst=variant([1.05, 0.92, 2.19]),
         uncertain=(variant([1.0, 1.0, 2.21]),),
         second_best=None,
     )
     assert known.same.tolist() == [True, True, False]
     assert replace(known, uncertain=()).same.tolist() == [True, True, True]
     assert replace(known, second_best=variant([0.9, 1.0, 2.0])).same.tolist() == [False, True, False]
-    nothing = replace(known, costs=(), uncertain=())
-    assert nothing.same.tolist() == [False, False, False]
-    assert nothing.ratios.shape == (0, 3)
+    narrow = (PriceRange(low=0.81, high=2.0), free, PriceRange(low=0.0, high=1.19))
+    assert replace(known, prices=narrow, uncertain=()).same.tolist() == [False, True, False]
 
 
 @pytest.mark.slow

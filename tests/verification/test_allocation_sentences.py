@@ -37,7 +37,7 @@ SMALL = replace(
     graded_steps=4,
     exact_points=4,
     setting_steps=(1, 2),
-    changed_costs=3,
+    price_nodes=4,
     share_blocks=8,
     yields=(0.8, 0.95, 0.9999),
     confirmation_units=1024,
@@ -217,10 +217,15 @@ def test_a_yield_that_the_units_cannot_show_has_no_price(results):
     assert np.isfinite(results.prices.prices[:-1]).all()
 
 
-def test_costs_are_changed_to_corners(results):
-    assert says(answer_of(results).sentences, "allocation.corners", count=3, change=20)
-    assert len(results.robustness.costs) == 3
-    assert "free zones cost more by [%]" in tables.variants_frame(results.robustness, "cost units").columns
+def test_it_is_said_what_wrong_prices_cost_at_most_and_which_zone_depends_on_its_own(results):
+    sentences, found = answer_of(results).sentences, results.robustness
+    worst, cost = found.worst, results.free.chosen.cost
+    gaps = {"change": 0.2, "most": worst.most, "share": worst.most / cost, "lost": worst.lost}
+    assert says(sentences, "allocation.worst_prices", **gaps)
+    nearest = min(range(len(found.groups)), key=lambda at: found.prices[at].nearest)
+    own = found.prices[nearest]
+    assert says(sentences, "allocation.price_range", group=found.groups[nearest], same=0.1, low=own.low, high=own.high)
+    assert "free zones cost more by [%]" in tables.variants_frame(found, "cost units").columns
 
 
 def test_the_quantile_of_the_units_is_what_the_target_share_keeps(results):
@@ -271,7 +276,7 @@ def test_failed_units_are_counted_by_a_yield_alone(results):
 
 
 def test_a_stiffness_that_breaks_the_free_zones_is_said_of_them(results):
-    kept = results.robustness.costs[0]
+    kept = results.robustness.at_worst
     uncertain = (kept, replace(kept, kept=False, regret=np.nan))
     model = replace(results.model, identified=load_identified_stiffness("rv20e_table6"))
     lost = replace(results, model=model, robustness=replace(results.robustness, uncertain=uncertain))

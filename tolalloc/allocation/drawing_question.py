@@ -335,8 +335,7 @@ class DrawingQuestion:
         """Return the answers under changed assumptions."""
         verifier = self.verifier("robustness", self._at_ratios_of(free.chosen)).dividing_as(free.chosen)
         verifier = replace(verifier, units=self.effort.stiffness_units)
-        seeds = self.seeds("robustness")
-        return robustness(verifier, free, self._changed_models(seeds), seeds, self.effort.changed_costs)
+        return robustness(verifier, free, self._changed_models(self.seeds("robustness")), self.effort.price_nodes)
 
     def _changed_models(self, seeds: SeedTree) -> tuple[Model, ...]:
         """Return models drawn from what is uncertain of the model, none if nothing is said of it."""

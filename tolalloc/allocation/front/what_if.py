@@ -9,13 +9,12 @@ from itertools import product
 import numpy as np
 from jaxtyping import Bool, Float
 
-from tolalloc.allocation.cost.model import Weighted
+from tolalloc.allocation.front.price_region import SAME, PriceRange, WorstPrices, price_ranges, worst_prices
 from tolalloc.allocation.search import process_choice
 from tolalloc.allocation.search.zone_allocation import Programs, ZoneAllocation
 from tolalloc.allocation.space.design_space import DesignSpace
-from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Solution
+from tolalloc.allocation.space.problem import AllocationProblem, Solution
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier
-from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models.model import Evaluation, Model
 
 
@@ -234,12 +233,6 @@ def _cheapest(
     return (cost, error) if np.isfinite(cost) else (np.nan, np.nan)
 
 
-COST_CHANGE = 0.2
-"""Relative change of every cost, up or down, in the corners that are tried [-]."""
-SAME = 0.1
-"""Relative difference up to which two zones are called the same; neighbours of a ladder differ by a quarter [-]."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Variant:
     """The answer under one changed assumption."""
@@ -259,7 +252,9 @@ class Robustness:
 
     groups: tuple[str, ...]  # Names of the groups
     optimum: Float[np.ndarray, " group"]  # The undisturbed answer of the same local models [-]
-    costs: tuple[Variant, ...]  # In random corners of the box in which every cost changes by `COST_CHANGE`
+    prices: tuple[PriceRange, ...]  # Of every group, while its zone stays within `SAME` of the optimum
+    worst: WorstPrices  # Of the box in which every cost changes by `COST_CHANGE`
+    at_worst: Variant  # The answer at these prices
     # With what is uncertain in the model drawn from what is known of it; none where nothing is
     uncertain: tuple[Variant, ...]
     second_best: Variant | None  # With the second-best set of processes, none where there is no other
@@ -267,7 +262,7 @@ class Robustness:
     @property
     def variants(self) -> tuple[Variant, ...]:
         """All of them."""
-        return (*self.costs, *self.uncertain, *((self.second_best,) if self.second_best else ()))
+        return (self.at_worst, *self.uncertain, *((self.second_best,) if self.second_best else ()))
 
     @property
     def ratios(self) -> Float[np.ndarray, "variant group"]:
@@ -276,13 +271,12 @@ class Robustness:
 
     @property
     def same(self) -> Bool[np.ndarray, " group"]:
-        """Which zones stay the same under all changes; none where nothing was changed, as that shows nothing."""
-        return np.asarray((np.abs(np.log(self.ratios)) <= np.log(1 + SAME)).all(axis=0) & bool(self.variants))
+        """Which zones stay within `SAME` under all changes, and with their own cost `COST_CHANGE` higher or lower."""
+        alone = np.array([own.holds_change for own in self.prices])
+        return np.asarray((np.abs(np.log(self.ratios)) <= np.log(1 + SAME)).all(axis=0) & alone)
 
 
-def robustness(
-    verifier: Verifier, allocation: ZoneAllocation, models: Sequence[Model], seeds: SeedTree, draws: int
-) -> Robustness:
+def robustness(verifier: Verifier, allocation: ZoneAllocation, models: Sequence[Model], nodes: int) -> Robustness:
     """Return the answers under changed costs, models and processes.
 
     Parameters
@@ -293,16 +287,13 @@ def robustness(
         What was found.
     models
         The model with what is uncertain in it changed, such as its stiffnesses.
-    seeds
-        Node of the seed tree.
-    draws
-        Random corners of the costs [-].
+    nodes
+        Most nodes of the search for the worst prices [-].
 
     Notes
     -----
-    Costs and processes are changed in the local models of the chosen design. What is lost is largest where every cost
-    is wrong by all of its change, so corners are drawn and not what lies between them. A changed model takes local
-    models around the same design. How far it moves what is compared with a limit is the difference between two
+    Costs and processes are changed in the local models of the chosen design (`price_region`). A changed model takes
+    local models around the same design. How far it moves what is compared with a limit is the difference between two
     models on the same units, added to what the verification of the chosen design found: the luck of a second sample,
     often smaller and so less able to show a yield, tells nothing of the change.
 
@@ -317,40 +308,23 @@ def robustness(
     >>> from tolalloc.allocation.space.effort import SearchEffort
     >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
     >>> found = allocate(verifier, scale_in_proportion(verifier, 3), SearchEffort(steps=1))
-    >>> max(variant.regret for variant in robustness(verifier, found, (), SeedTree(1), draws=1).costs) < 0.01
+    >>> robustness(verifier, found, (), nodes=10).at_worst.regret < 0.01
     True
     """
     problem, optimum, locked = verifier.space.problem(allocation.stacks), allocation.inside, allocation.locked_cost
-    corners = seeds.child("costs").generator().choice([1 - COST_CHANGE, 1 + COST_CHANGE], (draws, optimum.zones.size))
+    worst = worst_prices(problem, optimum, nodes)
+    cost = worst.cheapest.cost + locked
     return Robustness(
         groups=verifier.space.groups,
         optimum=optimum.zones,
-        costs=tuple(
-            _with_costs(problem, optimum, own, locked, f"corner {at} of the costs")
-            for at, own in enumerate(corners, start=1)
+        prices=price_ranges(problem, optimum),
+        worst=worst,
+        at_worst=Variant(
+            name="worst prices found", scales=worst.cheapest.zones, cost=cost, regret=worst.lost / cost, kept=True
         ),
         uncertain=_with_models(verifier, allocation, models),
         second_best=_second_best(problem, optimum, locked),
     )
-
-
-def _with_costs(
-    problem: AllocationProblem, optimum: Solution, factors: Float[np.ndarray, " group"], locked: float, name: str
-) -> Variant:
-    """Return the answer where every cost is multiplied by a factor of its own."""
-    features = tuple(_priced(feature, float(factor)) for feature, factor in zip(problem.features, factors, strict=True))
-    changed = replace(problem, features=features)
-    found = process_choice.allocate(changed)
-    cost, before = (changed.cost(own.zones, own.processes) + locked for own in (found, optimum))
-    return Variant(name=name, scales=found.zones, cost=cost, regret=before / cost - 1, kept=True)
-
-
-def _priced(feature: PricedFeature, factor: float) -> PricedFeature:
-    processes = tuple(
-        replace(made, cost=Weighted(model=made.cost, weight=factor), change=factor * made.change)
-        for made in feature.processes
-    )
-    return replace(feature, processes=processes)
 
 
 def _with_models(verifier: Verifier, allocation: ZoneAllocation, models: Sequence[Model]) -> tuple[Variant, ...]:

@@ -92,8 +92,8 @@ class AllocationEffort(NamedFields):
         Limits of the exact front of the local models [-].
     setting_steps
         Values of each of the last settings for which the cheapest zones are looked for, one number for each [-].
-    changed_costs
-        Random corners of the box in which every cost is wrong [-].
+    price_nodes
+        Most nodes of the search for the prices at which the answer loses most [-].
     changed_stiffnesses, stiffness_units
         Stiffnesses drawn from what is not known of them, and independent units for each [-].
     share_blocks
@@ -122,7 +122,7 @@ class AllocationEffort(NamedFields):
     graded_steps: Annotated[int, _least(1)] = 8
     exact_points: Annotated[int, _least(2)] = 50
     setting_steps: Annotated[tuple[int, ...], each("whole numbers, 1 or more", whole("", 1))] = (5, 6)
-    changed_costs: Annotated[int, _least(1)] = 40
+    price_nodes: Annotated[int, _least(1)] = 100
     changed_stiffnesses: Annotated[int, _least(1)] = 6
     stiffness_units: Annotated[int, _least(100)] = 2048
     share_blocks: Annotated[int, whole("a power of two, 2 or more", 2, power_of_two=True)] = 256
@@ -191,7 +191,7 @@ QUICK_ALLOCATION = AllocationEffort(
     graded_steps=3,
     exact_points=20,
     setting_steps=(2, 3),
-    changed_costs=10,
+    price_nodes=12,
     changed_stiffnesses=2,
     stiffness_units=1152,
     share_blocks=32,

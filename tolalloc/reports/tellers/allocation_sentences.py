@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tolalloc.allocation.front.what_if import COST_CHANGE, SAME
+from tolalloc.allocation.front.price_region import COST_CHANGE, SAME
 from tolalloc.allocation.result import AllocationResult, limit_price, limit_step, unit_quantile
 from tolalloc.allocation.search.candidates import ALONE
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
@@ -438,10 +438,14 @@ def _settled(result: AllocationResult) -> tuple[str, ...]:
     names = f": {', '.join(same)}" if same else ""
     key = "same_one" if len(same) == 1 else "same_many"
     said = [_say(key, same=len(same), count=len(found.groups), most=SAME, names=names)]
-    if found.costs:
-        dearest = max(0.0, *(variant.regret for variant in found.costs))
-        key = "corner" if len(found.costs) == 1 else "corners"
-        said.append(_say(key, count=len(found.costs), change=COST_CHANGE * 100, dearest=dearest))
+    worst, cost = found.worst, result.free.chosen.cost
+    gaps = {"change": COST_CHANGE, "most": worst.most, "share": worst.most / cost, "lost": worst.lost}
+    said.append(_say("worst_prices", **gaps))
+    ranges = zip(found.groups, found.prices, strict=True)
+    group, own = min(ranges, key=lambda one: one[1].nearest)
+    if own.nearest < np.inf:
+        key = "price_range_above" if own.high == np.inf else "price_range" if own.low else "price_range_below"
+        said.append(_say(key, group=group, low=own.low, high=own.high, same=SAME))
     return tuple(said)
 
 

@@ -300,6 +300,8 @@ def robustness_frame(result: AllocationResult, found: Robustness) -> pd.DataFram
             f"free zone [{unit}]": best,
             f"smallest under all changes [{unit}]": best * ratios.min(axis=0),
             f"largest under all changes [{unit}]": best * ratios.max(axis=0),
+            "same from cost times [-]": [own.low for own in found.prices],
+            "same to cost times [-]": [own.high for own in found.prices],
             "same in all": ["yes" if same else "no" for same in found.same],
         }
     )

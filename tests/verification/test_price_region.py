@@ -1,0 +1,89 @@
+"""How wrong costs may be: ranges of one price by search, the worst of all prices by every corner."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+
+from tolalloc.allocation.cost.model import Exponential, Process, Reciprocal, Weighted, reciprocal_squared
+from tolalloc.allocation.front.price_region import SAME, price_ranges, worst_prices
+from tolalloc.allocation.search import process_choice
+from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Stack
+
+
+def random_problem(generator: np.random.Generator, features: int = 4, ways: int = 1) -> AllocationProblem:
+    """Return features of three cost laws in two stacks, one in quadrature and one that is not always tight."""
+
+    def made(at: int, way: int) -> Process:
+        factor = generator.uniform(0.5, 3.0)
+        laws = (Reciprocal(factor=factor), reciprocal_squared(factor=factor), Exponential(factor=factor, scale=1.0))
+        low, high = (0.2, 3.0) if way == 0 else (0.1, 1.0)
+        return Process(name=f"way {way}", cost=laws[at % 3], minimum=low, maximum=high, change=0.4 * way)
+
+    weights = generator.uniform(0.5, 2.0, (2, features))
+    stacks = (
+        Stack(name="quadrature", worst_case=np.zeros(features), root_sum_square=weights[0], budget=2.0),
+        Stack(name="sum", worst_case=weights[1], root_sum_square=np.zeros(features), budget=1.3 * features),
+    )
+    return AllocationProblem(
+        features=tuple(
+            PricedFeature(name=f"f{at}", processes=tuple(made(at, way) for way in range(ways)))
+            for at in range(features)
+        ),
+        stacks=stacks,
+    )
+
+
+def priced(problem: AllocationProblem, factors: np.ndarray) -> AllocationProblem:
+    """Return the problem at other prices."""
+    features = tuple(
+        replace(
+            feature,
+            processes=tuple(
+                replace(made, cost=Weighted(model=made.cost, weight=float(by)), change=float(by) * made.change)
+                for made in feature.processes
+            ),
+        )
+        for feature, by in zip(problem.features, factors, strict=True)
+    )
+    return replace(problem, features=features)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_at_the_ends_of_its_price_a_zone_has_moved_by_a_tenth(seed):
+    """Prices found by solving the whole program at every price that a root finder asks for."""
+    problem = random_problem(np.random.default_rng(seed))
+    optimum = process_choice.allocate(problem)
+    for at, own in enumerate(price_ranges(problem, optimum)):
+
+        def moved(by: float, at: int = at) -> float:
+            factors = np.where(np.arange(4) == at, by, 1.0)
+            return float(process_choice.allocate(priced(problem, factors)).zones[at] / optimum.zones[at])
+
+        if own.low > 0:
+            assert moved(own.low) == pytest.approx(1 / (1 + SAME), rel=2e-4)
+        else:
+            assert moved(1e-3) > 1 / (1 + SAME) - 1e-4
+        if own.high < np.inf:
+            assert moved(own.high) == pytest.approx(1 + SAME, rel=2e-4)
+        else:
+            assert moved(1e3) < 1 + SAME + 1e-4
+
+
+@pytest.mark.parametrize(("seed", "ways"), [(3, 1), (4, 1), (5, 2)])
+def test_no_corner_of_the_prices_loses_more_than_is_proven_and_the_worst_is_found(seed, ways):
+    """All 16 corners of ±20 %, each with its own cheapest zones."""
+    problem = random_problem(np.random.default_rng(seed), ways=ways)
+    optimum, lost = process_choice.allocate(problem), []
+    for corner in product((0.8, 1.2), repeat=4):
+        changed = priced(problem, np.array(corner))
+        lost.append(changed.cost(optimum.zones, optimum.processes) - process_choice.allocate(changed).cost)
+    found = worst_prices(problem, optimum, nodes=300)
+    assert found.lost == pytest.approx(max(lost), rel=1e-5)
+    assert found.most >= max(lost) - 1e-7
+    assert found.most == pytest.approx(max(lost), rel=0.02)
+    few = worst_prices(problem, optimum, nodes=1)
+    assert few.lost <= max(lost) + 1e-7 <= few.most + 2e-7

@@ -1,0 +1,248 @@
+"""How wrong costs may be before other zones are cheapest: the price of one zone, and all prices at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.allocation.cost.model import Process, Weighted
+from tolalloc.allocation.search import process_choice
+from tolalloc.allocation.search.convex_program import ConvexProgram
+from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Solution, Stack
+from tolalloc.exceptions import SolveError
+
+COST_CHANGE = 0.2
+"""Relative change of every cost, up or down, in the box of prices [-]."""
+SAME = 0.1
+"""Relative difference up to which two zones are called the same; neighbours of a ladder differ by a quarter [-]."""
+_EXCHANGES = 8
+"""Largest number of exchanges of zones and their worst prices [-]."""
+_HELD = 1e-6
+"""Room of a zone that is held, over the zone: a program needs an interior [-]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PriceRange:
+    """Between which factors the cost of one zone may lie, all others as assumed, so that the zone stays the same."""
+
+    low: float  # 0 where it stays however cheap it gets [-]
+    high: float  # Infinite where it stays however dear it gets [-]
+
+    @property
+    def nearest(self) -> float:
+        """By which factor, up or down, the cost may be wrong at least; infinite where it does not matter [-]."""
+        return min(self.high, 1 / self.low if self.low else np.inf)
+
+    @property
+    def holds_change(self) -> bool:
+        """Whether the zone stays the same with its cost `COST_CHANGE` higher or lower."""
+        return self.low <= 1 - COST_CHANGE and self.high >= 1 + COST_CHANGE
+
+
+def price_ranges(problem: AllocationProblem, optimum: Solution) -> tuple[PriceRange, ...]:
+    """Return for every zone the factors of its cost between which the cheapest zone stays within `SAME` of its own.
+
+    Parameters
+    ----------
+    problem
+        The allocation with the local models.
+    optimum
+        Its cheapest design; processes stay as they are.
+
+    Raises
+    ------
+    SolveError
+        A convex program was not solved.
+
+    Notes
+    -----
+    With V(z) the least cost of all other zones where this one is z, the cheapest z at a price t makes t·c(z) + V(z)
+    least; V is convex, so that z is cheapest just at t = −V′(z)/c′(z), V′ = Σ λₛ·∂loadₛ/∂z with the prices λ of
+    the program in which z is held. t grows with z, so two solves give the range.
+
+    References
+    ----------
+    Own derivation; A. V. Fiacco, Introduction to sensitivity and stability analysis in nonlinear programming (1983),
+    for V′.
+
+    Examples
+    --------
+    Two zones of 1/z each, the sum of them 4: a zone of 2 grows to 2.2 where its cost is (2.2/1.8)² times as high.
+
+    >>> from tolalloc.allocation.cost.model import Reciprocal
+    >>> made = Process(name="ground", cost=Reciprocal(factor=1.0), minimum=0.1, maximum=9.0)
+    >>> stack = Stack(name="gap", worst_case=np.ones(2), root_sum_square=np.zeros(2), budget=4.0)
+    >>> problem = AllocationProblem(
+    ...     features=tuple(PricedFeature(name=name, processes=(made,)) for name in "ab"), stacks=(stack,)
+    ... )
+    >>> found = price_ranges(problem, process_choice.allocate(problem))[0]
+    >>> round(found.high, 3), round((2.2 / 1.8) ** 2, 3)
+    (1.494, 1.494)
+    """
+    program = ConvexProgram(problem.features, optimum.processes, len(problem.stacks), problem.shared)
+    found = []
+    for at, zone in enumerate(optimum.zones):
+        low = _price(problem, program, at, zone / (1 + SAME))
+        high = _price(problem, program, at, zone * (1 + SAME))
+        found.append(PriceRange(low=0.0 if low is None else low, high=np.inf if high is None else high))
+    return tuple(found)
+
+
+def _price(problem: AllocationProblem, program: ConvexProgram, at: int, zone: float) -> float | None:
+    """Return the factor of a zone's cost at which it is cheapest at a value; none where no price makes it so."""
+    lower, upper = program.lower.copy(), program.upper.copy()
+    if not lower[at] <= zone <= upper[at]:
+        return None
+    lower[at], upper[at] = zone * (1 - _HELD), zone * (1 + _HELD)
+    found = program.solve(problem.stacks, lower=lower, upper=upper)
+    if found is None:  # no other zones make room for it
+        return None
+    slopes = [_load_slope(stack, found.zones)[at] for stack in problem.stacks]
+    worth = float(found.prices @ np.array(slopes)) + 2 * problem.features[at].loss * zone
+    slope = float(problem.features[at].processes[program.processes[at]].cost.slope(np.array(zone)))
+    return float(worth / -slope) if slope < 0 else None
+
+
+def _load_slope(stack: Stack, zones: Float[np.ndarray, " feature"]) -> Float[np.ndarray, " feature"]:
+    """Return the derivatives of a stack's load by the zones [unit of the stack per unit of the zone]."""
+    spread = float(np.sqrt(((stack.root_sum_square * zones) ** 2).sum()))
+    quadrature = stack.root_sum_square**2 * zones / spread if spread > 0 else np.zeros(zones.size)
+    return np.asarray(stack.worst_case + quadrature)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorstPrices:
+    """The prices at which the answer loses most against the zones that are cheapest then."""
+
+    factors: Float[np.ndarray, " feature"]  # Of the cost of every zone [-]
+    cheapest: Solution  # At these prices
+    lost: float  # What the answer costs more than these, at these prices [cost units]
+    most: float  # What it costs more at any prices of the box at most, proven [cost units]
+
+
+def worst_prices(problem: AllocationProblem, optimum: Solution, nodes: int = 100) -> WorstPrices:
+    """Return the prices of the box of `COST_CHANGE` at which the answer loses most.
+
+    Parameters
+    ----------
+    problem
+        The allocation with the local models.
+    optimum
+        Its cheapest design.
+    nodes
+        Most nodes of the search; with few the proven loss is further from the one found [-].
+
+    Raises
+    ------
+    SolveError
+        A convex program was not solved.
+
+    Notes
+    -----
+    max over prices t and zones z of Σ tᵢ·(cᵢ(zᵢ*) − cᵢ(zᵢ)): a zone that costs less than in the answer has its cost
+    raised, one that costs more has it lowered. Each process is cut in two where it costs what the answer does, so that
+    the branch and bound over processes finds the worst prices, and its bound covers the whole box. The zones found are
+    then exchanged with those that are cheapest at their worst prices as long as the loss grows.
+
+    References
+    ----------
+    Own derivation, as minimax regret with interval costs: I. Averbakh, V. Lebedev, Eur. J. Oper. Res. 154 (2004).
+
+    Examples
+    --------
+    Of two zones of 1/z each whose sum is 4, one gets dearer by a fifth and one cheaper: (√1.2 + √0.8)²/4 for 1.
+
+    >>> from tolalloc.allocation.cost.model import Reciprocal
+    >>> made = Process(name="ground", cost=Reciprocal(factor=1.0), minimum=0.1, maximum=9.0)
+    >>> stack = Stack(name="gap", worst_case=np.ones(2), root_sum_square=np.zeros(2), budget=4.0)
+    >>> problem = AllocationProblem(
+    ...     features=tuple(PricedFeature(name=name, processes=(made,)) for name in "ab"), stacks=(stack,)
+    ... )
+    >>> found = worst_prices(problem, process_choice.allocate(problem))
+    >>> round(found.lost, 4), round(1 - (1.2**0.5 + 0.8**0.5) ** 2 / 4, 4)
+    (0.0101, 0.0101)
+    """
+    costs = _costs(problem.features, optimum)
+    cut = tuple(
+        replace(feature, processes=tuple(_cut(feature, cost)))
+        for feature, cost in zip(problem.features, costs, strict=True)
+    )
+    searched = process_choice.allocate(replace(problem, features=cut), nodes)
+    if not isinstance(searched, Solution):
+        raise SolveError("The worst prices of the allocation were not found: its cheapest zones keep no limit.")
+    best = _lost(problem, optimum, _against(costs, _costs(cut, searched)))
+    for _ in range(_EXCHANGES):
+        further = _lost(problem, optimum, _against(costs, _costs(problem.features, best.cheapest)))
+        if further.lost <= best.lost:
+            break
+        best = further
+    kept = float(costs.sum() + problem.losses @ optimum.zones**2)
+    return replace(best, most=max(kept - searched.bound, best.lost))
+
+
+def _costs(features: Sequence[PricedFeature], found: Solution) -> Float[np.ndarray, " feature"]:
+    """Return what every zone costs [cost units]."""
+    return np.array(
+        [
+            float(feature.processes[at].total(np.array(zone)))
+            for feature, at, zone in zip(features, found.processes, found.zones, strict=True)
+        ]
+    )
+
+
+def _against(answer: Float[np.ndarray, " feature"], other: Float[np.ndarray, " feature"]) -> Float[np.ndarray, "..."]:
+    """Return the prices at which an answer loses most against other zones [-]."""
+    return np.where(other <= answer, 1 + COST_CHANGE, 1 - COST_CHANGE)
+
+
+def _lost(problem: AllocationProblem, optimum: Solution, factors: Float[np.ndarray, " feature"]) -> WorstPrices:
+    """Return what the answer loses at some prices, which proves nothing of others."""
+    features = tuple(_priced(feature, float(by)) for feature, by in zip(problem.features, factors, strict=True))
+    changed = replace(problem, features=features)
+    found = process_choice.allocate(changed)
+    if not isinstance(found, Solution):
+        raise SolveError("At other prices the allocation has no solution, although prices change no limit.")
+    lost = max(changed.cost(optimum.zones, optimum.processes) - found.cost, 0.0)
+    return WorstPrices(factors=factors, cheapest=found, lost=lost, most=np.inf)
+
+
+def _priced(feature: PricedFeature, factor: float) -> PricedFeature:
+    processes = tuple(
+        replace(made, cost=Weighted(model=made.cost, weight=factor), change=factor * made.change)
+        for made in feature.processes
+    )
+    return replace(feature, processes=processes)
+
+
+def _cut(feature: PricedFeature, cost: float) -> Iterator[Process]:
+    """Return a feature's processes, cheaper than a cost with their price raised, dearer with it lowered."""
+    for made in feature.processes:
+        middle = _zone_of_cost(made, cost)
+        for low, high, weight in (
+            (made.minimum, middle, 1 - COST_CHANGE),
+            (middle, made.maximum, 1 + COST_CHANGE),
+        ):
+            if low < high or made.minimum == made.maximum:
+                yield replace(
+                    made,
+                    cost=Weighted(model=made.cost, weight=weight),
+                    change=weight * made.change + (1 - weight) * cost,
+                    minimum=low,
+                    maximum=high,
+                )
+
+
+def _zone_of_cost(made: Process, cost: float) -> float:
+    """Return the zone of a process at which it costs so much, or the end of its range that is nearest."""
+    from scipy.optimize import brentq
+
+    ends = [float(made.total(np.array(zone))) - cost for zone in (made.minimum, made.maximum)]
+    if ends[0] <= 0:
+        return made.minimum
+    if ends[1] >= 0:
+        return made.maximum
+    found, *_ = brentq(lambda zone: float(made.total(np.array(zone))) - cost, made.minimum, made.maximum, full_output=1)
+    return float(found)
