@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -170,17 +171,20 @@ def worst_prices(problem: AllocationProblem, optimum: Solution, nodes: int = 100
         replace(feature, processes=tuple(_cut(feature, cost)))
         for feature, cost in zip(problem.features, costs, strict=True)
     )
-    searched = process_choice.allocate(replace(problem, features=cut), nodes)
-    if not isinstance(searched, Solution):
-        raise SolveError("The worst prices of the allocation were not found: its cheapest zones keep no limit.")
-    best = _lost(problem, optimum, _against(costs, _costs(cut, searched)))
+    kept = float(costs.sum() + problem.losses @ optimum.zones**2)
+    # Whatever is searched: the answer costs no more than all prices raised say, others no less than all lowered.
+    most, start = (1 + COST_CHANGE) * kept - (1 - COST_CHANGE) * optimum.bound, _half_raised(costs)
+    with suppress(SolveError):  # no zones within so many nodes, so nothing is proven besides
+        searched = process_choice.allocate(replace(problem, features=cut), nodes)
+        if isinstance(searched, Solution):
+            most, start = min(most, kept - searched.bound), _against(costs, _costs(cut, searched))
+    best = _lost(problem, optimum, start)
     for _ in range(_EXCHANGES):
         further = _lost(problem, optimum, _against(costs, _costs(problem.features, best.cheapest)))
         if further.lost <= best.lost:
             break
         best = further
-    kept = float(costs.sum() + problem.losses @ optimum.zones**2)
-    return replace(best, most=max(kept - searched.bound, best.lost))
+    return replace(best, most=max(most, best.lost))
 
 
 def _costs(features: Sequence[PricedFeature], found: Solution) -> Float[np.ndarray, " feature"]:
@@ -191,6 +195,11 @@ def _costs(features: Sequence[PricedFeature], found: Solution) -> Float[np.ndarr
             for feature, at, zone in zip(features, found.processes, found.zones, strict=True)
         ]
     )
+
+
+def _half_raised(costs: Float[np.ndarray, " feature"]) -> Float[np.ndarray, " feature"]:
+    """Return prices from which the worst are looked for where no search says better: those of dear zones raised [-]."""
+    return np.where(costs > np.median(costs), 1 + COST_CHANGE, 1 - COST_CHANGE)
 
 
 def _against(answer: Float[np.ndarray, " feature"], other: Float[np.ndarray, " feature"]) -> Float[np.ndarray, "..."]:
