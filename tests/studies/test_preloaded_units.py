@@ -161,3 +161,11 @@ def test_teeth_that_rated_torque_presses_harder_allow_no_more_preload():
     moved = own.at(asked.model, settings, asked.space.setting_steps)
     assert rated_pin_force(asked.model.at(settings).reducer_in_force) > own.limits.upper + 200.0
     assert (moved.limits.upper, moved.slopes) == (own.limits.upper, (0.0, 0.0))
+
+
+@pytest.mark.parametrize(("preset", "limited"), [("cd29", True), ("rv20e", True), ("rv20e_liu2020", False)])
+def test_a_reducer_limits_preload_unless_its_stiffness_is_printed_and_far_too_large(preset, limited):
+    source = ta.reducer(preset, neglected=("*",))
+    row = {"id": "pin.diameter", "plus": 1, "minus": -1, "unit": "µm", "min": 0.5, "max": 2, "cost": 1}
+    model = source.bound(ta.Drawing.of_rows([row]).errors, "test")
+    assert (ta.PRELOAD in model.own_limits) == limited

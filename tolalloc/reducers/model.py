@@ -448,11 +448,12 @@ class ReducerModel(Model):
     def own_limits(self) -> Mapping[str, float]:
         """No pin may press harder without torque than the rated torque makes it: such a unit is preloaded.
 
-        Only where bearings are stated by their dimensions: with printed stiffnesses, far too large, nearly all are.
+        Not with an RV reducer's printed stiffnesses, which no dimensions support: far too large, they press nearly all.
         With either the pins' friction may take no more without load than the catalogue allows, where it states that:
         less what seals, grease and preloaded rollers take.
         """
-        limits = {PRELOAD: self.rated_pin_force} if self.reducer.parts else {}
+        pressed = self.reducer.parts or self.reducer.output_pins
+        limits = {PRELOAD: self.rated_pin_force} if pressed else {}
         catalogue = self.reducer.catalogue
         if catalogue and catalogue.no_load_torque:
             limits[FRICTION_TORQUE] = catalogue.no_load_torque - IdleTorque.of(self.reducer).together
