@@ -9,6 +9,7 @@ import pytest
 from scipy.stats import binom, norm
 
 import tolalloc as ta
+from tests.builders import says
 from tests.verification.test_lower_bound import CHAIN, GAP, OPTIMUM, chain, cheapest_normal, drawing
 from tolalloc.allocation.search.proven_bound import (
     BoundedLimit,
@@ -309,3 +310,26 @@ def test_a_reducer_that_has_no_bounds_is_refused(preset, output, says):
             questions=[ta.Allocation(boxes=10)],
         ).allocate(effort="quick")
     assert f"no bound can be proven, as {says}" in str(caught.value)
+
+
+@pytest.mark.parametrize(("boxes", "key"), [(500, "proven"), (1, "proven_nothing")])
+def test_the_report_says_what_no_drawing_costs_less_than(boxes, key):
+    slopes = {GAP: {"a": (1.0, 1.0), "b": (-1.0, -1.0), "c": (2.0, 2.0)}}
+    answer = ta.Study(
+        ta.model(chain, inputs=tuple(CHAIN), outputs=(GAP,), slopes=slopes),
+        drawing(CHAIN),
+        limits={GAP: ta.Limit(lower=13.8, upper=14.2, show=ta.AtYield(0.9973))},
+        questions=[ta.Allocation(front=False, what_if=False, boxes=boxes)],
+        seed=1,
+    ).allocate(effort="quick")
+    found = answer.result.proven
+    own = {"bound": found.cost, "boxes": found.boxes, "counted": "gap"}
+    more = {
+        "below": 1 - found.cost / answer.result.cost,
+        "answer": "the answer",
+        "confidence": 0.95,
+        "units": found.units,
+        "allowed": str(found.allowed[0]),
+    }
+    assert found.says_more == (key == "proven")
+    assert says(answer.sentences, f"allocation.{key}", **own, **(more if found.says_more else {}))

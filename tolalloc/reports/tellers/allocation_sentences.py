@@ -338,7 +338,7 @@ def _proven(result: AllocationResult) -> tuple[str, ...]:
     if not free.met:
         return (_say("proven_alone", **gaps),)
     answer = _say("answer_free" if result.graded else "answer_drawing", cost=free.cost)
-    return (_say("proven", answer=answer, cost=free.cost, above=free.cost / found.cost - 1, **gaps),)
+    return (_say("proven", answer=answer, below=1 - found.cost / free.cost, **gaps),)
 
 
 def _free(result: AllocationResult) -> tuple[str, ...]:
@@ -429,6 +429,10 @@ def _good_unit(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     return (_say("good", yield_=said, price=price, cost_unit=cost_unit, output=short(result.leading)),)
 
 
+_LEAST_PRICE = 0.005
+"""Factor of a cost that is said as 0 [-]."""
+
+
 def _settled(result: AllocationResult) -> tuple[str, ...]:
     """Return which zones do not depend on what was assumed."""
     found = result.robustness
@@ -437,14 +441,15 @@ def _settled(result: AllocationResult) -> tuple[str, ...]:
     same = [group for group, settled in zip(found.groups, found.same, strict=True) if settled]
     names = f": {', '.join(same)}" if same else ""
     key = "same_one" if len(same) == 1 else "same_many"
-    said = [_say(key, same=len(same), count=len(found.groups), most=SAME, names=names)]
+    said = [_say(key, same=len(same), count=len(found.groups), most=SAME, change=COST_CHANGE, names=names)]
     worst, cost = found.worst, result.free.chosen.cost
     gaps = {"change": COST_CHANGE, "most": worst.most, "share": worst.most / cost, "lost": worst.lost}
     said.append(_say("worst_prices", **gaps))
     ranges = zip(found.groups, found.prices, strict=True)
     group, own = min(ranges, key=lambda one: one[1].nearest)
     if own.nearest < np.inf:
-        key = "price_range_above" if own.high == np.inf else "price_range" if own.low else "price_range_below"
+        both = "price_range" if own.low > _LEAST_PRICE else "price_range_below"
+        key = "price_range_above" if own.high == np.inf else both
         said.append(_say(key, group=group, low=own.low, high=own.high, same=SAME))
     return tuple(said)
 
