@@ -53,9 +53,8 @@ class SixPins:
 
     def cost(self, scales: np.ndarray) -> np.ndarray:
         """Return the cost of designs [cost units]."""
-        return np.array(
-            [sum(f.processes[0].total(s) for f, s in zip(self.space.features, own, strict=True)) for own in scales]
-        )
+        by_zone = [f.processes[0].total(own) for f, own in zip(self.space.features, scales.T, strict=True)]
+        return np.sum(by_zone, axis=0)
 
 
 def six_pins(generator: np.random.Generator, count: int) -> SixPins:

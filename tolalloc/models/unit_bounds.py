@@ -41,6 +41,7 @@ class ScaledUnits:
         return ScaledUnits(middle=self.middle, standard=self.standard[rows], group=self.group, groups=self.groups)
 
 
+@runtime_checkable
 class UnitBounds(Protocol):
     """What is certain of one output of some random units."""
 

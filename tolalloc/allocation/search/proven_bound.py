@@ -9,7 +9,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.joint_yield import JointRequirement
@@ -368,7 +368,7 @@ class BoundSearch:
 
     def _worst(
         self, units: ScaledUnits, own: Sequence[Requirement], designs: Float[np.ndarray, "design variable"], count: int
-    ) -> Float[np.ndarray, " chosen"]:
+    ) -> Int[np.ndarray, " chosen"]:
         """Return the units that lie furthest beyond their limits in some designs; others only leave a bound lower."""
         excess = np.full(len(units.standard), -np.inf)
         for design in designs:
@@ -377,6 +377,7 @@ class BoundSearch:
                 found = self.model.at(self.space.settings_of(design)).reading((each.output,))(x)
                 for sign, limit in each.limits.turned:
                     beyond = np.where(found.good, sign * (found.values[:, 0] - limit), -np.inf)
-                    scale = float(np.ptp(beyond[np.isfinite(beyond)])) or 1.0
-                    excess = np.maximum(excess, beyond / scale)
+                    known = beyond[np.isfinite(beyond)]
+                    scale = float(np.ptp(known)) if known.size else 0.0
+                    excess = np.maximum(excess, beyond / (scale or 1.0))
         return np.argsort(-excess, kind="stable")[:count]
