@@ -19,6 +19,7 @@ from tolalloc.models.model import ARRAY_RATE, Evaluation, Model, Observer, Setti
 from tolalloc.models.settings import Setting, require_settings
 from tolalloc.models.unit_bounds import ScaledUnits, SlopeBounds
 from tolalloc.models.user_function import UserFunction, identity
+from tolalloc.reading.named_fields import is_number
 from tolalloc.reading.units import MILLIMETRE
 
 
@@ -117,18 +118,21 @@ class FunctionModel:
 
     def _require_slopes(self) -> None:
         """Raise unless slopes are stated of outputs of the model, by all of its inputs and settings, as two numbers."""
-        named = [*self.inputs, *(setting.name for setting in self.settings)]
+        named, place = [*self.inputs, *(setting.name for setting in self.settings)], f"model {self.name}, slopes"
+        if not isinstance(self.slopes, Mapping):
+            raise InputError.at(f"model {self.name}", "slopes", self.slopes, "output → input → two numbers")
         for output, slopes in self.slopes.items():
             if output not in self.outputs:
-                raise UnknownNameError.among(f"model {self.name}, slopes", "output", output, self.outputs)
+                raise UnknownNameError.among(place, "output", output, self.outputs)
+            if not isinstance(slopes, Mapping):
+                raise InputError.at(place, output, slopes, "input → its least and its largest derivative")
             for name in slopes:
                 if name not in named:
-                    raise UnknownNameError.among(f"model {self.name}, slopes of {output}", "input", name, named)
+                    raise UnknownNameError.among(f"{place} of {output}", "input", name, named)
             for name in named:
-                stated = slopes.get(name, (np.nan, np.nan))
-                if np.shape(stated) != (2,) or not stated[0] <= stated[1] or not np.isfinite(stated).all():
+                if not _is_range(slopes.get(name)):
                     allowed = "two finite numbers, its least and its largest derivative"
-                    raise InputError.at(f"model {self.name}, slopes of {output}", name, stated, allowed)
+                    raise InputError.at(f"{place} of {output}", name, slopes.get(name), allowed)
 
     def set_to(self, settings: Mapping[str, float]) -> FunctionModel:
         """Return the function with other values of its settings [units of their names].
@@ -335,6 +339,13 @@ class BoundFunction(Model):
         inputs[:, [self.source.inputs.index(name) for name in self.varied]] += x
         settings = np.tile(self.values, (x.shape[0], 1))
         return np.concatenate([inputs * self._per_input, settings], axis=1)
+
+
+def _is_range(value: object) -> bool:
+    """Return whether a value is two finite numbers, the smaller one first."""
+    if not isinstance(value, list | tuple) or len(value) != 2 or not all(is_number(own) for own in value):
+        return False
+    return bool(np.isfinite(value).all() and value[0] <= value[1])
 
 
 def model(

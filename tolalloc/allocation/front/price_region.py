@@ -12,7 +12,7 @@ from jaxtyping import Float
 from tolalloc.allocation.cost.model import Process, Weighted
 from tolalloc.allocation.search import process_choice
 from tolalloc.allocation.search.convex_program import ConvexProgram
-from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Solution, Stack
+from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Solution
 from tolalloc.exceptions import SolveError
 
 COST_CHANGE = 0.2
@@ -75,6 +75,7 @@ def price_ranges(problem: AllocationProblem, optimum: Solution) -> tuple[PriceRa
 
     >>> from tolalloc.allocation.cost.model import Reciprocal
     >>> made = Process(name="ground", cost=Reciprocal(factor=1.0), minimum=0.1, maximum=9.0)
+    >>> from tolalloc.allocation.space.problem import Stack
     >>> stack = Stack(name="gap", worst_case=np.ones(2), root_sum_square=np.zeros(2), budget=4.0)
     >>> problem = AllocationProblem(
     ...     features=tuple(PricedFeature(name=name, processes=(made,)) for name in "ab"), stacks=(stack,)
@@ -101,17 +102,10 @@ def _price(problem: AllocationProblem, program: ConvexProgram, at: int, zone: fl
     found = program.solve(problem.stacks, lower=lower, upper=upper)
     if found is None:  # no other zones make room for it
         return None
-    slopes = [_load_slope(stack, found.zones)[at] for stack in problem.stacks]
+    slopes = [stack.zone_slopes(found.zones)[at] for stack in problem.stacks]
     worth = float(found.prices @ np.array(slopes)) + 2 * problem.features[at].loss * zone
     slope = float(problem.features[at].processes[program.processes[at]].cost.slope(np.array(zone)))
     return float(worth / -slope) if slope < 0 else None
-
-
-def _load_slope(stack: Stack, zones: Float[np.ndarray, " feature"]) -> Float[np.ndarray, " feature"]:
-    """Return the derivatives of a stack's load by the zones [unit of the stack per unit of the zone]."""
-    spread = float(np.sqrt(((stack.root_sum_square * zones) ** 2).sum()))
-    quadrature = stack.root_sum_square**2 * zones / spread if spread > 0 else np.zeros(zones.size)
-    return np.asarray(stack.worst_case + quadrature)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,6 +152,7 @@ def worst_prices(problem: AllocationProblem, optimum: Solution, nodes: int = 100
 
     >>> from tolalloc.allocation.cost.model import Reciprocal
     >>> made = Process(name="ground", cost=Reciprocal(factor=1.0), minimum=0.1, maximum=9.0)
+    >>> from tolalloc.allocation.space.problem import Stack
     >>> stack = Stack(name="gap", worst_case=np.ones(2), root_sum_square=np.zeros(2), budget=4.0)
     >>> problem = AllocationProblem(
     ...     features=tuple(PricedFeature(name=name, processes=(made,)) for name in "ab"), stacks=(stack,)

@@ -292,13 +292,8 @@ def _touching(constraint: OneSidedConstraint, design: VerifiedDesign) -> Stack:
     stack = constraint.stack
     if constraint.law is None:
         return stack
-    spread = stack.root_sum_square * design.scales
-    length = float(np.linalg.norm(spread)) or 1.0
-    return replace(
-        stack,
-        worst_case=stack.worst_case + stack.root_sum_square * spread / length,
-        root_sum_square=np.zeros(spread.size),
-    )
+    slopes = stack.zone_slopes(design.scales)
+    return replace(stack, worst_case=slopes, root_sum_square=np.zeros(slopes.size))
 
 
 def _derivative_error(

@@ -324,17 +324,27 @@ class BoundSearch:
             Designs near which it should be sharpest.
         cost
             Cost of a drawing that keeps the limits, infinite if there is none [cost units].
+
+        Raises
+        ------
+        ValueError
+            The model has no bounds, which `require_bounded` says before.
         """
+        bounded = self.model
+        if not isinstance(bounded, BoundedModel):
+            raise ValueError(_unbounded(self.model, "any output"))
         errors, own = self.space.errors, _counted(self.model, self.requirements)
         jointly = [each for each in self.requirements if isinstance(each, JointRequirement)]
         confidence = 1 - (1 - CONFIDENCE) / (len(own) + len(jointly))
         drawn = np.concatenate([*self.seeds.uniform_chunks(self.units, len(errors.columns))])
-        counts = [len(source.columns) for source in errors.active]
-        middle = errors.deviations(np.zeros((1, drawn.shape[1])), errors.zones)[0]
+        middle = errors.deviations(np.zeros((1, drawn.shape[1])), errors.zones)
+        group = np.full(drawn.shape[1], -1)  # a column that is on no drawing belongs to none
+        drawn_on = np.repeat(self.space.group_of_source, [len(source.columns) for source in errors.active])
+        group[: drawn_on.size] = drawn_on
         every = ScaledUnits(
-            middle=middle,
-            standard=errors.standard_values(drawn) * np.repeat(errors.zones, counts),
-            group=np.repeat(self.space.group_of_source, counts),
+            middle=middle[0],
+            standard=errors.deviations(errors.standard_values(drawn), errors.zones) - middle,
+            group=group,
             groups=len(self.space.groups),
         )
         shares = [1 - each.guarantee.target for each in (*own, *jointly) if isinstance(each.guarantee, AtYield)]
@@ -344,9 +354,7 @@ class BoundSearch:
         limits: list[BoundedLimit] = []
         members: list[tuple[int, ...]] = []
         for each in own:
-            if not isinstance(self.model, BoundedModel):  # `_counted` has left such outputs out
-                continue
-            bounds = self.model.unit_bounds(each.output, every.chosen(rows), near)
+            bounds = bounded.unit_bounds(each.output, every.chosen(rows), near)
             accuracy, first = self.model.accuracy.get(each.output, 0.0), len(limits)
             limits += [
                 BoundedLimit(bounds=bounds, sign=sign, limit=limit, accuracy=accuracy)

@@ -86,6 +86,12 @@ class Stack:
         spread = np.sqrt(((self.root_sum_square * zones) ** 2).sum(axis=-1))
         return np.asarray(zones @ self.worst_case + spread + shared @ self.slopes)
 
+    def zone_slopes(self, zones: Float[np.ndarray, " feature"]) -> Float[np.ndarray, " feature"]:
+        """Return the derivatives of the value by the zones [unit of the stack per unit of the zone]."""
+        spread = self.root_sum_square * zones
+        length = float(np.linalg.norm(spread)) or 1.0
+        return np.asarray(self.worst_case + self.root_sum_square * spread / length)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Shared:
