@@ -16,7 +16,7 @@ from tolalloc.reports.scene_record import scene_record
 
 SMALL = ta.Effort(
     allocation=ta.AllocationEffort(
-        verification_units=256, confirmation_units=2**11, share_blocks=8, search=ta.SearchEffort(steps=2)
+        verification_units=2**9, confirmation_units=2**11, share_blocks=8, search=ta.SearchEffort(steps=2)
     ),
     ranking=ta.RankingEffort(sobol=ta.SobolEffort(start=8, limit=8)),
 )
