@@ -14,7 +14,7 @@ SMALL_EFFORT = """ta.Effort(
             permutations=2),
         allocation=ta.AllocationEffort(
             verification_units=256, confirmation_units=512, shared_units=16, graded_steps=2, exact_points=8,
-            setting_steps=(2, 2), price_nodes=4, changed_stiffnesses=1, stiffness_units=128, share_blocks=8,
+            setting_steps=(2, 2), price_nodes=4, stiffness_units=128, share_blocks=8,
             yields=(0.9, 0.95), error=0.5,
             search=ta.SearchEffort(steps=2, front=ta.FrontEffort(population=8, generations=4, population_on_kernel=8,
                 generations_on_kernel=2, designs=10, rounds=1, points=3))),

@@ -32,7 +32,7 @@ housing.pitch,broached,reciprocal,0.8,5,{change},another machine
 """
 SMALL = """AllocationEffort(
         verification_units=128, confirmation_units=512, shared_units=16, graded_steps=2, exact_points=8,
-        setting_steps=(2, 2), price_nodes=4, changed_stiffnesses=1, stiffness_units=128, share_blocks=8,
+        setting_steps=(2, 2), price_nodes=4, stiffness_units=128, share_blocks=8,
         yields=(0.9, 0.95),
         search=SearchEffort(steps=2, front=FrontEffort(population=8, generations=4, population_on_kernel=8,
             generations_on_kernel=2, designs=10, rounds=1, points=3)))"""

@@ -12,11 +12,11 @@ from tests.builders import says
 from tolalloc import LOST_MOTION
 from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.cost.unit_price import YieldLadder
+from tolalloc.allocation.front.uncertain_region import UncertainRange, UncertainRegion
 from tolalloc.allocation.result import AllocationResult, limit_price, solver_noise
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
 from tolalloc.allocation.space.effort import QUICK_ALLOCATION
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
-from tolalloc.reducers.reducer.files import load_identified_stiffness
 from tolalloc.reports.document import Section
 from tolalloc.reports.header import Header
 from tolalloc.reports.tellers import allocation_figures as figures
@@ -275,14 +275,36 @@ def test_failed_units_are_counted_by_a_yield_alone(results):
     assert says(sentence, "allocation.failed_many", count=2)
 
 
+def region(same=(-0.7, 0.7), first=("", ""), kept=(-0.7, 0.7), worst=None):
+    own = UncertainRange(column="stiffness.a", tried=0.7, same=same, first=first, kept=kept)
+    still = UncertainRange(column="stiffness.b", tried=0.7, same=(-0.7, 0.7), first=("", ""), kept=(-0.7, 0.7))
+    return UncertainRegion(name="stiffness", ranges=(own, still), ratios=np.ones((4, 1)), least_favourable=worst)
+
+
+def told_with(results, found):
+    answer = answer_of(replace(results, robustness=replace(results.robustness, uncertain=found)))
+    assert "nan" not in " ".join(answer.sentences)
+    return answer
+
+
 def test_a_stiffness_that_breaks_the_free_zones_is_said_of_them(results):
-    kept = results.robustness.at_worst
-    uncertain = (kept, replace(kept, kept=False, regret=np.nan))
-    model = replace(results.model, identified=load_identified_stiffness("rv20e_table6"))
-    lost = replace(results, model=model, robustness=replace(results.robustness, uncertain=uncertain))
-    assert [own for own in answer_of(lost).warnings if own.startswith("With 1 of 2 random stiffness values")]
-    assert not [own for own in answer_of(results).warnings if "stiffness values" in own]
-    assert "nan" not in " ".join(answer_of(lost).sentences)
+    worst = replace(results.robustness.at_worst, kept=False, regret=np.nan)
+    assert says(told_with(results, region(worst=worst)).warnings, "allocation.uncertain", what="stiffness")
+    kept = told_with(results, region(worst=replace(worst, kept=True, regret=0.0)))
+    assert not [own for own in kept.warnings if "least favourable" in own]
+
+
+def test_the_region_of_stiffness_is_said_as_factors(results):
+    holds = told_with(results, region())
+    assert says(holds.sentences, "allocation.region_holds", what="stiffness", low=np.exp(-0.7), high=np.exp(0.7))
+    moved = told_with(results, region(same=(-0.3, 0.4), first=("bores", "pins"), kept=(-0.7, 0.1)))
+    said = {"column": "stiffness.a", "low": np.exp(-0.3), "high": np.exp(0.4), "group": "bores"}
+    assert says(moved.sentences, "allocation.region_moves", **said)
+    assert says(moved.sentences, "allocation.region_breaks", column="stiffness.a", low=np.exp(-0.7), high=np.exp(0.1))
+    assert not says(moved.sentences, "allocation.region_holds")
+    frame = tables.region_frame(region(same=(-0.3, 0.4), first=("bores", "")))
+    assert frame.loc[0, "first zone to change above"] == "none"
+    assert frame.loc[0, "zones same to times [-]"] == pytest.approx(np.exp(0.4))
 
 
 def test_a_trade_without_any_cost_is_said_in_words(results):

@@ -335,16 +335,7 @@ class DrawingQuestion:
         """Return the answers under changed assumptions."""
         verifier = self.verifier("robustness", self._at_ratios_of(free.chosen)).dividing_as(free.chosen)
         verifier = replace(verifier, units=self.effort.stiffness_units)
-        return robustness(verifier, free, self._changed_models(self.seeds("robustness")), self.effort.price_nodes)
-
-    def _changed_models(self, seeds: SeedTree) -> tuple[Model, ...]:
-        """Return models drawn from what is uncertain of the model, none if nothing is said of it."""
-        if not self.model.uncertain:
-            return ()
-        source = self.model.uncertain[0]
-        shape = (self.effort.changed_stiffnesses, len(source.columns))
-        draws = source.standard_values(seeds.child("stiffness").generator().random(shape))
-        return tuple(self.model.changed(change) for change in draws)
+        return robustness(verifier, free, self.effort.price_nodes)
 
     def prices(self, free: ZoneAllocation) -> YieldLadder | None:
         """Return the price of a good unit over yield targets, if the question prices the others."""

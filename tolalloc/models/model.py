@@ -204,7 +204,7 @@ class Model(ABC):
 
     @property
     def uncertain(self) -> tuple[CorrelatedSource, ...]:
-        """What is not known of the model itself and stands on no drawing; `with_uncertain` answers for it."""
+        """What is not known of the model itself and stands on no drawing; a column is ln of a factor, 0 as assumed."""
         return ()
 
     def with_uncertain(self, outputs: tuple[str, ...]) -> Response:

@@ -102,9 +102,8 @@ def _of_allocation(question: Allocation, prepared: Prepared) -> tuple[_Part, ...
     tried = front.designs + front.rounds * front.points + front.population_on_kernel * front.generations_on_kernel + 2
     fronts = (1 + bool(settings)) * tried * effort.shared_units * question.front
     what_if = question.what_if * (
-        effort.changed_stiffnesses * effort.stiffness_units * len(model.uncertain)
+        sum(2 * len(own.columns) + 2 for own in model.uncertain) * effort.stiffness_units
         + prod(effort.setting_steps[:settings]) * 4 * effort.shared_units
-        + 2 * effort.stiffness_units
     )
     shares = effort.share_blocks * (len(errors.blocks) + len({*errors.dimension_of_column}) + 4)
     shares += units_to_learn(errors, effort.share_blocks)

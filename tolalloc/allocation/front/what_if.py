@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -10,11 +9,12 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from tolalloc.allocation.front.price_region import SAME, PriceRange, WorstPrices, price_ranges, worst_prices
+from tolalloc.allocation.front.uncertain_region import UncertainRegion, Variant, uncertain_region
 from tolalloc.allocation.search import process_choice
 from tolalloc.allocation.search.zone_allocation import Programs, ZoneAllocation
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.problem import AllocationProblem, Solution
-from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier
+from tolalloc.allocation.verify.verification import Verifier
 from tolalloc.models.model import Evaluation, Model
 
 
@@ -234,19 +234,6 @@ def _cheapest(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Variant:
-    """The answer under one changed assumption."""
-
-    name: str  # What was changed
-    scales: Float[np.ndarray, " group"]  # Scale of every group [-]
-    cost: float  # Its cost under the changed assumption, with the locked zones at their own [cost units]
-    # What the undisturbed answer costs more than this one under the changed assumption, as a share of its cost; not a
-    # number where the chosen design no longer keeps a requirement [-]
-    regret: float
-    kept: bool  # Whether the chosen design still keeps every requirement, told by the change that the same units show
-
-
-@dataclass(frozen=True, kw_only=True)
 class Robustness:
     """Answers under changed assumptions."""
 
@@ -255,19 +242,20 @@ class Robustness:
     prices: tuple[PriceRange, ...]  # Of every group, while its zone stays within `SAME` of the optimum
     worst: WorstPrices  # Of the box in which every cost changes by `COST_CHANGE`
     at_worst: Variant  # The answer at these prices
-    # With what is uncertain in the model drawn from what is known of it; none where nothing is
-    uncertain: tuple[Variant, ...]
+    uncertain: UncertainRegion | None  # Of what is uncertain of the model; none where nothing is
     second_best: Variant | None  # With the second-best set of processes, none where there is no other
 
     @property
     def variants(self) -> tuple[Variant, ...]:
         """All of them."""
-        return (self.at_worst, *self.uncertain, *((self.second_best,) if self.second_best else ()))
+        uncertain = self.uncertain.least_favourable if self.uncertain else None
+        return tuple(own for own in (self.at_worst, uncertain, self.second_best) if own)
 
     @property
-    def ratios(self) -> Float[np.ndarray, "variant group"]:
-        """Scale under the changed assumption over the undisturbed one [-]."""
-        return np.array([variant.scales / self.optimum for variant in self.variants]).reshape(-1, len(self.groups))
+    def ratios(self) -> Float[np.ndarray, "change group"]:
+        """Scale under the changed assumption over the undisturbed one, the ends of what is uncertain too [-]."""
+        ends = self.uncertain.ratios if self.uncertain else np.empty((0, len(self.groups)))
+        return np.vstack([*(variant.scales / self.optimum for variant in self.variants), ends])
 
     @property
     def same(self) -> Bool[np.ndarray, " group"]:
@@ -276,7 +264,7 @@ class Robustness:
         return np.asarray((np.abs(np.log(self.ratios)) <= np.log(1 + SAME)).all(axis=0) & alone)
 
 
-def robustness(verifier: Verifier, allocation: ZoneAllocation, models: Sequence[Model], nodes: int) -> Robustness:
+def robustness(verifier: Verifier, allocation: ZoneAllocation, nodes: int) -> Robustness:
     """Return the answers under changed costs, models and processes.
 
     Parameters
@@ -285,17 +273,13 @@ def robustness(verifier: Verifier, allocation: ZoneAllocation, models: Sequence[
         Verifies the chosen design again with every changed model.
     allocation
         What was found.
-    models
-        The model with what is uncertain in it changed, such as its stiffnesses.
     nodes
         Most nodes of the search for the worst prices [-].
 
     Notes
     -----
-    Costs and processes are changed in the local models of the chosen design (`price_region`). A changed model takes
-    local models around the same design. How far it moves what is compared with a limit is the difference between two
-    models on the same units, added to what the verification of the chosen design found: the luck of a second sample,
-    often smaller and so less able to show a yield, tells nothing of the change.
+    Costs and processes are changed in the local models of the chosen design (`price_region`), what is uncertain of the
+    model in those of the changed model (`uncertain_region`).
 
     regret = cost of the answer / cost of the changed answer − 1 (own derivation) [-].
 
@@ -308,7 +292,7 @@ def robustness(verifier: Verifier, allocation: ZoneAllocation, models: Sequence[
     >>> from tolalloc.allocation.space.effort import SearchEffort
     >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
     >>> found = allocate(verifier, scale_in_proportion(verifier, 3), SearchEffort(steps=1))
-    >>> robustness(verifier, found, (), nodes=10).at_worst.regret < 0.01
+    >>> robustness(verifier, found, nodes=10).at_worst.regret < 0.01
     True
     """
     problem, optimum, locked = verifier.space.problem(allocation.stacks), allocation.inside, allocation.locked_cost
@@ -322,42 +306,9 @@ def robustness(verifier: Verifier, allocation: ZoneAllocation, models: Sequence[
         at_worst=Variant(
             name="worst prices found", scales=worst.cheapest.zones, cost=cost, regret=worst.lost / cost, kept=True
         ),
-        uncertain=_with_models(verifier, allocation, models),
+        uncertain=uncertain_region(verifier, allocation),
         second_best=_second_best(problem, optimum, locked),
     )
-
-
-def _with_models(verifier: Verifier, allocation: ZoneAllocation, models: Sequence[Model]) -> tuple[Variant, ...]:
-    """Return the answers of changed models."""
-    if not models:
-        return ()
-    name = verifier.model.uncertain[0].name.split(" (")[0]
-    undisturbed = verifier.verify(allocation.chosen.design, "robustness")
-    return tuple(
-        _with_model(replace(verifier, model=model), allocation, undisturbed, f"{name} {at}")
-        for at, model in enumerate(models, start=1)
-    )
-
-
-def _with_model(verifier: Verifier, allocation: ZoneAllocation, undisturbed: VerifiedDesign, name: str) -> Variant:
-    """Return the answer of a changed model."""
-    chosen, optimum, stacks = allocation.chosen, allocation.inside, []
-    verified = verifier.verify(chosen.design, undisturbed.name)  # of the same name, so on the same units
-    rises = [
-        float(now.predicted(chosen.design) - before.predicted(chosen.design))
-        for now, before in zip(verified.constraints, undisturbed.constraints, strict=True)
-    ]
-    for constraint, aimed, rise in zip(verified.constraints, allocation.stacks, rises, strict=True):
-        loads = [float(stack.load(chosen.scales, chosen.settings)) for stack in (constraint.stack, aimed)]
-        stacks.append(replace(constraint.stack, budget=loads[0] - (loads[1] - aimed.budget) - rise))
-    problem = verifier.space.problem(tuple(stacks))
-    found = process_choice.allocate(problem)
-    cost = problem.cost(found.zones, found.processes) + allocation.locked_cost
-    before = optimum.cost + allocation.locked_cost
-    kept = all(constraint.excess + rise <= 0 for constraint, rise in zip(chosen.constraints, rises, strict=True))
-    # Infinite values: so many units fail that none shows it.
-    kept = kept and all(np.isfinite(constraint.value) for constraint in verified.constraints)
-    return Variant(name=name, scales=found.zones, cost=cost, regret=before / cost - 1 if kept else np.nan, kept=kept)
 
 
 def _second_best(problem: AllocationProblem, optimum: Solution, locked: float) -> Variant | None:

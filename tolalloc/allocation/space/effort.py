@@ -94,8 +94,8 @@ class AllocationEffort(NamedFields):
         Values of each of the last settings for which the cheapest zones are looked for, one number for each [-].
     price_nodes
         Most nodes of the search for the prices at which the answer loses most [-].
-    changed_stiffnesses, stiffness_units
-        Stiffnesses drawn from what is not known of them, and independent units for each [-].
+    stiffness_units
+        Units on which every change of a stiffness that is not known is seen [-].
     share_blocks
         Blocks of the Sobol analysis at the zones of the drawing, a power of two [-].
     yields
@@ -123,7 +123,6 @@ class AllocationEffort(NamedFields):
     exact_points: Annotated[int, _least(2)] = 50
     setting_steps: Annotated[tuple[int, ...], each("whole numbers, 1 or more", whole("", 1))] = (5, 6)
     price_nodes: Annotated[int, _least(1)] = 100
-    changed_stiffnesses: Annotated[int, _least(1)] = 6
     stiffness_units: Annotated[int, _least(100)] = 2048
     share_blocks: Annotated[int, whole("a power of two, 2 or more", 2, power_of_two=True)] = 256
     yields: Annotated[
@@ -192,7 +191,6 @@ QUICK_ALLOCATION = AllocationEffort(
     exact_points=20,
     setting_steps=(2, 3),
     price_nodes=12,
-    changed_stiffnesses=2,
     stiffness_units=1152,
     share_blocks=32,
     yields=(0.7, 0.8, 0.9, 0.95, 0.99, 0.9973),

@@ -205,11 +205,16 @@ class AllocationTeller(Teller[AllocationResult]):
             found.append(Section(heading=_say("heading_good_unit"), tables=priced))
         if result.robustness:
             moved, variants = tables.robustness_frame(result, result.robustness), result.robustness
+            region = variants.uncertain
             found.append(
                 Section(
                     heading=_say("heading_robustness"),
                     figures=(figures.robustness_figure(moved),),
-                    tables=(("robustness", moved), ("variants", tables.variants_frame(variants, unit))),
+                    tables=(
+                        ("robustness", moved),
+                        ("variants", tables.variants_frame(variants, unit)),
+                        *(((f"{region.name} region", tables.region_frame(region)),) if region else ()),
+                    ),
                 )
             )
         return tuple(found)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from tolalloc.allocation.front.price_region import COST_CHANGE, SAME
+from tolalloc.allocation.front.uncertain_region import COVERED, UncertainRegion
 from tolalloc.allocation.result import AllocationResult, limit_price, limit_step, unit_quantile
 from tolalloc.allocation.search.candidates import ALONE
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
@@ -451,7 +453,25 @@ def _settled(result: AllocationResult) -> tuple[str, ...]:
         both = "price_range" if own.low > _LEAST_PRICE else "price_range_below"
         key = "price_range_above" if own.high == np.inf else both
         said.append(_say(key, group=group, low=own.low, high=own.high, same=SAME))
-    return tuple(said)
+    return (*said, *(_region(found.uncertain) if found.uncertain else ()))
+
+
+def _region(found: UncertainRegion) -> Iterator[str]:
+    """Yield within which changes of what is uncertain of the model the answer holds."""
+    moving = [own for own in found.ranges if own.moves_a_zone]
+    breaking = [own for own in found.ranges if own.breaks_a_limit]
+    if not moving and not breaking:
+        tried = float(np.exp(min(own.tried for own in found.ranges)))
+        yield _say("region_holds", what=found.name, low=1 / tried, high=tried, same=SAME)
+    if moving:
+        own = min(moving, key=lambda one: one.same[1] - one.same[0])
+        below, above = own.first
+        first = below if below and (not above or -own.same[0] < own.same[1]) else above
+        low, high = np.exp(own.same)
+        yield _say("region_moves", column=own.column, low=low, high=high, same=SAME, group=first)
+    for own in breaking:
+        low, high = np.exp(own.kept)
+        yield _say("region_breaks", column=own.column, low=low, high=high)
 
 
 def warnings(result: AllocationResult, header: Header) -> tuple[str, ...]:
@@ -465,11 +485,10 @@ def warnings(result: AllocationResult, header: Header) -> tuple[str, ...]:
         found.append(_say("not_verified", missed=missed(chosen)))
     if not result.free.proportional.met:
         found.append(_say("alike_missed"))
-    uncertain = result.robustness.uncertain if result.robustness else ()
-    lost = sum(not variant.kept for variant in uncertain)
-    if lost and result.free.chosen.met:
-        what = result.model.uncertain[0].name.split(" (")[0]
-        found.append(_say("uncertain", lost=lost, count=len(uncertain), what=what))
+    region = result.robustness.uncertain if result.robustness else None
+    worst = region.least_favourable if region else None
+    if region and worst and not worst.kept and result.free.chosen.met:
+        found.append(_say("uncertain", what=region.name, covered=COVERED))
     found += [f"{own.sentence}." for own in result.space.settings if own.out_of_bounds]
     fault = examined(result).fault or ""
     found += [own for own in portrait_of(result.model).cautions(chosen.settings) if own not in fault]

@@ -9,6 +9,7 @@ import pandas as pd
 
 from tolalloc.allocation.cost.unit_price import YieldLadder
 from tolalloc.allocation.front.pareto_front import Front, Fronts
+from tolalloc.allocation.front.uncertain_region import UncertainRegion
 from tolalloc.allocation.front.what_if import Robustness, SettingTrade
 from tolalloc.allocation.result import AllocationResult, limit_price, solver_noise, unit_quantile
 from tolalloc.allocation.search.candidates import GRADES
@@ -298,8 +299,8 @@ def robustness_frame(result: AllocationResult, found: Robustness) -> pd.DataFram
         {
             "group": found.groups,
             f"free zone [{unit}]": best,
-            f"smallest under all changes [{unit}]": best * ratios.min(axis=0),
-            f"largest under all changes [{unit}]": best * ratios.max(axis=0),
+            f"smallest under all changes [{unit}]": best * np.nanmin(ratios, axis=0),
+            f"largest under all changes [{unit}]": best * np.nanmax(ratios, axis=0),
             "same from cost times [-]": [own.low for own in found.prices],
             "same to cost times [-]": [own.high for own in found.prices],
             "same in all": ["yes" if same else "no" for same in found.same],
@@ -318,6 +319,27 @@ def variants_frame(found: Robustness, cost_unit: str) -> pd.DataFrame:
         }
         for variant in found.variants
     ]
+    return pd.DataFrame(rows)
+
+
+def region_frame(found: UncertainRegion) -> pd.DataFrame:
+    """Return within which factors of what is uncertain, each alone, free zones stay the same and keep all limits."""
+    rows = []
+    for own in found.ranges:
+        tried, same, kept = (np.exp(ends) for ends in ((-own.tried, own.tried), own.same, own.kept))
+        rows.append(
+            {
+                "uncertain": own.column,
+                "tried from times [-]": tried[0],
+                "tried to times [-]": tried[1],
+                "zones same from times [-]": same[0],
+                "zones same to times [-]": same[1],
+                "first zone to change below": own.first[0] or "none",
+                "first zone to change above": own.first[1] or "none",
+                "limits kept from times [-]": kept[0],
+                "limits kept to times [-]": kept[1],
+            }
+        )
     return pd.DataFrame(rows)
 
 
