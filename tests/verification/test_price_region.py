@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from tolalloc.allocation.cost.model import Exponential, Process, Reciprocal, Weighted, reciprocal_squared
-from tolalloc.allocation.front.price_region import SAME, price_ranges, worst_prices
+from tolalloc.allocation.front.price_region import SAME, graded_price_ranges, price_ranges, worst_prices
 from tolalloc.allocation.search import process_choice
+from tolalloc.allocation.search.discrete import DiscreteProblem, feature_options
 from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Stack
 
 
@@ -87,3 +88,47 @@ def test_no_corner_of_the_prices_loses_more_than_is_proven_and_the_worst_is_foun
     assert found.most == pytest.approx(max(lost), rel=0.02)
     few = worst_prices(problem, optimum, nodes=1)
     assert few.lost <= max(lost) + 1e-7 <= few.most + 2e-7
+
+
+def graded(problem: AllocationProblem) -> DiscreteProblem:
+    """Return the choice of every feature among steps of a quarter."""
+    steps = 0.2 * 1.25 ** np.arange(12)
+    labels = [f"{step:.3g}" for step in steps]
+    options = tuple(feature_options(feature, steps, labels) for feature in problem.features)
+    return DiscreteProblem(problem=problem, options=options)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_zone_keeps_its_step_just_within_the_range_of_its_price(seed):
+    """Every set of steps is priced: 12 steps of four zones, half of the problems with a loss that keeps its price."""
+    problem = random_problem(np.random.default_rng(seed))
+    if seed % 2:
+        problem = replace(problem, features=tuple(replace(own, loss=0.05) for own in problem.features))
+    choice = graded(problem)
+    optimum, every = choice.solve(), list(product(*(range(len(own)) for own in choice.options)))
+    zones = np.array([[own[at].zone for own, at in zip(choice.options, taken, strict=True)] for taken in every])
+    allowed = np.all([stack.load(zones, np.zeros((len(zones), 0))) <= stack.budget for stack in problem.stacks], axis=0)
+    zones = zones[allowed]
+    made = np.column_stack(
+        [
+            [{own.zone: own.cost - feature.loss * own.zone**2 for own in options}[zone] for zone in column]
+            for feature, options, column in zip(problem.features, choice.options, zones.T, strict=True)
+        ]
+    )
+    rest = made.sum(axis=1) + zones**2 @ problem.losses
+    assert rest.min() == pytest.approx(optimum.cost)
+    narrow = 0
+    for at, own in enumerate(graded_price_ranges(choice, optimum)):
+        for factor, keeps in (
+            *((end * by, inside) for end, by, inside in ((own.low, 1.001, True), (own.low, 0.999, False)) if end),
+            *((end * by, inside) for end, by, inside in ((own.high, 0.999, True), (own.high, 1.001, False))),
+        ):
+            if np.isfinite(factor):
+                cheapest = zones[np.argmin(rest + (factor - 1) * made[:, at])]
+                assert (cheapest[at] == optimum.zones[at]) == keeps
+                narrow += 1
+        for end, factor in ((own.low, 1e-6), (own.high, 1e6)):
+            if end in (0.0, np.inf):
+                cheapest = zones[np.argmin(rest + (factor - 1) * made[:, at])]
+                assert cheapest[at] == optimum.zones[at]
+    assert narrow > 8

@@ -331,11 +331,11 @@ class DrawingQuestion:
         third = searched[1][0] if len(searched) > 1 else None
         return Fronts(exact=exact, searched=searched[0][0], with_setting=third, score=searched[0][1])
 
-    def robustness(self, free: ZoneAllocation) -> Robustness:
+    def robustness(self, free: ZoneAllocation, graded: GradedAllocation | None) -> Robustness:
         """Return the answers under changed assumptions."""
         verifier = self.verifier("robustness", self._at_ratios_of(free.chosen)).dividing_as(free.chosen)
         verifier = replace(verifier, units=self.effort.stiffness_units)
-        return robustness(verifier, free, self.effort.price_nodes)
+        return robustness(verifier, free, self.effort.price_nodes, graded)
 
     def prices(self, free: ZoneAllocation) -> YieldLadder | None:
         """Return the price of a good unit over yield targets, if the question prices the others."""
@@ -434,7 +434,7 @@ def allocate_drawing(
         searched = {outcome: count - before[outcome] for outcome, count in record.counts.items()}
         if question.what_if:
             with record.stage("robustness"):
-                robust = question.robustness(free)
+                robust = question.robustness(free, graded)
         proven = question.proven(free, record)
         with record.stage("shares of variance"):
             chosen = Candidates(fixed=fixed, free=free, graded=graded).drawn

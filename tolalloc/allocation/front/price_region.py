@@ -12,6 +12,7 @@ from jaxtyping import Float
 from tolalloc.allocation.cost.model import Process, Weighted
 from tolalloc.allocation.search import process_choice
 from tolalloc.allocation.search.convex_program import ConvexProgram
+from tolalloc.allocation.search.discrete import DiscreteProblem, DiscreteSolution, Option
 from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Solution
 from tolalloc.exceptions import SolveError
 
@@ -19,6 +20,8 @@ COST_CHANGE = 0.2
 """Relative change of every cost, up or down, in the box of prices [-]."""
 SAME = 0.1
 """Relative difference up to which two zones are called the same; neighbours of a ladder differ by a quarter [-]."""
+_SAME_PRICE = 1e-9
+"""Relative difference of prices that ends the search for one [-]."""
 _EXCHANGES = 8
 """Largest number of exchanges of zones and their worst prices [-]."""
 _HELD = 1e-6
@@ -106,6 +109,83 @@ def _price(problem: AllocationProblem, program: ConvexProgram, at: int, zone: fl
     worth = float(found.prices @ np.array(slopes)) + 2 * problem.features[at].loss * zone
     slope = float(problem.features[at].processes[program.processes[at]].cost.slope(np.array(zone)))
     return float(worth / -slope) if slope < 0 else None
+
+
+def graded_price_ranges(problem: DiscreteProblem, optimum: DiscreteSolution) -> tuple[PriceRange, ...]:
+    """Return for every zone of a ladder the factors of its cost between which it keeps its step.
+
+    Parameters
+    ----------
+    problem
+        The choice among the steps, with the local models.
+    optimum
+        The cheapest choice.
+
+    Raises
+    ------
+    SolveError
+        The cheapest of other choices was not proven.
+
+    Notes
+    -----
+    With W the least cost of all other zones where one has a step, the step s* stays cheapest against s up to the price
+    t = (W(s) − W(s*))/(c(s*) − c(s)). The least t of all coarser steps and the largest of all finer ones are found
+    without solving for every step: at a price the cheapest of them has a t of its own, at which the next is looked for,
+    until none is cheaper.
+
+    References
+    ----------
+    M. J. Eisner, D. G. Severance, J. ACM 23 (1976) 619–635, for the breakpoints of a program in one parameter.
+
+    Examples
+    --------
+    Of two zones at most 4 together, both 2, one grows to 3 where its cost is (1 − 1/2)/(1/2 − 1/3) = 3 times as high.
+
+    >>> from tolalloc.allocation.cost.model import Reciprocal
+    >>> from tolalloc.allocation.search.discrete import feature_options
+    >>> made = Process(name="ground", cost=Reciprocal(factor=1.0), minimum=0.1, maximum=9.0)
+    >>> features = tuple(PricedFeature(name=name, processes=(made,)) for name in "ab")
+    >>> from tolalloc.allocation.space.problem import Stack
+    >>> stack = Stack(name="gap", worst_case=np.ones(2), root_sum_square=np.zeros(2), budget=4.0)
+    >>> steps = tuple(feature_options(one, np.array([1.0, 2.0, 3.0]), ("1", "2", "3")) for one in features)
+    >>> problem = DiscreteProblem(problem=AllocationProblem(features=features, stacks=(stack,)), options=steps)
+    >>> found = graded_price_ranges(problem, problem.solve())[0]
+    >>> round(found.low, 6), round(found.high, 6)
+    (0.333333, 3.0)
+    """
+    return tuple(
+        PriceRange(
+            low=_break_even(problem, optimum, at, coarser=False),
+            high=_break_even(problem, optimum, at, coarser=True),
+        )
+        for at in range(len(optimum.options))
+    )
+
+
+def _break_even(problem: DiscreteProblem, optimum: DiscreteSolution, at: int, *, coarser: bool) -> float:
+    """Return the factor of a zone's cost from which on a coarser or a finer step is cheaper, the end where none is."""
+    own, loss = optimum.options[at], problem.problem.features[at].loss
+    rivals = [step for step in problem.options[at] if (step.zone > own.zone) == coarser and step.zone != own.zone]
+    never = np.inf if coarser else 0.0
+
+    def made(step: Option) -> float:
+        return step.cost - loss * step.zone**2
+
+    factor = 1.0
+    for _ in range(len(rivals) + 1):
+        priced = tuple(replace(step, cost=step.cost + (factor - 1) * made(step)) for step in rivals)
+        found = problem.with_options(at, priced).solve() if priced else None
+        if found is None:
+            return never
+        rival = rivals[priced.index(found.options[at])]
+        saved = made(own) - made(rival)
+        if saved == 0 or (saved > 0) != coarser:
+            return never  # no price tells them apart in this direction
+        others = (found.cost - factor * made(rival)) - (optimum.cost - made(own))
+        before, factor = factor, others / saved
+        if np.isclose(factor, before, rtol=_SAME_PRICE):
+            break
+    return factor if factor > _SAME_PRICE else 0.0
 
 
 @dataclass(frozen=True, kw_only=True)

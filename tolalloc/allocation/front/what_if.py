@@ -8,9 +8,17 @@ from itertools import product
 import numpy as np
 from jaxtyping import Bool, Float
 
-from tolalloc.allocation.front.price_region import SAME, PriceRange, WorstPrices, price_ranges, worst_prices
+from tolalloc.allocation.front.price_region import (
+    SAME,
+    PriceRange,
+    WorstPrices,
+    graded_price_ranges,
+    price_ranges,
+    worst_prices,
+)
 from tolalloc.allocation.front.uncertain_region import UncertainRegion, Variant, uncertain_region
 from tolalloc.allocation.search import process_choice
+from tolalloc.allocation.search.discrete import GradedAllocation
 from tolalloc.allocation.search.zone_allocation import Programs, ZoneAllocation
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.problem import AllocationProblem, Solution
@@ -240,6 +248,7 @@ class Robustness:
     groups: tuple[str, ...]  # Names of the groups
     optimum: Float[np.ndarray, " group"]  # The undisturbed answer of the same local models [-]
     prices: tuple[PriceRange, ...]  # Of every group, while its zone stays within `SAME` of the optimum
+    graded: tuple[PriceRange, ...]  # Of every group, while its zone keeps its step of the ladder; none without ladders
     worst: WorstPrices  # Of the box in which every cost changes by `COST_CHANGE`
     at_worst: Variant  # The answer at these prices
     uncertain: UncertainRegion | None  # Of what is uncertain of the model; none where nothing is
@@ -264,7 +273,9 @@ class Robustness:
         return np.asarray((np.abs(np.log(self.ratios)) <= np.log(1 + SAME)).all(axis=0) & alone)
 
 
-def robustness(verifier: Verifier, allocation: ZoneAllocation, nodes: int) -> Robustness:
+def robustness(
+    verifier: Verifier, allocation: ZoneAllocation, nodes: int, graded: GradedAllocation | None = None
+) -> Robustness:
     """Return the answers under changed costs, models and processes.
 
     Parameters
@@ -275,6 +286,8 @@ def robustness(verifier: Verifier, allocation: ZoneAllocation, nodes: int) -> Ro
         What was found.
     nodes
         Most nodes of the search for the worst prices [-].
+    graded
+        What was found on ladders of zones, if that was asked for.
 
     Notes
     -----
@@ -302,6 +315,7 @@ def robustness(verifier: Verifier, allocation: ZoneAllocation, nodes: int) -> Ro
         groups=verifier.space.groups,
         optimum=optimum.zones,
         prices=price_ranges(problem, optimum),
+        graded=graded_price_ranges(graded.problem, graded.solution) if graded and graded.chosen.met else (),
         worst=worst,
         at_worst=Variant(
             name="worst prices found", scales=worst.cheapest.zones, cost=cost, regret=worst.lost / cost, kept=True

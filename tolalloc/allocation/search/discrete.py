@@ -186,6 +186,10 @@ class DiscreteProblem:
         """Return the cheapest allowed choice, None where none is allowed; see `best_choice` for the nodes [-]."""
         return self._solution(best_choice(self._program, most_nodes))
 
+    def with_options(self, at: int, options: tuple[Option, ...]) -> DiscreteProblem:
+        """Return the problem in which the feature at a position takes one of other options."""
+        return replace(self, options=(*self.options[:at], options, *self.options[at + 1 :]))
+
     def least_violating(self) -> DiscreteSolution:
         """Return the choice whose largest violation over the stack's scale is least, which names the blocking stack.
 
@@ -245,14 +249,22 @@ class GradedAllocation:
     chosen: VerifiedDesign  # The cheapest verified design, or the least violating one
     tried: tuple[VerifiedDesign, ...]  # All verified designs, the free one in this space first
     labels: tuple[str, ...]  # Name of the zone of every group on the drawing
-    # Cheapest choice that the chosen design's local models let keep the limits; without locked zones
-    solution: DiscreteSolution
-
+    problem: DiscreteProblem  # Choices that the chosen design's local models let keep the limits; without locked zones
     least: float  # Lower bound on the cost of every such choice near by, the errors of the units counted [cost units]
+
+    @cached_property
+    def solution(self) -> DiscreteSolution:
+        """Cheapest of these choices."""
+        found = self.problem.solve()
+        if found is None:
+            raise SolveError(
+                f"{self.chosen.name}: the choice among ladders does not find the design it was built around."
+            )
+        return found
 
     @property
     def bound(self) -> float:
-        """The same with locked zones [cost units]."""
+        """`least` with locked zones [cost units]."""
         return self.least + self.space.locked_cost
 
     @property
@@ -274,7 +286,7 @@ class GradedAllocation:
             chosen=chosen,
             tried=every,
             labels=_labels(grid, chosen),
-            solution=_proof(grid, chosen, every),
+            problem=_problem(grid, chosen, every),
             least=_least_cost(grid, chosen),
         )
 
@@ -462,7 +474,7 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
         chosen=chosen,
         tried=tuple(tried),
         labels=_labels(grid, chosen),
-        solution=_proof(grid, chosen, tuple(tried)),
+        problem=_problem(grid, chosen, tuple(tried)),
         least=_least_cost(grid, chosen),
     )
 
@@ -522,14 +534,11 @@ def _least_cost(grid: _Grid, chosen: VerifiedDesign) -> float:
     return least_cost(chosen, cheapest, near_by)
 
 
-def _proof(grid: _Grid, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...]) -> DiscreteSolution:
-    """Return the cheapest choice that keeps the limits, by the models of the chosen one."""
+def _problem(grid: _Grid, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...]) -> DiscreteProblem:
+    """Return the choices that keep the limits, by the models of the chosen one."""
     # A load that is its own budget may lie beyond it by rounding.
     stacks = tuple(
         replace(stack, budget=stack.budget + 1e-9 * abs(stack.budget))
         for stack in kept_stacks(chosen, tried, margin=0.0)
     )
-    found = grid.problem(stacks).solve()
-    if found is None:
-        raise SolveError(f"{chosen.name}: the choice among ladders does not find the design that it was built around.")
-    return found
+    return grid.problem(stacks)

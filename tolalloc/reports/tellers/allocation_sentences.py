@@ -453,6 +453,10 @@ def _settled(result: AllocationResult) -> tuple[str, ...]:
         both = "price_range" if own.low > _LEAST_PRICE else "price_range_below"
         key = "price_range_above" if own.high == np.inf else both
         said.append(_say(key, group=group, low=own.low, high=own.high, same=SAME))
+    if found.graded:
+        steady = [group for group, one in zip(found.groups, found.graded, strict=True) if one.holds_change]
+        gaps = {"same": len(steady), "count": len(found.groups), "change": COST_CHANGE}
+        said.append(_say("graded_prices", names=f": {', '.join(steady)}" if steady else "", **gaps))
     return (*said, *(_region(found.uncertain) if found.uncertain else ()))
 
 

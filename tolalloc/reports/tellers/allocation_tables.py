@@ -304,6 +304,11 @@ def robustness_frame(result: AllocationResult, found: Robustness) -> pd.DataFram
             "same from cost times [-]": [own.low for own in found.prices],
             "same to cost times [-]": [own.high for own in found.prices],
             "same in all": ["yes" if same else "no" for same in found.same],
+            **{
+                name: [getattr(own, end) for own in found.graded]
+                for name, end in (("graded same from cost times [-]", "low"), ("graded same to cost times [-]", "high"))
+                if found.graded
+            },
         }
     )
 
