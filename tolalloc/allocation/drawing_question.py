@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice, YieldLadder, best_yield
 from tolalloc.allocation.front.pareto_front import Fronts, exact_front, searched_front
+from tolalloc.allocation.front.uncertain_region import doubted
 from tolalloc.allocation.front.what_if import (
     QuantileResponse,
     Robustness,
@@ -125,7 +126,7 @@ class DrawingQuestion:
             "confirmation_units": (self.effort.confirmation_units, 1 - FIRST.error(self.effort.error)),
             "verification_units": (self.effort.verification_units, self.search_confidence),
         }
-        if self.what_if and self.model.uncertain:
+        if self.what_if and doubted(self.model).uncertain:
             asked["stiffness_units"] = (self.effort.stiffness_units, self.search_confidence)
         for requirement in self.requirements:
             for name, (units, confidence) in asked.items():

@@ -21,6 +21,7 @@ from tolalloc.reducers.cycloid.solvers import LINEAR
 from tolalloc.reducers.equivalent.hysteresis import HysteresisLoop
 from tolalloc.reducers.equivalent.perfect import exact_loop, preload, rated_pin_force
 from tolalloc.reducers.equivalent.wear import wear_of
+from tolalloc.reducers.families.known import family_of
 from tolalloc.reducers.load_case import Combined, LoadCase, at, combined_outputs
 from tolalloc.reducers.reducer.design import (
     MODIFICATION_CONVENTION,
@@ -368,6 +369,18 @@ class ReducerModel(Model):
     def uncertain(self) -> tuple[CorrelatedSource, ...]:
         """What is not known of identified stiffnesses."""
         return (stiffness_source(self.identified, self.reducer),) if self.identified else ()
+
+    @property
+    def with_assumed(self) -> ReducerModel:
+        """The model with its bearings' stiffnesses among what is uncertain, by no amount unless identified."""
+        if self.identified:
+            return self
+        own = {name: getattr(self.reducer.stiffness, name) for name in family_of(self.reducer).identified}
+        values = {name: value for name, value in own.items() if np.isfinite(value)}
+        assumed = IdentifiedStiffness(
+            source=self.reducer.name, values=values, standard_uncertainty=dict.fromkeys(values, 0.0)
+        )
+        return replace(self, identified=assumed)
 
     def with_uncertain(self, outputs: tuple[str, ...]) -> Response:
         """Return the response of the outputs with the stiffnesses as further columns, to first order in ln K."""

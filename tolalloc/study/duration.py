@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tolalloc.allocation.front.uncertain_region import doubted
 from tolalloc.allocation.verify.verification import SLOPE_UNITS
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
@@ -102,7 +103,7 @@ def _of_allocation(question: Allocation, prepared: Prepared) -> tuple[_Part, ...
     tried = front.designs + front.rounds * front.points + front.population_on_kernel * front.generations_on_kernel + 2
     fronts = (1 + bool(settings)) * tried * effort.shared_units * question.front
     what_if = question.what_if * (
-        sum(2 * len(own.columns) + 2 for own in model.uncertain) * effort.stiffness_units
+        sum(2 * len(own.columns) + 2 for own in doubted(model).uncertain) * effort.stiffness_units
         + prod(effort.setting_steps[:settings]) * 4 * effort.shared_units
     )
     shares = effort.share_blocks * (len(errors.blocks) + len({*errors.dimension_of_column}) + 4)

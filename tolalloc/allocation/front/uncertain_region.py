@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -15,6 +16,7 @@ from tolalloc.allocation.search.zone_allocation import ZoneAllocation
 from tolalloc.allocation.space.problem import Stack
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier
 from tolalloc.exceptions import SolveError
+from tolalloc.models.model import Model
 
 SPAN = float(np.log(2.0))
 """Change of one column, either way, up to which zones are followed at least, half to twice: ln of a factor [-]."""
@@ -26,6 +28,20 @@ _FOUND = 1e-3
 """Error of that place as a share of the span [-]."""
 _LEFT = 1.0
 """What stands for a change of zones where no zones keep the limits: ln of a ratio above any that counts [-]."""
+
+
+@runtime_checkable
+class AssumingModel(Protocol):
+    """A model that rests on numbers which nobody may have measured."""
+
+    @property
+    def with_assumed(self) -> Model:
+        """The model with these among what is uncertain, by no stated amount unless something is known of it."""
+
+
+def doubted(model: Model) -> Model:
+    """Return a model with all that may be wrong with it among what is uncertain."""
+    return model.with_assumed if isinstance(model, AssumingModel) else model
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,6 +175,7 @@ def uncertain_region(verifier: Verifier, allocation: ZoneAllocation) -> Uncertai
     >>> uncertain_region(verifier, found) is None
     True
     """
+    verifier = replace(verifier, model=doubted(verifier.model))
     if not verifier.model.uncertain:
         return None
     (source, *_), here = verifier.model.uncertain, _Undisturbed(verifier, allocation)
