@@ -142,6 +142,10 @@ class Case:
     agreement: float = 1e-6
 
 
+PRICES = r"worst prices|in whatever combination|,(yes|no)(,[\d.inf]+,[\d.inf]+)?\"?,?$"
+"""Lines that follow the search for the worst prices, cut short after few nodes: what it lost and proved, and the zones
+at these prices. Two halves of a process meet where the answer lies, so that the last bit decides which comes first."""
+
 NEW = "new @mine --like rv40e --cranks 3 --with all"
 MINE = "--reducer @mine/reducer.toml"
 
@@ -224,6 +228,7 @@ LONGER = (
     Case(
         name="preset",
         agreement=1e-4,  # grades begin where an early step of the search stood
+        wandering=PRICES,
         files={"preset.py": PRESET},
         commands=(
             "check @preset.py",
@@ -231,7 +236,12 @@ LONGER = (
             "whatif @preset.py pin.diameter=3 disc*.pitch=10",
         ),
     ),
-    Case(name="three", files={"three.py": THREE}, commands=(NEW, "check @three.py", "run @three.py --out @run")),
+    Case(
+        name="three",
+        wandering=PRICES,
+        files={"three.py": THREE},
+        commands=(NEW, "check @three.py", "run @three.py --out @run"),
+    ),
     Case(
         name="bench",
         commands=(
@@ -260,25 +270,25 @@ SHIPPED = "shipped_{}"
 
 FRONT = r'^ +"[\d.]+,[\d.]+,[\d.]*,[\d.]+,(yes)?",?$'
 WANDERING = {
-    "choi2000_clutch": r'"confirmation,|"answer found": |^ +"tolerances,|units: answer found',
+    "choi2000_clutch": rf'"confirmation,|"answer found": |^ +"tolerances,|units: answer found|{PRICES}',
     "liu2020_allocation": FRONT,
-    "liu2020_allocation_full": FRONT,
+    "liu2020_allocation_full": f"{FRONT}|{PRICES}",
     "rv20e_allocation": FRONT,
     "rv20e_diagnosis": r"\d",
     "song2019_modification": r"genetic|^ +\d+\.\d+,?$",
     "zhang2025_assembly": r"^zhang2025's genetic algorithm|^ +\"[\d.]+,[\d.]+,2,",
 }
 """Study → lines that follow a random search: the whole of a search for causes, the amounts of an evolution, its excess
-over a certified cost, the designs of a front with the radial clearance."""
+over a certified cost, the designs of a front with the radial clearance, the worst prices."""
 AGREEMENT = dict.fromkeys(
     (
         *("liu2020_allocation", "liu2020_allocation_full", "rv20e_allocation", "choi2000_clutch"),
         "liu2020_identification",
     ),
-    1e-5,
+    1e-4,
 )
 """Study → agreement of processors on where a convex program or a fit has its least: the place is flatter than the
-value, which agrees to 1e-8."""
+value, which agrees to 1e-8, so to the root of that."""
 
 
 def shipped(study: str) -> Case:
