@@ -25,6 +25,7 @@ COMPUTES_NOTHING = {
     "reducers.load_case.load_cycle": "reads",
     "reducers.load_case.require_duty": "checks",
     "reducers.duty.require_cycle": "checks",
+    "allocation.front.uncertain_region.doubted": "reads",
     "allocation.search.proven_bound.require_bounded": "checks",
     "reducers.cycloid.solvers.pins.pin_slopes": "passes on",
     "reducers.reducer.files.load_identified_stiffness": "reads",

@@ -184,4 +184,5 @@ def shares(values: Sequence[object], start: float, width: float) -> dict[str, An
     edges = start + width * np.arange(BINS + 2)
     known = np.asarray(values, dtype=float)
     counts, _ = np.histogram(known[np.isfinite(known)], edges)
-    return {"x": numbers(edges[:-1]), "y": numbers(100.0 * counts / max(known.size, 1)), "width": width}
+    edge, wide = numbers(edges[:-1]), numbers([width])[0]
+    return {"x": edge, "y": numbers(100.0 * counts / max(known.size, 1)), "width": wide}
