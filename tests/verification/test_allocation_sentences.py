@@ -282,7 +282,8 @@ def region(same=(-0.7, 0.7), first=("", ""), kept=(-0.7, 0.7), worst=None):
 
 
 def told_with(results, found):
-    answer = answer_of(replace(results, robustness=replace(results.robustness, uncertain=found)))
+    of_all = replace(found, ratios=np.ones((4, len(results.robustness.groups))))
+    answer = answer_of(replace(results, robustness=replace(results.robustness, uncertain=of_all)))
     assert "nan" not in " ".join(answer.sentences)
     return answer
 
