@@ -84,6 +84,7 @@ def test_output_that_is_not_utf_8_shows_a_question_mark(calculation):
     assert b'"study": "?"' in stdout.buffer.getvalue()
 
 
+@pytest.mark.slow
 def test_a_command_ends_well_where_all_its_streams_are_closed(tmp_path):
     words = [sys.executable, "-c", "from tolalloc.cli.main import main; main()", "new", str(tmp_path / "mine")]
     shell = ["sh", "-c", '"$@" <&- >&- 2>&-', "sh", *words]

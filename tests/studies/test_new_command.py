@@ -106,6 +106,7 @@ def mean_twist(reducer) -> float:
     return mean["value"]
 
 
+@pytest.mark.slow
 def test_a_reducer_of_three_cranks_with_turned_flanks_is_asked_and_checked(tmp_path):
     """40 µrad of rotation leave 2.03 µm more on the flank, which the carrier turns through, and no radial clearance."""
     made = ta.new(tmp_path / "mine", like="rv40e", cranks=3)

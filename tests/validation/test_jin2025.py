@@ -84,6 +84,7 @@ def indices(model: EquivalentModel, errors: ErrorModel) -> SaltelliIndices:
     return saltelli_indices(answered, len(PRINTED), SeedTree(3))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("zones", "total", "rank_correlation"),
     [("drawing", (0.782, 0.0, 0.0, 0.232, 0.0), (0.1, 0.7)), ("6 µm", (0.860, 0.021, 0.047, 0.119, 0.046), (0.1, 0.3))],

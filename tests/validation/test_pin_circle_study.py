@@ -57,6 +57,7 @@ def indices(grade: str, blocks: int = BLOCKS) -> SaltelliIndices:
     return saltelli_indices(answered, 3, SeedTree(3), second_order=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("grade", "first"), [("IT6", HOLES), ("IT8", CIRCLE)])
 def test_which_of_circle_and_holes_is_first_is_a_matter_of_their_grade(grade, first):
     """Its lead is above 0 with 97.5 % confidence: zones of 25 and 9 µm, and of 63 and 22 µm."""

@@ -276,8 +276,8 @@ def test_failed_units_are_counted_by_a_yield_alone(results):
 
 
 def region(same=(-0.7, 0.7), first=("", ""), kept=(-0.7, 0.7), worst=None):
-    own = UncertainRange(column="stiffness.a", tried=0.7, same=same, first=first, kept=kept)
-    still = UncertainRange(column="stiffness.b", tried=0.7, same=(-0.7, 0.7), first=("", ""), kept=(-0.7, 0.7))
+    own = UncertainRange(column="stiffness.a", tried=(-0.7, 0.7), same=same, first=first, kept=kept)
+    still = UncertainRange(column="stiffness.b", tried=(-0.7, 0.7), same=(-0.7, 0.7), first=("", ""), kept=(-0.7, 0.7))
     return UncertainRegion(name="stiffness", ranges=(own, still), ratios=np.ones((4, 1)), least_favourable=worst)
 
 
@@ -303,6 +303,10 @@ def test_the_region_of_stiffness_is_said_as_factors(results):
     assert says(moved.sentences, "allocation.region_moves", **said)
     assert says(moved.sentences, "allocation.region_breaks", column="stiffness.a", low=np.exp(-0.7), high=np.exp(0.1))
     assert not says(moved.sentences, "allocation.region_holds")
+    unanswered = replace(region().ranges[0], tried=(-0.7, 0.0), same=(-0.7, 0.0), kept=(-0.7, 0.0))
+    told = told_with(results, replace(region(), ranges=(unanswered,)))
+    assert says(told.sentences, "allocation.region_unanswered", columns="stiffness.a")
+    assert not says(told.sentences, "allocation.region_holds")
     frame = tables.region_frame(region(same=(-0.3, 0.4), first=("bores", "")))
     assert frame.loc[0, "first zone to change above"] == "none"
     assert frame.loc[0, "zones same to times [-]"] == pytest.approx(np.exp(0.4))

@@ -13,6 +13,7 @@ from tolalloc.allocation.front.price_region import SAME, graded_price_ranges, pr
 from tolalloc.allocation.search import process_choice
 from tolalloc.allocation.search.discrete import DiscreteProblem, feature_options
 from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Stack
+from tolalloc.exceptions import SolveError
 
 
 def random_problem(generator: np.random.Generator, features: int = 4, ways: int = 1) -> AllocationProblem:
@@ -74,6 +75,7 @@ def test_at_the_ends_of_its_price_a_zone_has_moved_by_a_tenth(seed):
             assert moved(1e3) < 1 + SAME + 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "ways"), [(3, 1), (4, 1), (5, 2)])
 def test_no_corner_of_the_prices_loses_more_than_is_proven_and_the_worst_is_found(seed, ways):
     """All 16 corners of ±20 %, each with its own cheapest zones."""
@@ -132,3 +134,10 @@ def test_a_zone_keeps_its_step_just_within_the_range_of_its_price(seed):
                 cheapest = zones[np.argmin(rest + (factor - 1) * made[:, at])]
                 assert cheapest[at] == optimum.zones[at]
     assert narrow > 8
+
+
+def test_a_choice_that_is_not_proven_has_no_ranges():
+    choice = graded(random_problem(np.random.default_rng(0)))
+    optimum = choice.solve()
+    with pytest.raises(SolveError, match="not proven"):
+        graded_price_ranges(choice, replace(optimum, bound=0.99 * optimum.cost))

@@ -68,6 +68,7 @@ def test_a_drawing_whose_own_units_have_no_answer_is_said():
         ta.Study(own.model, wide, limits=own.limits, effort=EFFORT, name="wide").allocate()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [SolveError, InputError])
 def test_what_was_answered_before_a_fault_is_kept(tmp_path, monkeypatch, kind):
     def fails(*_):

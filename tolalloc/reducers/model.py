@@ -373,10 +373,10 @@ class ReducerModel(Model):
     @property
     def with_assumed(self) -> ReducerModel:
         """The model with its bearings' stiffnesses among what is uncertain, by no amount unless identified."""
-        if self.identified:
-            return self
         own = {name: getattr(self.reducer.stiffness, name) for name in family_of(self.reducer).identified}
         values = {name: value for name, value in own.items() if np.isfinite(value)}
+        if self.identified or not values:
+            return self
         assumed = IdentifiedStiffness(
             source=self.reducer.name, values=values, standard_uncertainty=dict.fromkeys(values, 0.0)
         )

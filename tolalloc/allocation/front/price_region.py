@@ -22,6 +22,8 @@ SAME = 0.1
 """Relative difference up to which two zones are called the same; neighbours of a ladder differ by a quarter [-]."""
 _SAME_PRICE = 1e-9
 """Relative difference of prices that ends the search for one [-]."""
+_PROVEN = 1e-6
+"""Gap of a choice that counts as proven [-]."""
 _EXCHANGES = 8
 """Largest number of exchanges of zones and their worst prices [-]."""
 _HELD = 1e-6
@@ -124,7 +126,7 @@ def graded_price_ranges(problem: DiscreteProblem, optimum: DiscreteSolution) -> 
     Raises
     ------
     SolveError
-        The cheapest of other choices was not proven.
+        A choice was not proven to be the cheapest within its nodes.
 
     Notes
     -----
@@ -153,6 +155,7 @@ def graded_price_ranges(problem: DiscreteProblem, optimum: DiscreteSolution) -> 
     >>> round(found.low, 6), round(found.high, 6)
     (0.333333, 3.0)
     """
+    _require_proven(optimum)
     return tuple(
         PriceRange(
             low=_break_even(problem, optimum, at, coarser=False),
@@ -160,6 +163,11 @@ def graded_price_ranges(problem: DiscreteProblem, optimum: DiscreteSolution) -> 
         )
         for at in range(len(optimum.options))
     )
+
+
+def _require_proven(found: DiscreteSolution) -> None:
+    if found.gap > _PROVEN:
+        raise SolveError("The cheapest of other steps was not proven within the nodes allowed.")
 
 
 def _break_even(problem: DiscreteProblem, optimum: DiscreteSolution, at: int, *, coarser: bool) -> float:
@@ -177,6 +185,7 @@ def _break_even(problem: DiscreteProblem, optimum: DiscreteSolution, at: int, *,
         found = problem.with_options(at, priced).solve() if priced else None
         if found is None:
             return never
+        _require_proven(found)
         rival = rivals[priced.index(found.options[at])]
         saved = made(own) - made(rival)
         if saved == 0 or (saved > 0) != coarser:

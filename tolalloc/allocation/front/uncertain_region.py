@@ -13,7 +13,7 @@ from tolalloc.allocation.front.price_region import SAME
 from tolalloc.allocation.search import process_choice
 from tolalloc.allocation.search.convex_program import ConvexProgram
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
-from tolalloc.allocation.space.problem import Stack
+from tolalloc.allocation.space.problem import Solution, Stack
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier
 from tolalloc.exceptions import SolveError
 from tolalloc.models.model import Model
@@ -62,7 +62,8 @@ class UncertainRange:
     """Between which changes of one uncertain column, all others as assumed, the answer holds."""
 
     column: str  # The column
-    tried: float  # Largest change either way, at which it was looked at: ln of a factor [-]
+    # Smallest and largest change at which it was looked at, 0 where too many units have no answer: ln of a factor [-]
+    tried: tuple[float, float]
     same: tuple[float, float]  # Changes between which every zone stays within `SAME` [-]
     first: tuple[str, str]  # The zone that leaves first below and above, empty where none does within what was tried
     kept: tuple[float, float]  # Changes between which the chosen design keeps every requirement [-]
@@ -75,7 +76,7 @@ class UncertainRange:
     @property
     def breaks_a_limit(self) -> bool:
         """Whether the chosen design no longer keeps a requirement within what was tried."""
-        return self.kept != (-self.tried, self.tried)
+        return self.kept != self.tried
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -269,7 +270,7 @@ class _Path:
     def place(self, end: _Moved) -> tuple[float, str]:
         """Return the share of the way at which the first zone leaves, and its name; one and nothing where none does."""
         inside, outside = 0.0, 0.0
-        for share in _SHARES:
+        for share in _SHARES if np.isfinite(end.rises).all() else ():
             if self.beyond(end, share) > 0:
                 outside = share
                 break
@@ -304,14 +305,15 @@ def _between(here: Stack, there: Stack, share: float) -> Stack:
 
 def _range(path: _Path, column: str, span: float, ends: tuple[_Moved, _Moved]) -> UncertainRange:
     """Return the range of one column between the ends of its span."""
+    tried = tuple(span * np.isfinite(end.rises).all() for end in ends)
     (low, first_low), (high, first_high) = (path.place(end) for end in ends)
     kept = [_kept_share(path.allocation, end) for end in ends]
     return UncertainRange(
         column=column,
-        tried=span,
-        same=(-span * low, span * high),
+        tried=(-tried[0], tried[1]),
+        same=(-tried[0] * low, tried[1] * high),
         first=(first_low, first_high),
-        kept=(-span * kept[0], span * kept[1]),
+        kept=(-tried[0] * kept[0], tried[1] * kept[1]),
     )
 
 
@@ -357,9 +359,9 @@ def _variant(verifier: Verifier, allocation: ZoneAllocation, moved: _Moved, name
     """Return the answer of a changed model."""
     named = f"{name}, least favourable within {COVERED:g} standard uncertainties"
     problem, optimum = verifier.space.problem(moved.stacks), allocation.inside
-    if not np.isfinite(moved.rises).all():
+    found = process_choice.allocate(problem) if np.isfinite(moved.rises).all() else None
+    if not isinstance(found, Solution):  # no units answer, or no zones keep the limits
         return Variant(name=named, scales=np.full(optimum.zones.size, np.nan), cost=np.nan, regret=np.nan, kept=False)
-    found = process_choice.allocate(problem)
     cost = problem.cost(found.zones, found.processes) + allocation.locked_cost
     kept = _kept_share(allocation, moved) == 1.0
     regret = (optimum.cost + allocation.locked_cost) / cost - 1 if kept else np.nan

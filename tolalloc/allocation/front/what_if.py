@@ -23,6 +23,7 @@ from tolalloc.allocation.search.zone_allocation import Programs, ZoneAllocation
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.problem import AllocationProblem, Solution
 from tolalloc.allocation.verify.verification import Verifier
+from tolalloc.exceptions import SolveError
 from tolalloc.models.model import Evaluation, Model
 
 
@@ -248,7 +249,8 @@ class Robustness:
     groups: tuple[str, ...]  # Names of the groups
     optimum: Float[np.ndarray, " group"]  # The undisturbed answer of the same local models [-]
     prices: tuple[PriceRange, ...]  # Of every group, while its zone stays within `SAME` of the optimum
-    graded: tuple[PriceRange, ...]  # Of every group, while its zone keeps its step of the ladder; none without ladders
+    # Of every group, while its zone keeps its step of the ladder; none without ladders or a proof
+    graded: tuple[PriceRange, ...]
     worst: WorstPrices  # Of the box in which every cost changes by `COST_CHANGE`
     at_worst: Variant  # The answer at these prices
     uncertain: UncertainRegion | None  # Of what is uncertain of the model; none where nothing is
@@ -315,7 +317,7 @@ def robustness(
         groups=verifier.space.groups,
         optimum=optimum.zones,
         prices=price_ranges(problem, optimum),
-        graded=graded_price_ranges(graded.problem, graded.solution) if graded and graded.chosen.met else (),
+        graded=_of_steps(graded) if graded and graded.chosen.met else (),
         worst=worst,
         at_worst=Variant(
             name="worst prices found", scales=worst.cheapest.zones, cost=cost, regret=worst.lost / cost, kept=True
@@ -323,6 +325,14 @@ def robustness(
         uncertain=uncertain_region(verifier, allocation),
         second_best=_second_best(problem, optimum, locked),
     )
+
+
+def _of_steps(graded: GradedAllocation) -> tuple[PriceRange, ...]:
+    """Return the ranges of prices on ladders, none where a choice is not proven: those would claim too much."""
+    try:
+        return graded_price_ranges(graded.problem, graded.solution)
+    except SolveError:
+        return ()
 
 
 def _second_best(problem: AllocationProblem, optimum: Solution, locked: float) -> Variant | None:

@@ -250,17 +250,8 @@ class GradedAllocation:
     tried: tuple[VerifiedDesign, ...]  # All verified designs, the free one in this space first
     labels: tuple[str, ...]  # Name of the zone of every group on the drawing
     problem: DiscreteProblem  # Choices that the chosen design's local models let keep the limits; without locked zones
+    solution: DiscreteSolution  # The cheapest of these
     least: float  # Lower bound on the cost of every such choice near by, the errors of the units counted [cost units]
-
-    @cached_property
-    def solution(self) -> DiscreteSolution:
-        """Cheapest of these choices."""
-        found = self.problem.solve()
-        if found is None:
-            raise SolveError(
-                f"{self.chosen.name}: the choice among ladders does not find the design it was built around."
-            )
-        return found
 
     @property
     def bound(self) -> float:
@@ -281,12 +272,14 @@ class GradedAllocation:
     ) -> GradedAllocation:
         """Return the allocation with another choice, which was found beside those of the search."""
         grid, every = _Grid(self.space, drawn, chosen.design), (*self.tried, *tried)
+        problem = _problem(grid, chosen, every)
         return replace(
             self,
             chosen=chosen,
             tried=every,
             labels=_labels(grid, chosen),
-            problem=_problem(grid, chosen, every),
+            problem=problem,
+            solution=_proof(problem, chosen),
             least=_least_cost(grid, chosen),
         )
 
@@ -469,12 +462,14 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
             tried.append(verified)
         missed, kept = (missed, margin) if verified.met else (margin, kept)
     chosen = cheapest_met(tuple(tried[1:]))
+    problem = _problem(grid, chosen, tuple(tried))
     return GradedAllocation(
         space=space,
         chosen=chosen,
         tried=tuple(tried),
         labels=_labels(grid, chosen),
-        problem=_problem(grid, chosen, tuple(tried)),
+        problem=problem,
+        solution=_proof(problem, chosen),
         least=_least_cost(grid, chosen),
     )
 
@@ -542,3 +537,11 @@ def _problem(grid: _Grid, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, .
         for stack in kept_stacks(chosen, tried, margin=0.0)
     )
     return grid.problem(stacks)
+
+
+def _proof(problem: DiscreteProblem, chosen: VerifiedDesign) -> DiscreteSolution:
+    """Return the cheapest of these choices."""
+    found = problem.solve()
+    if found is None:
+        raise SolveError(f"{chosen.name}: the choice among ladders does not find the design that it was built around.")
+    return found

@@ -457,16 +457,19 @@ def _settled(result: AllocationResult) -> tuple[str, ...]:
         steady = [group for group, one in zip(found.groups, found.graded, strict=True) if one.holds_change]
         gaps = {"same": len(steady), "count": len(found.groups), "change": COST_CHANGE}
         said.append(_say("graded_prices", names=f": {', '.join(steady)}" if steady else "", **gaps))
-    return (*said, *(_region(found.uncertain) if found.uncertain else ()))
+    return (*said, *(_region(found.uncertain) if found.uncertain and result.free.chosen.met else ()))
 
 
 def _region(found: UncertainRegion) -> Iterator[str]:
     """Yield within which changes of what is uncertain of the model the answer holds."""
     moving = [own for own in found.ranges if own.moves_a_zone]
     breaking = [own for own in found.ranges if own.breaks_a_limit]
-    if not moving and not breaking:
-        tried = float(np.exp(min(own.tried for own in found.ranges)))
-        yield _say("region_holds", what=found.name, low=1 / tried, high=tried, same=SAME)
+    low, high = (np.array([own.tried[side] for own in found.ranges]) for side in (0, 1))
+    unanswered = [own.column for own in found.ranges if 0.0 in own.tried]
+    if unanswered:
+        yield _say("region_unanswered", columns=", ".join(unanswered))
+    elif not moving and not breaking:
+        yield _say("region_holds", what=found.name, low=np.exp(low.max()), high=np.exp(high.min()), same=SAME)
     if moving:
         own = min(moving, key=lambda one: one.same[1] - one.same[0])
         below, above = own.first

@@ -331,7 +331,7 @@ def region_frame(found: UncertainRegion) -> pd.DataFrame:
     """Return within which factors of what is uncertain, each alone, free zones stay the same and keep all limits."""
     rows = []
     for own in found.ranges:
-        tried, same, kept = (np.exp(ends) for ends in ((-own.tried, own.tried), own.same, own.kept))
+        tried, same, kept = (np.exp(ends) for ends in (own.tried, own.same, own.kept))
         rows.append(
             {
                 "uncertain": own.column,
