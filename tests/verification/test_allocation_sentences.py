@@ -307,7 +307,9 @@ def test_the_region_of_stiffness_is_said_as_factors(results):
     told = told_with(results, replace(region(), ranges=(unanswered,)))
     assert says(told.sentences, "allocation.region_unanswered", columns="stiffness.a")
     assert not says(told.sentences, "allocation.region_holds")
-    frame = tables.region_frame(region(same=(-0.3, 0.4), first=("bores", "")))
+    frame = tables.region_frame(region(same=(-0.3, 0.4), first=("bores", "")), met=True)
+    missed = tables.region_frame(region(), met=False)
+    assert "zones same to times [-]" in missed and "limits kept to times [-]" not in missed
     assert frame.loc[0, "first zone to change above"] == "none"
     assert frame.loc[0, "zones same to times [-]"] == pytest.approx(np.exp(0.4))
 

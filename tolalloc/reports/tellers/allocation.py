@@ -213,7 +213,11 @@ class AllocationTeller(Teller[AllocationResult]):
                     tables=(
                         ("robustness", moved),
                         ("variants", tables.variants_frame(variants, unit)),
-                        *(((f"{region.name} region", tables.region_frame(region)),) if region else ()),
+                        *(
+                            ((f"{region.name} region", tables.region_frame(region, result.free.chosen.met)),)
+                            if region
+                            else ()
+                        ),
                     ),
                 )
             )

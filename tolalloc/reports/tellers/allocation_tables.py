@@ -327,8 +327,11 @@ def variants_frame(found: Robustness, cost_unit: str) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def region_frame(found: UncertainRegion) -> pd.DataFrame:
-    """Return within which factors of what is uncertain, each alone, free zones stay the same and keep all limits."""
+def region_frame(found: UncertainRegion, met: bool) -> pd.DataFrame:
+    """Return within which factors of what is uncertain, each alone, free zones stay the same and keep all limits.
+
+    Of zones that miss a limit as it is nothing is said of limits.
+    """
     rows = []
     for own in found.ranges:
         tried, same, kept = (np.exp(ends) for ends in (own.tried, own.same, own.kept))
@@ -341,8 +344,7 @@ def region_frame(found: UncertainRegion) -> pd.DataFrame:
                 "zones same to times [-]": same[1],
                 "first zone to change below": own.first[0] or "none",
                 "first zone to change above": own.first[1] or "none",
-                "limits kept from times [-]": kept[0],
-                "limits kept to times [-]": kept[1],
+                **({"limits kept from times [-]": kept[0], "limits kept to times [-]": kept[1]} if met else {}),
             }
         )
     return pd.DataFrame(rows)
