@@ -28,7 +28,8 @@ from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import TolallocError
 from tolalloc.models.model import Evaluation
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reports.wording import number
+from tolalloc.reports.document import Section
+from tolalloc.reports.wording import Spoken, number
 from tolalloc.study.prepared import Prepared
 
 
@@ -117,14 +118,36 @@ def says(prose: str | Iterable[str], sentence: str, **gaps: object) -> bool:
     gaps
         What fills some of its gaps; the others may hold anything.
     """
-    teller, key = sentence.split(".")
-    text = files("tolalloc.reports").joinpath("sentences", f"{teller}.toml").read_text(encoding="utf-8")
     pattern = ""
-    for words, gap, form, _ in Formatter().parse(" ".join(tomllib.loads(text)[key].split())):
+    for words, gap, form, _ in Formatter().parse(_with_gaps(sentence)):
         pattern += re.escape(words)
         if gap is not None:
             pattern += re.escape(number(gaps[gap], form or "")) if gap in gaps else ".*"
     return any(re.search(pattern, own) for own in ([prose] if isinstance(prose, str) else prose))
+
+
+def wording(sentence: str, **gaps: object) -> str:
+    """Return a sentence of a teller, such as ``simulation.ringing``, with all of its gaps filled."""
+    return Spoken().format(_with_gaps(sentence), **gaps)
+
+
+def _with_gaps(sentence: str) -> str:
+    """Return the words of a sentence of a teller, its gaps open."""
+    teller, key = sentence.split(".")
+    text = files("tolalloc.reports").joinpath("sentences", f"{teller}.toml").read_text(encoding="utf-8")
+    return " ".join(tomllib.loads(text)[key].split())
+
+
+def telling(sentences: Iterable[str], sentence: str, **gaps: object) -> str:
+    """Return the one of several sentences that says a sentence of a teller."""
+    (found,) = (own for own in sentences if says(own, sentence, **gaps))
+    return found
+
+
+def headed(sections: Iterable[Section], heading: str, **gaps: object) -> Section:
+    """Return the one section whose heading is a sentence of a teller."""
+    (found,) = (own for own in sections if says(own.heading, heading, **gaps))
+    return found
 
 
 FIRST_STAGE = ("sun.", "planet", "mesh")

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.builders import says
+from tests.builders import headed, says, telling, wording
 from tolalloc.assembly.adjustment import AssemblyRequest, AssemblyResult, assemble
 from tolalloc.assembly.files import load_plan
 from tolalloc.assembly.gains import assembled, tuned_gains
@@ -188,14 +188,12 @@ def test_what_is_to_be_expected_is_said_with_the_noise(expected):
     sweep, at = expected.sweep, tables.at_state_weight(expected)
     before, after, floor = (value / ARCSECOND for value in (sweep.total[0], sweep.total[at], sweep.noise_floor))
     sentence = answer(expected).sentences[0]
-    assert f"leave {before:.2f}″ rms of all final angles unadjusted, {after:.2f}″ adjusted" in sentence
-    assert f"however large Q, this plan leaves {floor:.2f}″" in sentence
+    assert says(sentence, "assembly.expected", before=before, after=after, precision=5.0, floor=floor)
     assert "noise" not in sentence
 
 
 def text(results: AssemblyResult, heading: str) -> str:
-    sections = {section.heading: section.paragraphs for section in answer(results).document.sections}
-    return " ".join(sections[heading])
+    return " ".join(headed(answer(results).document.sections, f"assembly.{heading}_heading").paragraphs)
 
 
 def test_where_another_unit_of_precision_buys_little_is_said(expected):
@@ -211,29 +209,33 @@ def test_a_sweep_that_does_not_reach_diminishing_returns_says_so(expected):
 @pytest.mark.slow
 def test_the_line_load_is_said_with_perfect_parts(measured):
     sentences = said(replace(measured, transmission=effect(1)))
-    assert "Largest line load at rated torque: 400 → 200 N/mm (perfect parts: 0.8 N/mm)." in sentences
-    test, rated = (f"1 → {value} arcsec (perfect parts: 0.8 arcsec)" for value in (3, 2))
+    change = wording("assembly.change", before=400.0, after=200.0, unit="N/mm", perfect=0.8)
+    assert says(sentences, "assembly.line_load", change=change)
+    test, rated = (
+        wording("assembly.change", before=1.0, after=value, unit="arcsec", perfect=0.8) for value in (3.0, 2.0)
+    )
     assert says(sentences, "assembly.transmission", torque=-1.0, test=test, rated=rated)
 
 
 def test_random_assemblies_are_counted(expected):
     sentences = said(replace(expected, transmission=effect(10)))
-    assert "medians of 10 random assemblies: 400 → 200 N/mm (perfect parts: 0.8 N/mm, smaller in 10 of 10)" in sentences
-    assert "1 → 3 arcsec (perfect parts: 0.8 arcsec, smaller in 1 of 10)" in sentences
+    of_all = {"perfect": 0.8, "many": 10}
+    loads = wording("assembly.change_of_many", before=400.0, after=200.0, unit="N/mm", smaller=10, **of_all)
+    assert says(sentences, "assembly.line_load_of_many", many=10, change=loads)
+    assert says(sentences, "assembly.change_of_many", before=1.0, after=3.0, unit="arcsec", smaller=1, **of_all)
 
 
 def test_costs_are_said_with_and_without_adjusting(expected):
     tolerances = expected.tolerances
-    assert (
-        f"{tolerances.adjusted.total:.2f} cost units with adjusting at Q = 5, "
-        f"{tolerances.unadjusted.total:.2f} without adjusting"
-    ) in said(expected)
+    without = wording("assembly.cost_unadjusted", total=tolerances.unadjusted.total)
+    gaps = {"total": tolerances.adjusted.total, "precision": 5.0, "without": without}
+    assert says(said(expected), "assembly.cost_adjusted", **gaps)
 
 
 def test_limits_out_of_reach_without_adjusting_are_said_and_warned_of(expected):
     without = replace(expected, tolerances=replace(expected.tolerances, unadjusted="pump: too wide."))
-    assert "without adjusting no tolerances keep the limits" in said(without)
-    assert "Without adjusting: pump: too wide." in warnings(without)
+    assert says(said(without), "assembly.no_tolerances_unadjusted")
+    assert wording("assembly.warn_unadjusted", why="pump: too wide.") in warnings(without)
     assert "unadjusted, ± [arcsec]" not in tolerance_tables.tolerance_table(without.plan, without.tolerances)
 
 
@@ -242,7 +244,7 @@ def test_the_gain_of_a_tuned_filter_is_said_with_the_reach_of_its_proof(expected
     saving = 1 - tolerances.retuned.best.total / tolerances.adjusted.total
     assert saving > 0
     assert says(said(expected), "assembly.cost_retuned", total=tolerances.retuned.best.total, less=saving)
-    assert any("that no other filter allows cheaper ones is not proven" in warning for warning in warnings(expected))
+    assert says(warnings(expected), "assembly.warn_retuned")
 
 
 def test_the_share_of_random_assemblies_within_all_limits_is_said(expected):
@@ -256,16 +258,16 @@ def test_the_share_of_random_assemblies_within_all_limits_is_said(expected):
 @pytest.mark.slow
 def test_the_tolerances_of_the_tuned_filter_are_verified_where_effort_has_no_price(plan):
     free = run(replace(plan, requirements=replace(plan.requirements, effort_price=0.0)))
-    assert "random assemblies with the tolerances of the tuned filter at Q = 5, " in said(free)
+    assert says(said(free), "assembly.verified", which=wording("assembly.of_retuned", precision=5.0))
     assert "verified, re-tuned, 3σ [arcsec]" in tolerance_tables.limit_table(free.plan, free.tolerances)
-    assert "Verified is “re-tuned”." in text(free, "Angular tolerances")
+    assert says(text(free, "tolerances"), "assembly.section_verified", which="re-tuned")
 
 
 def test_a_filter_that_gains_nothing_when_tuned_has_no_row_and_no_column(expected):
     first = replace(expected.tolerances.retuned, allocations=(expected.tolerances.adjusted,))
     same = replace(expected, tolerances=replace(expected.tolerances, retuned=first, verified=first.best))
-    assert "Tuning the filter to the allocated tolerances gains nothing here." in said(same)
-    assert "random assemblies with the tolerances for Q = 5, " in said(same)
+    assert says(said(same), "assembly.nothing_retuned")
+    assert says(said(same), "assembly.verified", which=wording("assembly.of_adjusted", precision=5.0))
     document = answer(same).document
     assert "re-tuned" not in " ".join([*document.warnings, *document.answer])
     for _, frame in document.sections[-1].tables:
@@ -275,7 +277,7 @@ def test_a_filter_that_gains_nothing_when_tuned_has_no_row_and_no_column(expecte
 
 def test_steps_that_turn_parts_that_are_not_there_are_warned_of(expected, plan):
     everything = steps_in_order(plan.chain, "all", "current", Efforts())
-    warned = "Turns of parts that are mounted later cannot be made: steps 1, 2."
+    warned = wording("assembly.warn_not_there", steps="1, 2")
     assert warned in warnings(run(replace(plan, steps=everything, requirements=None)))
     assert warned not in warnings(expected)
 
@@ -286,43 +288,41 @@ def test_the_best_precision_is_said_only_where_effort_has_a_price(expected, plan
     assert f"Q = {best.gains.state_weight:.4g}" in said(expected)
     assert "best precision" in set(tolerance_tables.certificate_table(plan, expected.tolerances)["allocation"])
     free = run(replace(plan, requirements=replace(plan.requirements, effort_price=0.0)))
-    assert "With a price for turning" not in said(free)
+    assert not says(said(free), "assembly.cost_best")
     assert "best precision" not in set(tolerance_tables.certificate_table(free.plan, free.tolerances)["allocation"])
 
 
 @pytest.mark.slow
 def test_parts_beyond_their_tolerance_are_named_and_no_others(measured):
-    assert "Beyond their stated tolerance: bracket about x (+70.00″, ±60″)." in warnings(measured)
+    beyond = wording("assembly.beyond", part="bracket", axis="x", error=70.0, tolerance=60.0)
+    assert wording("assembly.warn_beyond", parts=beyond) in warnings(measured)
 
 
 @pytest.mark.slow
 def test_a_part_at_its_tolerance_is_not_beyond_it(plan):
-    assert not any("Beyond" in warning for warning in warnings(run(plan, plan.tolerances)))
+    assert not says(warnings(run(plan, plan.tolerances)), "assembly.warn_beyond")
 
 
 def test_missed_limits_are_named(expected):
     tight = replace(expected.plan.requirements, tilt_limit=ARCSECOND * np.array([1.0, np.inf, np.inf]))
-    missed = warnings(replace(expected, plan=replace(expected.plan, requirements=tight)))
-    assert any("miss limits: tilt of bracket (" in warning and "limit 1″" in warning for warning in missed)
-    assert not any("miss limits" in warning for warning in warnings(expected))
+    warned = warnings(replace(expected, plan=replace(expected.plan, requirements=tight)))
+    missed = telling(warned, "assembly.warn_missed")
+    assert says(missed, "assembly.limited", angle="tilt", part="bracket", limit=1.0)
+    assert not says(warnings(expected), "assembly.warn_missed")
 
 
 @pytest.mark.slow
 def test_a_characteristic_that_rises_is_named(measured):
     assert not larger(measured)
     swapped = replace(measured.measured, unadjusted=measured.measured.adjusted / 2)
-    assert any(
-        warning.startswith("Adjusting leaves larger than unadjusted: tilt of bracket (")
-        for warning in warnings(replace(measured, measured=swapped))
-    )
+    warned = warnings(replace(measured, measured=swapped))
+    assert "tilt of bracket (" in telling(warned, "assembly.warn_larger")
 
 
 def test_assemblies_without_equilibrium_are_counted(expected):
     made = effect(10)
     lost = replace(made, good=np.arange(10) > 0)
-    assert "Assemblies without equilibrium, left out of the transmission: 1." in warnings(
-        replace(expected, transmission=lost)
-    )
+    assert wording("assembly.warn_failed", failed=1) in warnings(replace(expected, transmission=lost))
     assert transmission.answers(lost, transmission.LINE_LOAD).shape == (2, 9)
 
 
@@ -399,29 +399,31 @@ def test_a_limit_is_in_doubt_where_what_the_turns_miss_reaches_beyond_it(measure
         asked = limited(known, float(limit))
         row = characteristic_table(asked).iloc[0]
         assert (row["OK"], row["turns miss, 3σ [arcsec]"]) == (word, 6.0)
-        assert any(f"tilt of bracket ({after:.2f} ± 6.00″" in each for each in warnings(asked)) == (word != "yes")
-        assert any("reach beyond the limit" in each for each in warnings(asked)) == (word == "in doubt")
+        told = {"angle": "tilt", "part": "bracket", "after": after, "missed": 6.0}
+        assert says(warnings(asked), "assembly.limited_measured", **told) == (word != "yes")
+        assert says(warnings(asked), "assembly.warn_doubted") == (word == "in doubt")
 
 
 @pytest.mark.slow
 def test_measured_parts_that_miss_limits_are_told_what_keeps_them(measured):
     asked = limited(measured, 0.01)
     keeping = replace(asked, measured=replace(asked.measured, keeping=446.68))
-    assert any("Turned as listed for Q = 446.7, they keep them all." in each for each in warnings(keeping))
+    assert says(warnings(keeping), "assembly.keeping", precision=446.68)
     never = replace(asked, measured=replace(asked.measured, keeping=None))
-    assert any("No state weight that was tried keeps them all." in each for each in warnings(never))
+    assert says(warnings(never), "assembly.never_keeping")
     assert summary(keeping)["measured"]["smallest precision tried that keeps all limits [-]"] == 446.68
 
 
 @pytest.mark.slow
 def test_an_output_that_rises_is_warned_of_with_a_reason(measured):
     (warning,) = [each for each in warnings(replace(measured, transmission=effect(1))) if "N·m" in each]
-    assert warning.startswith(
-        "Adjusting leaves larger than unadjusted: peak-to-peak transmission error at -1 N·m (1 → 3 arcsec), "
-        "peak-to-peak transmission error, rated torque (1 → 2 arcsec). Discs that are turned against each other"
+    risen = (
+        "peak-to-peak transmission error at -1 N·m (1 → 3 arcsec)",
+        "peak-to-peak transmission error, rated torque (1 → 2 arcsec)",
     )
-    assert "one carries alone" in warning and "wedges between the pins" in warning
-    assert "one carries alone" in text(replace(measured, transmission=effect(1)), "Transmission")
+    why = wording("assembly.why_larger")
+    assert warning == wording("assembly.warn_risen", outputs=", ".join(risen), why=why)
+    assert why in text(replace(measured, transmission=effect(1)), "transmission")
 
 
 @pytest.mark.slow
@@ -435,53 +437,55 @@ def test_an_output_that_falls_is_not_warned_of(measured):
 def test_turning_fewer_parts_is_advised_only_where_it_leaves_less(expected):
     total = expected.sweep.total[tables.at_state_weight(expected)]
     better, worse = (warnings(replace(expected, fewer=float(factor * total))) for factor in (0.5, 1.5))
-    shown = f"leaves {total / 2 / ARCSECOND:.2f}″ rms instead of {total / ARCSECOND:.2f}″: every further adjustment "
-    assert f"Turning at every step only the part just mounted {shown}misses by 1″ itself." in better
-    assert not any("just mounted" in warning for warning in worse + warnings(replace(expected, fewer=None)))
+    gaps = {"fewer": total / 2 / ARCSECOND, "total": total / ARCSECOND, "noise": 1.0}
+    assert wording("assembly.warn_fewer_noise", **gaps) in better
+    for key in ("assembly.warn_fewer", "assembly.warn_fewer_noise"):
+        assert not says(worse + warnings(replace(expected, fewer=None)), key)
 
 
 def test_what_a_larger_precision_buys_is_said_of_the_sweep_itself(expected):
-    falls, heading = "a larger Q makes all expected angles together smaller", "State weight against effort"
+    def told(results: AssemblyResult, key: str, **gaps: object) -> bool:
+        return says(text(results, "sweep"), f"assembly.{key}", **gaps)
+
     sweep = replace(
         expected.sweep,
         total=np.linspace(3, 2, expected.sweep.total.size) * ARCSECOND,
         next_unit=np.linspace(0.5, 0.001, expected.sweep.total.size),
     )
     falling = replace(expected, sweep=sweep)
-    assert falls in text(falling, heading) and "each unit of Q buys less" in text(falling, heading)
+    assert told(falling, "bought") and told(falling, "each_less")
     uneven = replace(falling, sweep=replace(sweep, next_unit=sweep.next_unit[::-1]))
-    assert falls in text(uneven, heading) and "each unit of Q buys less" not in text(uneven, heading)
+    assert told(uneven, "bought") and not told(uneven, "each_less")
     total = sweep.total.copy()
     total[3] = ARCSECOND
     rising = replace(expected, sweep=replace(sweep, total=total))
-    assert falls not in text(rising, heading)
-    assert f"Q = {sweep.state_weights[3]:g} leaves least of all angles together, 1.00″ rms" in text(rising, heading)
-    assert "At Q = 5, none of 6 tilts and rotations are larger than unadjusted." in text(expected, heading)
+    assert not told(rising, "bought")
+    assert told(rising, "bought_least", precision=sweep.state_weights[3], least=1.0)
+    assert told(expected, "section_sweep", precision=5.0, rose="none", all=6, are="are")
 
 
 def test_a_unit_of_precision_that_adds_is_not_said_to_take_off(expected):
     sweep = replace(expected.sweep, next_unit=np.full_like(expected.sweep.next_unit, -0.2))
     added = said(replace(expected, sweep=sweep))
     assert says(added, "assembly.diminished", found=0.0, little=0.01)
-    assert "and from Q = 0 on it increases them." in added
-    assert "increases them" not in said(replace(expected, sweep=replace(sweep, next_unit=-sweep.next_unit * 0.01)))
+    assert says(added, "assembly.adds", precision=0.0)
+    slowly = replace(sweep, next_unit=-sweep.next_unit * 0.01)
+    assert not says(said(replace(expected, sweep=slowly)), "assembly.adds")
 
 
 @pytest.mark.slow
 def test_of_weighted_angles_only_the_weighted_norm_is_said_to_fall(plan):
     errors = ARCSECOND * np.array([[50.0, 0, 10], [0, 50, 0], [5, 25, -12]])
     weighted = run(replace(plan, weights=np.array([1.0, 2.0, 1.0])), errors)
-    assert "The weighted norm of all angles falls, a single angle need not" in " ".join(
-        answer(weighted).document.sections[0].paragraphs
-    )
+    paragraphs = answer(weighted).document.sections[0].paragraphs
+    assert says(paragraphs, "assembly.section_larger", norm="weighted norm")
 
 
 @pytest.mark.slow
 def test_turns_of_measured_parts_come_from_the_file(measured, expected):
     assert "measure" not in tables.step_table(measured) and "measure" in tables.step_table(expected)
-    heading = "How errors build up and are adjusted"
-    assert "A part is mounted, then the parts of that step are turned" in text(measured, heading)
-    assert "A part is mounted, then measured, then the parts" in text(expected, heading)
+    for results, read in ((measured, ""), (expected, "then measured, ")):
+        assert says(text(results, "steps"), "assembly.section_steps", measured=read)
 
 
 def test_the_summary_holds_all_that_was_asked(expected):
@@ -543,10 +547,10 @@ def test_without_limits_nothing_is_said_of_tolerances(expected):
     asked = replace(expected.plan.requirements, tilt_limit=free, rotation_limit=free)
     unlimited = replace(expected, plan=replace(expected.plan, requirements=asked))
     document = answer(unlimited).document
-    assert "Angular tolerances" not in [section.heading for section in document.sections]
+    assert not says((section.heading for section in document.sections), "assembly.tolerances_heading")
     assert "cost units" not in " ".join(document.answer)
     assert document.summary["tolerances"] is None
-    assert "No limits are stated, so no angular tolerances are given." in document.warnings
+    assert wording("assembly.warn_unlimited") in document.warnings
     assert "OK" not in characteristic_table(unlimited)
 
 
@@ -554,8 +558,8 @@ def test_without_limits_nothing_is_said_of_tolerances(expected):
 def test_limits_that_no_tolerances_keep_leave_everything_else(plan, errors):
     tight = replace(plan.requirements, tilt_limit=ARCSECOND * np.array([0.2, np.inf, np.inf]))
     document = answer(run(replace(plan, requirements=tight), errors)).document
-    assert any(warning.startswith("No angular tolerances are given. pump: ") for warning in document.warnings)
-    assert "Angular tolerances" not in [section.heading for section in document.sections]
+    assert says(document.warnings, "assembly.warn_unreachable", why="pump: ")
+    assert not says((section.heading for section in document.sections), "assembly.tolerances_heading")
     json.dumps(document.summary, allow_nan=False)
 
 
@@ -594,18 +598,14 @@ def test_only_pins_that_carry_are_shown(measured):
 
 def test_a_report_without_reducer_and_limits_leaves_their_sections_out(plan):
     document = answer(run(replace(plan, requirements=None))).document
-    assert [section.heading for section in document.sections] == [
-        "How errors build up and are adjusted",
-        "State weight against effort",
-    ]
+    headings = [wording(f"assembly.{key}_heading") for key in ("steps", "sweep")]
+    assert [section.heading for section in document.sections] == headings
     assert "the base is rigid" in document.assumptions
 
 
 @pytest.mark.slow
 def test_what_is_assumed_of_parts_is_said_of_those_that_are_measured(measured, expected):
-    exactly = (
-        "all parts are measured before the first is mounted, exactly, and turned as listed, without measuring again"
-    )
+    exactly = wording("assembly.assume_measured")
     assert exactly in assumptions(measured)
     assert exactly not in assumptions(expected)
 
@@ -618,7 +618,7 @@ def test_a_single_angle_that_rises_is_counted(plan):
     found = results.measured
     rose = int((np.abs(found.adjusted) > np.abs(found.unadjusted)).sum())
     assert rose > 0
-    assert f"Larger adjusted than unadjusted: {rose} of 9, " in paragraphs
+    assert says(paragraphs, "assembly.section_larger", rose=rose, angles=9)
 
 
 @pytest.mark.slow
