@@ -1,7 +1,7 @@
 """What the commands of a golden case said and wrote: prose as one text, numbers as one record.
 
 ``python -m tests.golden.record NAME …`` makes golden files anew, all of them unless named; ``--check`` compares
-instead, to the last bit.
+instead, to the last digit that is kept.
 """
 
 from __future__ import annotations
@@ -9,12 +9,15 @@ from __future__ import annotations
 import csv
 import difflib
 import json
+import math
 import re
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+import zlib
+from collections.abc import Callable, Sequence
 from html.parser import HTMLParser
+from itertools import zip_longest
 from pathlib import Path
 
 import pandas as pd
@@ -39,8 +42,13 @@ _UNSTEADY = (
     (r"(computing time \[s\]) .*$", r"\1"),
 )
 """What no two runs or machines have in common, and what stands for it."""
+_NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 _TIMED = re.compile(r"seconds \[s\]|per second|speed over|computing time|time a set")
 """Headers of columns that hold how long something took."""
+FIRST, SPARSE, EVERY = 20, 1000, 200
+"""Rows of a long table that are kept, rows from which it is a time series, and which of its rows are kept then [-]."""
+WIDEST = 200
+"""Letters of a line of a golden file that holds more than one value [-]."""
 _BLOCKS = {"p", "h1", "h2", "h3", "li", "div", "section", "summary", "dt", "dd", "figcaption", "br"}
 
 
@@ -91,7 +99,7 @@ def recorded(case: Case, run: Run = tolalloc, look: Look = lambda *_: None) -> t
 def _recorded(case: Case, folder: Path, run: Run, look: Look) -> tuple[str, dict[str, object]]:
     for name, text in case.files.items():
         (folder / name).write_text(text, encoding="utf-8")
-    prose, numbers = "", dict[str, object]()
+    prose, numbers, seen = "", dict[str, object](), dict[bytes, str]()
     for at, typed in enumerate(case.commands, start=1):
         before = set(folder.rglob("*"))
         done = run(*(f"{folder}/{word[1:]}" if word.startswith("@") else word for word in typed.split()))
@@ -101,21 +109,31 @@ def _recorded(case: Case, folder: Path, run: Run, look: Look) -> tuple[str, dict
             name = f"{at} {path.relative_to(folder).as_posix()}"
             if "/.tolalloc-units" in str(path) or path.name == "manifest.json" or path.is_dir():
                 continue
-            if path.name == "report.html":
-                prose += f"--- {name}\n{prose_of(path)}\n"
-            elif path.suffix == ".json":
-                numbers[name] = json.loads(path.read_text(encoding="utf-8"))
-            elif path.suffix == ".csv":
-                numbers[name] = _rows(path)
-            elif path.suffix == ".xlsx":
-                sheets = pd.read_excel(path, sheet_name=None, header=None)
-                numbers[name] = {sheet: [*map(str, frame.shape)] for sheet, frame in sheets.items()}
-            elif path.suffix in (".toml", ".py", ".md"):
-                prose += f"--- {name}\n{path.read_text(encoding='utf-8')}\n"
+            if typed.startswith("new ") and case.name != "start":
+                continue  # what `new` makes is kept once
+            if path.suffix in (".json", ".csv", ".xlsx"):
+                same = name if path.suffix == ".xlsx" else seen.setdefault(path.read_bytes(), name)
+                numbers[name] = _numbers_of(path, case.wandering) if same == name else f"the same as {same}"
             else:
-                prose += f"--- {name}\n"
+                prose += f"--- {name}\n{_words_of(path)}"
     look(done, folder)
     return steady(prose, folder), json.loads(steady(json.dumps(numbers, ensure_ascii=False), folder))
+
+
+def _numbers_of(path: Path, wandering: str) -> object:
+    """Return what is kept of a table, a record or a workbook, of the last the size of each sheet."""
+    if path.suffix == ".json":
+        return abridged(json.loads(path.read_text(encoding="utf-8")), wandering)
+    if path.suffix == ".csv":
+        return abridged_table(_rows(path), wandering)
+    return {name: [*map(str, frame.shape)] for name, frame in pd.read_excel(path, sheet_name=None, header=None).items()}
+
+
+def _words_of(path: Path) -> str:
+    """Return the text of a page or of a file that people read, and nothing of others."""
+    if path.name == "report.html":
+        return f"{prose_of(path)}\n"
+    return f"{path.read_text(encoding='utf-8')}\n" if path.suffix in (".toml", ".py", ".md") else ""
 
 
 def _rows(path: Path) -> list[str]:
@@ -128,12 +146,81 @@ def _rows(path: Path) -> list[str]:
     return [",".join(row[at] for at in left) for row in rows]
 
 
+def abridged_table(lines: list[str], wandering: str) -> list[str]:
+    """Return a table's header and first rows with a digest of each column; of a time series every 200th row.
+
+    Rows that tell of a random search are in no digest.
+    """
+    if len(lines) > SPARSE:
+        return lines[::EVERY]
+    if len(lines) <= FIRST + 5:
+        return lines
+    rows = [line for line in lines[1:] if not re.search(wandering, _as_written(line))]
+    columns = zip_longest(*csv.reader([lines[0], *rows]), fillvalue="")
+    said = (f"{name}: {_digest(cells)}" for name, *cells in columns)
+    return [*lines[: FIRST + 1], f"all {len(lines) - 1} rows", *said]
+
+
+def abridged(content: object, wandering: str) -> object:
+    """Return the content of a JSON file, of each of its long lists the first items and a digest."""
+    if isinstance(content, dict):
+        return {key: abridged(value, wandering) for key, value in content.items()}
+    if isinstance(content, float):
+        return float(f"{content:.10g}")  # what follows is another processor's, and would change with each record
+    if not isinstance(content, list):
+        return content
+    if len(content) <= FIRST + 5:
+        return [abridged(item, wandering) for item in content]
+    items = [item for item in content if not re.search(wandering, _as_written(item))]
+    first = [abridged(item, wandering) for item in content[:FIRST]]
+    keys = list(items[0]) if items and all(isinstance(item, dict) for item in items) else []
+    cells = {f"{key}: ": [item.get(key) for item in items] for key in keys} or {"": items}
+    said = (f"{key}{_digest([json.dumps(cell) for cell in own])}" for key, own in cells.items())
+    return [*first, f"all {len(content)}", *said]
+
+
+def _as_written(item: object) -> str:
+    """Return an item of a list as a line of a golden file."""
+    return f"  {json.dumps(item, ensure_ascii=False)},"
+
+
+def _digest(cells: Sequence[str]) -> str:
+    """Return what the numbers and the words of some cells come to, so that any one of them, or their order, changes it.
+
+    Of the numbers these are the root mean square and, over it, the mean and the mean weighted by the place from −1 to
+    1; processors that agree on the numbers agree on them.
+    """
+    found = [float(number) for cell in cells for number in _NUMBER.findall(cell) if math.isfinite(float(number))]
+    words = zlib.crc32("|".join(_NUMBER.sub("#", cell) for cell in cells).encode())
+    scale = math.sqrt(sum(value**2 for value in found) / len(found)) if found else 0.0
+    if not scale:
+        return f"words x{words:08x}"
+    mean = sum(found) / len(found) / scale
+    moment = sum(value * (2 * at / len(found) - 1) for at, value in enumerate(found)) / len(found) / scale
+    return f"words x{words:08x}, size {scale:.6e}, mean {mean:.5f}, slope {moment:.5f}"
+
+
 def steady(text: str, folder: Path) -> str:
     """Return a text without what no two runs or machines have in common."""
     text = text.replace(str(folder), "@")
     for pattern, instead in _UNSTEADY:
         text = re.sub(pattern, instead, text, flags=re.MULTILINE)
     return text
+
+
+def as_text(content: object, indent: int = 0) -> str:
+    """Return the text of a golden file: what fits in a line stands in one."""
+    line = json.dumps(content, ensure_ascii=False)
+    if len(line) + indent <= WIDEST or not isinstance(content, dict | list):
+        return line
+    inner = indent + 1
+    if isinstance(content, list):
+        (first, last), items = "[]", [as_text(item, inner) for item in content]
+    else:
+        (first, last) = "{}"
+        items = [f"{json.dumps(key, ensure_ascii=False)}: {as_text(own, inner)}" for key, own in content.items()]
+    between = ",\n" + " " * inner
+    return f"{first}\n{' ' * inner}{between.join(items)}\n{' ' * indent}{last}"
 
 
 def kept(name: str) -> tuple[str, dict[str, object]]:
@@ -148,11 +235,9 @@ def main(words: list[str]) -> int:
     different = 0
     for name in names:
         prose, numbers = recorded(CASES[name])
-        text = json.dumps(numbers, ensure_ascii=False, indent=1) + "\n"
+        text = as_text(numbers) + "\n"
         if "--check" in words:
-            was = [
-                *map(str.splitlines, (kept(name)[0], json.dumps(kept(name)[1], ensure_ascii=False, indent=1) + "\n"))
-            ]
+            was = [*map(str.splitlines, (kept(name)[0], as_text(kept(name)[1]) + "\n"))]
             for old, new, what in zip(was, (prose.splitlines(), text.splitlines()), ("prose", "numbers"), strict=True):
                 lines = list(difflib.unified_diff(old, new, f"{name} {what}", "now", lineterm="", n=0))
                 different += bool(lines)
