@@ -25,32 +25,47 @@ def stop(sentence: str) -> NoReturn:
 
 
 def environment() -> Path:
-    """Return the folder of the environment, made and filled if its stamp does not match."""
+    """Return the folder of the environment's programs; what its stamps do not match is filled in.
+
+    One stamp is that of the libraries, the other that of the package, which another clone may have put there.
+    """
     folder = Path(os.environ.get("TOLALLOC_ENVIRONMENT") or ROOT / ".venv")  # empty is not the current folder
     python = folder / ("Scripts" if os.name == "nt" else "bin") / "python"
-    wanted = hashlib.sha256(CONSTRAINTS.read_bytes() + (ROOT / "pyproject.toml").read_bytes()).hexdigest()
-    stamp = folder / "tolalloc.stamp"
-    if stamp.is_file() and stamp.read_text() == wanted:
-        return python.parent
-    print(f"Making the environment in {folder} (once, a minute or two) ...", file=sys.stderr, flush=True)
+    libraries = (folder / "libraries.stamp", hashlib.sha256(CONSTRAINTS.read_bytes()).hexdigest())
+    own = hashlib.sha256((ROOT / "pyproject.toml").read_bytes()).hexdigest()
+    package = (folder / "package.stamp", f"{own} {ROOT}")
+    if not is_stamped(*libraries):
+        fill(folder, python, ["--require-hashes", "-r", str(CONSTRAINTS)], *libraries)
+    if not is_stamped(*package):
+        fill(folder, python, ["--no-deps", "--no-build-isolation", "-e", str(ROOT)], *package)
+    return python.parent
+
+
+def is_stamped(stamp: Path, wanted: str) -> bool:
+    return stamp.is_file() and stamp.read_text() == wanted
+
+
+def fill(folder: Path, python: Path, what: list[str], stamp: Path, wanted: str) -> None:
+    """Install something into the environment, made if it is not there, and stamp it."""
     own_pip = find_spec("ensurepip") is not None
-    try:
-        venv.create(folder, with_pip=own_pip)
-    except OSError as fault:
-        stop(f"the environment {folder} cannot be made: {fault}. Remove it if another Python made it, and try again.")
+    if not python.exists():
+        make(folder, own_pip)
     # Debian may ship Python without ensurepip; its own pip can still fill the environment.
     pip = [str(python), "-m", "pip"] if own_pip else [sys.executable, "-m", "pip", "--python", str(python)]
     if not own_pip and find_spec("pip") is None:
         stop("this Python has neither ensurepip nor pip; on Debian or Ubuntu run: apt install python3-venv")
-    quiet = ["--quiet", "--disable-pip-version-check"]
-    for arguments in (
-        ["install", *quiet, "--require-hashes", "-r", str(CONSTRAINTS)],
-        ["install", *quiet, "--no-deps", "--no-build-isolation", "-e", str(ROOT)],
-    ):
-        if subprocess.run([*pip, *arguments], check=False).returncode:
-            stop(f"pip could not fill {folder}; its own message stands above.")
+    if subprocess.run([*pip, "install", "--quiet", "--disable-pip-version-check", *what], check=False).returncode:
+        stop(f"pip could not fill {folder}; its own message stands above.")
     stamp.write_text(wanted)
-    return python.parent
+
+
+def make(folder: Path, own_pip: bool) -> None:
+    """Make an empty environment."""
+    print(f"Making the environment in {folder} (once, a minute or two) ...", file=sys.stderr, flush=True)
+    try:
+        venv.create(folder, with_pip=own_pip)
+    except OSError as fault:
+        stop(f"the environment {folder} cannot be made: {fault}. Remove it if another Python made it, and try again.")
 
 
 def main() -> None:

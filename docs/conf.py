@@ -1,8 +1,13 @@
-"""How Sphinx makes the handbook of these pages: ``sphinx-build -W docs docs/_build``, read without a network."""
+"""How Sphinx makes the handbook of these pages: ``sphinx-build -W docs docs/_build``, read without a network.
+
+Where TOLALLOC_SCRIPTS is set, only scripts whose path it matches are run, and pictures of the others are left blank.
+"""
 
 from __future__ import annotations
 
+import base64
 import logging
+import os
 import re
 import shutil
 import subprocess
@@ -15,6 +20,9 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
 logging.getLogger("ezdxf").setLevel(logging.WARNING)  # what the drawings of the pages would tell
+
+SCRIPTS = os.environ.get("TOLALLOC_SCRIPTS", r"\.py$")
+BLANK = base64.b64decode("iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR4nGP4DwABAQEAsTj2FAAAAABJRU5ErkJggg==")
 
 project = "tolalloc"
 author = "tolalloc maintainers"
@@ -46,7 +54,7 @@ sphinx_gallery_conf = {
     "image_scrapers": ("pictures.of_answers", "matplotlib"),
     "ignore_repr_types": r"matplotlib\.",
     "thumbnail_size": (400, 250),
-    "filename_pattern": r"\.py$",
+    "filename_pattern": SCRIPTS,
     "within_subsection_order": "FileNameSortKey",
     "show_memory": False,
     "write_computation_times": False,
@@ -90,8 +98,21 @@ def _write_cases(_: Any) -> None:
     (HERE / "_made" / "cases.md").write_text(page(), encoding="utf-8")
 
 
+def _write_blanks(_: Any) -> None:
+    """Write a blank picture in place of each that a page shows and no script has made, where not all are run."""
+    if "TOLALLOC_SCRIPTS" not in os.environ:
+        return
+    for page in HERE.rglob("*.md"):
+        for name in re.findall(r"\]\(([^)]*_made/[^)]+\.png)\)", page.read_text(encoding="utf-8")):
+            picture = page.parent / name
+            if not picture.exists():
+                picture.parent.mkdir(parents=True, exist_ok=True)
+                picture.write_bytes(BLANK)
+
+
 def setup(app: Any) -> None:
     """Make the pages that no hand writes before Sphinx reads them."""
     app.connect("builder-inited", _write_commands, priority=100)  # before the gallery is made
     app.connect("builder-inited", _write_files, priority=101)
     app.connect("builder-inited", _write_cases, priority=102)
+    app.connect("builder-inited", _write_blanks, priority=900)  # after the gallery was made

@@ -5,33 +5,14 @@ from __future__ import annotations
 import ast
 import inspect
 import tomllib
-from pathlib import Path
 
 import pytest
 
+from tests.import_graph import PACKAGE, imported, module_of
 from tolalloc.models.model import Model
 
-ROOT = Path(__file__).parents[2]
-PACKAGE = ROOT / "tolalloc"
 MOST_NAMES, MOST_FILES_OF_ALLOCATION, MOST_MEMBERS = 16, 37, 26
 """Names in the package, files of its largest room, and public members of a model [-]."""
-
-
-def module_of(path: Path) -> str:
-    """Return the module of a file of the package."""
-    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
-
-
-def imported(tree: ast.AST, modules: set[str]) -> set[str]:
-    """Return the modules that a file imports, wherever: on top, for a type checker alone, or inside a function."""
-    found = set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            found |= {name.name for name in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            inner = {f"{node.module}.{name.name}" for name in node.names}
-            found |= inner & modules or {node.module}
-    return found & modules
 
 
 def circles(edges: dict[str, set[str]]) -> list[list[str]]:

@@ -18,7 +18,8 @@ from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.study.inquiries.identify import NAMES
 
 ROOT = Path(__file__).parents[2]
-FILES = sorted((ROOT / "tolalloc").rglob("*.py"))
+PACKAGE = ROOT / "tolalloc"
+FILES = sorted(PACKAGE.rglob("*.py"))
 DOORS = {
     "SALib": ("sensitivity/",),
     "pymoo": ("allocation/front/genetic.py",),
@@ -60,11 +61,20 @@ def imports(tree: ast.Module) -> set[str]:
     return found
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_heavy_libraries_enter_through_one_door(path):
-    place = path.relative_to(ROOT / "tolalloc").as_posix()
-    for library in imports(ast.parse(path.read_text(encoding="utf-8"))) & DOORS.keys():
-        assert place.startswith(DOORS[library]), f"{path}: {library}"
+@pytest.fixture(scope="module")
+def trees() -> dict[str, ast.Module]:
+    """Return each file of the package, parsed."""
+    return {path.relative_to(PACKAGE).as_posix(): ast.parse(path.read_text(encoding="utf-8")) for path in FILES}
+
+
+def test_heavy_libraries_enter_through_one_door(trees):
+    elsewhere = [
+        f"{place}: {library}"
+        for place, tree in trees.items()
+        for library in imports(tree) & DOORS.keys()
+        if not place.startswith(DOORS[library])
+    ]
+    assert not elsewhere
 
 
 def loaded_by(program: str) -> set[str]:
@@ -101,15 +111,25 @@ def test_help_lists_the_parameters_that_can_be_identified():
     assert NAMES.split(", ") == list(SYMBOLS)
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_files_and_functions_stay_small(path):
-    text = path.read_text(encoding="utf-8")
-    assert text.count("\n") <= 700  # a class is not cut up to please a counter
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.FunctionDef):
-            body = node.body[1:] if ast.get_docstring(node) else node.body
-            lines = (body[-1].end_lineno or 0) - body[0].lineno + 1 if body else 0
-            assert lines <= 65, f"{path}: {node.name} has {lines} lines"
+def lines_of(function: ast.FunctionDef) -> int:
+    """Return the lines of a function's body, without its docstring."""
+    body = function.body[1:] if ast.get_docstring(function) else function.body
+    return (body[-1].end_lineno or 0) - body[0].lineno + 1 if body else 0
+
+
+def test_files_stay_small():
+    lines = {path.name: path.read_text(encoding="utf-8").count("\n") for path in FILES}
+    assert not {name: count for name, count in lines.items() if count > 700}  # a class is not cut to please a counter
+
+
+def test_functions_stay_small(trees):
+    functions = [
+        (f"{place}: {node.name}", lines_of(node))
+        for place, tree in trees.items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef)
+    ]
+    assert not [(name, lines) for name, lines in functions if lines > 65]
 
 
 def _documented_numbers(record: ast.ClassDef) -> list[tuple[str, str]]:
@@ -127,12 +147,12 @@ def _documented_numbers(record: ast.ClassDef) -> list[tuple[str, str]]:
     return said
 
 
-def test_every_documented_number_states_its_unit():
+def test_every_documented_number_states_its_unit(trees):
     """What is said of a number field ends with a unit in brackets, unless it is a name, a flag or a record."""
     wanting = [
-        f"{path.name}: {node.name}.{name}"
-        for path in FILES
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        f"{place}: {node.name}.{name}"
+        for place, tree in trees.items()
+        for node in ast.walk(tree)
         if isinstance(node, ast.ClassDef)
         for name, text in _documented_numbers(node)
         if "[" not in text
