@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 import tomllib
 from collections.abc import Callable, Iterable
@@ -12,22 +13,27 @@ from string import Formatter
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import tolalloc as ta
+from tolalloc.allocation.front.pareto_problem import SearchedDesigns
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.requirement import Requirement
 from tolalloc.allocation.verify.verification import Verifier
 from tolalloc.capability.indices import Limits
+from tolalloc.drawings.correlation import Correlation
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
+from tolalloc.drawings.table_file import DATA
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import TolallocError
 from tolalloc.models.model import Evaluation
 from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.files import PRESETS
 from tolalloc.reports.document import Section
 from tolalloc.reports.wording import Spoken, number
 from tolalloc.study.prepared import Prepared
@@ -84,6 +90,26 @@ def source(name: str, feature: Feature = Feature.SIZE, zone: float = 6.0, **chan
     """Return a source with a zone of six standard deviations of 1, which may become a tenth or ten times as wide."""
     own = {"part": "part", "minimum": zone / 10, "maximum": 10 * zone, "cost": 1.0, **changes}
     return Source(name=name, feature=feature, zone=zone, **own)
+
+
+def sizes(names: Iterable[str], *, correlation: Correlation | None = None, **changes: Any) -> ErrorModel:
+    """Return independent sizes of standard deviation 1 by these names, unless fields are changed."""
+    return ErrorModel(tuple(source(name, **changes) for name in names), correlation=correlation or Correlation())
+
+
+ZONE_OF_A_LENGTH = {"plus": 20.0, "minus": -20.0, "unit": "µm", "min": 5.0, "max": 100.0, "cost": 1.0}
+
+
+def summed(a: float, b: float, c: float) -> float:
+    """Return the length of three parts."""
+    return a + b + c
+
+
+def study_of_lengths(drawing: ta.Drawing, **changes: Any) -> ta.Study:
+    """Return the study of the length of three parts within ± 0.03 mm, with fields changed."""
+    own = {"questions": [ta.Allocation(front=False, what_if=False)], "effort": "quick", **changes}
+    model = ta.model(summed, inputs=dict.fromkeys("abc", 0.0), outputs=("length [mm]",))
+    return ta.Study(model, drawing, limits={"length [mm]": ta.Limit(lower=-0.03, upper=0.03)}, **own)
 
 
 @dataclass(frozen=True)
@@ -150,6 +176,7 @@ def headed(sections: Iterable[Section], heading: str, **gaps: object) -> Section
     return found
 
 
+FEW = ("housing.pitch", "housing.runout", "disc1.pitch", "disc2.pitch", "pin.diameter")
 FIRST_STAGE = ("sun.", "planet", "mesh")
 STANDING = ("housing.", "each_pin.", "carrier.assembly", "carrier.tilt", "sun.assembly")
 """What stands still in the housing; a source that begins like none of these turns with the sun, a disc or the carrier.
@@ -169,13 +196,28 @@ def table_of_three_cranks(name: str, pins: int = 40) -> dict[str, Source]:
     return found
 
 
+def deviations_at(errors: ErrorModel, uniform: np.ndarray, scale: float = 1.0) -> np.ndarray:
+    """Return the units that uniform numbers stand for, a column for each of the errors, all zones scaled alike."""
+    return errors.deviations(errors.standard_values(uniform), scale * errors.zones)
+
+
+def seeded_units(errors: ErrorModel, count: int, seeds: int | SeedTree = 1, scale: float = 1.0) -> np.ndarray:
+    """Return the units that an experiment with these seeds draws, a column for each of the errors."""
+    tree = SeedTree(seeds) if isinstance(seeds, int) else seeds
+    uniform = np.concatenate(list(tree.uniform_chunks(count, len(errors.columns))))
+    return deviations_at(errors, uniform, scale)
+
+
+def random_units(errors: ErrorModel, count: int, seed: int = 1, scale: float = 1.0) -> np.ndarray:
+    """Return units of random numbers that no experiment draws, a column for each of the errors."""
+    return deviations_at(errors, np.random.default_rng(seed).random((count, len(errors.columns))), scale)
+
+
 def drawn_units(errors: ErrorModel, model: EquivalentModel, units: int, scale: float = 1.0) -> np.ndarray:
     """Return the columns of random units at the reducer's modification, all zones scaled alike [m, angles rad]."""
-    uniform = np.random.default_rng(20260101).uniform(size=(units, len(errors.columns)))
     found = np.zeros((units, len(model.columns)))
-    found[:, [model.columns.index(name) for name in errors.columns]] = errors.deviations(
-        errors.standard_values(uniform), scale * errors.zones
-    )
+    at = [model.columns.index(name) for name in errors.columns]
+    found[:, at] = random_units(errors, units, 20260101, scale)
     for name, amount in model.reducer.modification.deviations.items():
         found[:, model.columns.index(name)] = amount
     return found
@@ -186,6 +228,41 @@ def only(units: np.ndarray, model: EquivalentModel, *beginnings: str, without: b
     chosen = np.array([name.startswith(beginnings) is not without for name in model.columns])
     modification = np.array([name.startswith("modification.") for name in model.columns])
     return np.asarray(np.where(chosen | modification, units, 0.0))
+
+
+def unit_with(model: EquivalentModel, **errors: float) -> np.ndarray:
+    """Return one unit with the reducer's modification and these errors; ``__`` stands for a point in a name."""
+    known = model.reducer.modification.deviations | {name.replace("__", "."): own for name, own in errors.items()}
+    assert known.keys() <= set(model.columns)
+    return np.array([[known.get(name, 0.0) for name in model.columns]])
+
+
+def reducer_file(path: Path, preset: str, *changes: tuple[str, str], added: str = "") -> Path:
+    """Write the file of a shipped reducer with texts changed, each of which stands in it once, and return its path."""
+    text = (PRESETS / f"{preset}.reducer.toml").read_text(encoding="utf-8")
+    for old, new in changes:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    path.write_text(text + added, encoding="utf-8")
+    return path
+
+
+def few_sources(folder: Path, *names: str, **columns: str) -> Path:
+    """Write the baseline's table with some sources alone, five unless named, with columns changed; return its path."""
+    table = pd.read_csv(DATA / "rv20e_table4.tolerances.csv", dtype=str, keep_default_na=False)
+    table[table["id"].isin(names or FEW)].assign(**columns).to_csv(folder / "few.csv", index=False)
+    return folder / "few.csv"
+
+
+def numbers_of(answer: object) -> list[float]:
+    """Return every number of an answer for programs, in its order."""
+    inner = answer.values() if isinstance(answer, dict) else answer if isinstance(answer, list) else ()
+    return [answer] if isinstance(answer, int | float) else [number for one in inner for number in numbers_of(one)]
+
+
+def digest(found: SearchedDesigns) -> str:
+    """Return the digest of all designs of a search for a front and of their answers."""
+    return hashlib.sha256(found.designs.tobytes() + found.answers.values.tobytes()).hexdigest()
 
 
 def with_ovality(drawing: Drawing, amplitude: float) -> Drawing:

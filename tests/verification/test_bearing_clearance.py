@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
+from tests.builders import seeded_units
 from tolalloc.cli.start import new
-from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.reducer.files import PRESETS
 
@@ -53,8 +53,7 @@ def test_clearance_with_a_row_varies_around_the_nominal_one(tmp_path):
 def test_a_micrometre_of_internal_clearance_adds_about_015_arcmin_of_lost_motion(tmp_path):
     drawing = ta.drawing("rv20e_drawing")
     errors, medians = drawing.errors, []
-    uniform = next(iter(SeedTree(1).uniform_chunks(24, len(errors.columns))))
-    x = errors.deviations(errors.standard_values(uniform), errors.zones)
+    x = seeded_units(errors, 24)
     for clearance in (1.0, 2.0):  # half the internal clearance, as the reducer file takes it [µm]
         model = bound(reducer_file(tmp_path, clearance), drawing, ("disc*.tilt",))
         medians.append(float(np.median(model.reading((ta.LOST_MOTION,))(x).values[:, 0])))

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.builders import reducer_file, unit_with
 from tolalloc.exceptions import TolallocError
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.cycloid.tooth_profile import normals
@@ -17,7 +18,7 @@ from tolalloc.reducers.equivalent.outputs import Solved, forces, order_spectrum
 from tolalloc.reducers.equivalent.perfect import perfect_reducer
 from tolalloc.reducers.reducer.bearings import loss_factor
 from tolalloc.reducers.reducer.design import CentreGearClearances, Reducer, interface_forces
-from tolalloc.reducers.reducer.files import PRESETS, load_reducer
+from tolalloc.reducers.reducer.files import load_reducer
 
 RIGID = 1e13
 VECTORS = (
@@ -42,16 +43,11 @@ def model(reducer) -> EquivalentModel:
     return EquivalentModel(reducer)
 
 
-def unit(model: EquivalentModel, **values: float) -> np.ndarray:
-    """Return one unit with the reducer's modification; ``__`` stands for a point in a name."""
-    given = model.reducer.modification.deviations | {name.replace("__", "."): own for name, own in values.items()}
-    assert given.keys() <= set(model.columns)
-    return np.array([[given.get(name, 0.0) for name in model.columns]])
-
-
 def random_unit(model: EquivalentModel, seed: int) -> np.ndarray:
     names = [f"{name}.{axis}" for name in VECTORS for axis in "xy"] + list(NUMBERS)
-    return unit(model, **dict(zip(names, 4e-6 * np.random.default_rng(seed).standard_normal(len(names)), strict=True)))
+    return unit_with(
+        model, **dict(zip(names, 4e-6 * np.random.default_rng(seed).standard_normal(len(names)), strict=True))
+    )
 
 
 def rigid(reducer: Reducer) -> Reducer:
@@ -167,8 +163,8 @@ def test_normals_of_the_pins_are_those_of_the_shared_formula(reducer):
 def test_an_eccentricity_turns_the_output_by_itself_over_base_radius_and_ratio(model, part, sign):
     """θ = ±n·R(θ_gear)·ε/(r_b4·i_s): amplitude e/(r_b4·i_s), as many waves as the gear has turns in the housing."""
     reducer, at, size = model.reducer, np.linspace(0.0, 2 * np.pi, 200), 8e-6
-    before = model.equilibria(unit(model), -20.0, at).transmission_error[0]
-    after = model.equilibria(unit(model, **{f"{part}__eccentricity__x": size}), -20.0, at).transmission_error[0]
+    before = model.equilibria(unit_with(model), -20.0, at).transmission_error[0]
+    after = model.equilibria(unit_with(model, **{f"{part}__eccentricity__x": size}), -20.0, at).transmission_error[0]
     sun = 1 + 26 / 38 * 52
     order = sun * -72 / 24 if part == "pinion" else sun
     amplitude = size / (0.045 * np.cos(np.radians(20)) * sun)
@@ -182,9 +178,9 @@ def test_an_eccentricity_turns_the_output_by_itself_over_base_radius_and_ratio(m
 def test_orders_are_turns_of_the_gears_per_turn_of_the_output(reducer):
     own = replace(reducer, first_stage=replace(reducer.first_stage, sun_teeth=26))  # 53 turns of the sun
     model, at = EquivalentModel(own), 2 * np.pi * np.arange(960) / 960
-    before = model.equilibria(unit(model), -20.0, at).transmission_error
+    before = model.equilibria(unit_with(model), -20.0, at).transmission_error
     for part, order in (("centre", 53), ("pinion", 159)):
-        after = model.equilibria(unit(model, **{f"{part}__eccentricity__y": 8e-6}), -20.0, at).transmission_error
+        after = model.equilibria(unit_with(model, **{f"{part}__eccentricity__y": 8e-6}), -20.0, at).transmission_error
         found = order_spectrum(after - before)
         assert int(found.order[np.argmax(found.amplitude[0])]) == order
         assert found.amplitude[0].max() == pytest.approx(8e-6 / (own.centre_pair.base_radius * 53), rel=1e-9)
@@ -197,7 +193,7 @@ def test_a_rigid_centre_gear_leaves_the_reducer_without_one(reducer):
     for own in (stiff, without):
         model = EquivalentModel(own)
         values = {"sun__eccentricity__x": 9e-6, "crank1__journal1__eccentricity__y": 4e-6}
-        found.append(model.equilibria(unit(model, **values), -50.0, at).transmission_error)
+        found.append(model.equilibria(unit_with(model, **values), -50.0, at).transmission_error)
     np.testing.assert_allclose(found[0], found[1], atol=1e-4 * ARCSECOND)
 
 
@@ -206,11 +202,11 @@ def test_the_mesh_yields_as_statics_say(reducer):
     own, torque, at, found = rigid(reducer), -265.0, np.array([0.3]), []
     for stiffness in (own.stiffness.centre_mesh, RIGID):
         model = EquivalentModel(replace(own, stiffness=replace(own.stiffness, centre_mesh=stiffness)))
-        found.append(float(model.equilibria(unit(model), torque, at).transmission_error[0, 0]))
+        found.append(float(model.equilibria(unit_with(model), torque, at).transmission_error[0, 0]))
     lever = own.centre_pair.base_radius * own.sun_ratio
     expected = torque / lever**2 * (1 / own.stiffness.centre_mesh - 1 / RIGID)
     assert found[0] - found[1] == pytest.approx(expected, rel=1e-6)
-    solved = EquivalentModel(own).equilibria(unit(EquivalentModel(own)), torque, at)
+    solved = EquivalentModel(own).equilibria(unit_with(EquivalentModel(own)), torque, at)
     assert float(forces(solved).of("centre_mesh")[0, 0, 0]) == pytest.approx(
         interface_forces(own, torque)["centre_mesh"], rel=1e-9
     )
@@ -222,7 +218,7 @@ def test_backlash_of_the_mesh_is_lost_motion_over_the_ratio(reducer, clearance):
     for gap in (0.0, clearance):
         played = replace(own, clearances=CentreGearClearances(centre_mesh=gap))
         model = EquivalentModel(played)
-        ends = [model.equilibria(unit(model), torque, np.array([0.3])) for torque in (-8.0, 8.0)]
+        ends = [model.equilibria(unit_with(model), torque, np.array([0.3])) for torque in (-8.0, 8.0)]
         assert max(end.status.max() for end in ends) == 0
         twist.append(float(ends[1].transmission_error[0, 0] - ends[0].transmission_error[0, 0]))
     free = 2 * clearance / (own.centre_pair.base_radius * own.sun_ratio)
@@ -254,18 +250,12 @@ def test_friction_of_the_mesh_is_its_loss_factor_times_the_torque():
     np.testing.assert_allclose(more, 0.06 * loss_factor(24, 72, 1.6) * 265.0, rtol=1e-6)
 
 
-def written(tmp_path, line: str, wrong: str):
-    text = (PRESETS / "rv27c.reducer.toml").read_text(encoding="utf-8")
-    assert line in text
-    path = tmp_path / "own.reducer.toml"
-    path.write_text(text.replace(line, wrong, 1), encoding="utf-8")
-    return path
-
-
 def test_a_shaft_of_the_pinion_yields_in_series_with_its_teeth(tmp_path):
     shaft = "pinion_support = { diameter_mm = 15, length_mm = 25 }"
-    alone = load_reducer(written(tmp_path, f"{shaft}\n", "")).stiffness.centre_mesh
-    given = load_reducer(written(tmp_path, shaft, "pinion_support = 5e7")).stiffness.centre_mesh
+    alone = load_reducer(reducer_file(tmp_path / "own.reducer.toml", "rv27c", (f"{shaft}\n", ""))).stiffness.centre_mesh
+    given = load_reducer(
+        reducer_file(tmp_path / "own.reducer.toml", "rv27c", (shaft, "pinion_support = 5e7"))
+    ).stiffness.centre_mesh
     # ISO 6336-1 of 24 and 72 teeth, contact ratio 1.6, 10 mm wide
     assert alone == pytest.approx(1.45 / (0.04723 + 0.15551 / 24 + 0.25791 / 72) * 1e7, rel=1e-12)
     assert given == pytest.approx(1 / (1 / alone + 1 / 5e7), rel=1e-12)
@@ -283,7 +273,7 @@ def test_a_shaft_of_the_pinion_yields_in_series_with_its_teeth(tmp_path):
 )
 def test_a_wrong_file_is_refused_in_one_sentence(tmp_path, line, wrong, says):
     with pytest.raises(TolallocError) as raised:
-        load_reducer(written(tmp_path, line, wrong))
+        load_reducer(reducer_file(tmp_path / "own.reducer.toml", "rv27c", (line, wrong)))
     assert says in str(raised.value)
     assert "\n" not in str(raised.value)
 

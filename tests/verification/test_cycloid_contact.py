@@ -14,6 +14,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
+from tests.builders import unit_with
 from tests.random_cases import LAWS, random_reducer
 from tests.verification.test_cycloid_profile import modified_points, path_bend
 from tolalloc.exceptions import InputError
@@ -291,7 +292,7 @@ def test_pins_of_the_equivalent_model_with_rigid_bearings_are_pressed_alike(law,
         stiffness = replace(case.reducer.stiffness, **dict.fromkeys(BILATERAL, rigid))
         reducer = replace(case.reducer, disc_count=discs, stiffness=stiffness)
         model = EquivalentModel(reducer, orders=(1,))
-        errors = np.array([[reducer.modification.deviations.get(name, 0.0) for name in model.columns]])
+        errors = unit_with(model)
         state = model.equilibria(errors, sign * case.torque, np.array([carrier_angle]))
         assert (state.status == Status.CONVERGED).all()
         ours = forces(state).pins[0, 0]

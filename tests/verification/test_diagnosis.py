@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.builders import seeded_units
 from tolalloc.bench.diagnosis import Diagnosis, diagnose
 from tolalloc.bench.measurements import MeasuredCurve
 from tolalloc.bench.posterior import (
@@ -61,9 +62,7 @@ def problem_of(prepared: Prepared, curve: MeasuredCurve) -> CurveProblem:
 
 
 def drawn(prepared: Prepared, count: int, name: str) -> np.ndarray:
-    errors = prepared.errors
-    uniform = np.concatenate(list(SeedTree(5).child(name).uniform_chunks(count, len(errors.columns))))
-    return errors.deviations(errors.standard_values(uniform), errors.zones)
+    return seeded_units(prepared.errors, count, SeedTree(5).child(name))
 
 
 @pytest.fixture(scope="module")

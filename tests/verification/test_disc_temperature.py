@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
+from tests.builders import seeded_units
 from tolalloc.cli.start import new
-from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.reducer.design import THERMAL_EXPANSION, thermal_shift
@@ -32,9 +32,7 @@ def model(drawing) -> ReducerModel:
 
 
 def units(drawing: ta.Drawing, count: int) -> np.ndarray:
-    errors = drawing.errors
-    uniform = np.concatenate(list(SeedTree(1).uniform_chunks(count, len(errors.columns))))
-    return errors.deviations(errors.standard_values(uniform), 0.3 * errors.zones)
+    return seeded_units(drawing.errors, count, scale=0.3)
 
 
 @pytest.mark.parametrize("name", ["rv20e", "rv40e"])

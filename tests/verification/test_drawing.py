@@ -10,10 +10,10 @@ import pandas as pd
 import pytest
 
 import tolalloc as ta
+from tests.builders import deviations_at, seeded_units
 from tolalloc.cli.start import clearances_of, modification_of, sources_of
 from tolalloc.drawings.correlation import Correlation, Pair
 from tolalloc.drawings.drawing import Drawing, load_drawing
-from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame, table_text
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
@@ -33,7 +33,7 @@ def test_a_row_of_an_own_model_is_one_column_in_metres(generator):
     assert (hub.zone, hub.minimum, hub.maximum) == pytest.approx((2e-4, 2e-5, 5e-4))
     assert hub.nominal == pytest.approx(0.05529)
     assert (cage.part, cage.locked, cage.grade) == ("outer race", True, "own")
-    x = drawing.errors.deviations(drawing.errors.standard_values(generator.random((20_000, 2))), drawing.errors.zones)
+    x = deviations_at(drawing.errors, generator.random((20_000, 2)))
     # The standard error of a deviation of n normal numbers is 1/√(2n) of it; four of them.
     np.testing.assert_allclose(x.std(axis=0), 2e-4 / 6, rtol=4 / np.sqrt(40_000))
 
@@ -185,7 +185,6 @@ def test_discs_and_cranks_made_together_leave_a_tenth_less_transmission_error():
     for correlations in ("", "rv_pairs"):
         drawing = ta.drawing("rv20e_drawing", correlations=correlations)
         model = ta.reducer("rv20e", neglected=("disc*.tilt",)).set_to(drawing.settings).bound(drawing.errors, "test")
-        uniform = np.concatenate(list(SeedTree(1).uniform_chunks(600, len(drawing.errors.columns))))
-        x = drawing.errors.deviations(drawing.errors.standard_values(uniform), drawing.errors.zones)
+        x = seeded_units(drawing.errors, 600)
         medians.append(np.median(model.reading((ta.PEAK_TO_PEAK,))(x).values[:, 0]))
     assert medians[1] / medians[0] == pytest.approx(0.91, abs=0.04)  # 1.7 % is a median's error of 600 units

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tests.builders import prepared
-from tolalloc.drawings.seeds import SeedTree
+from tests.builders import prepared, reducer_file, seeded_units, unit_with
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import ARCMINUTE
 from tolalloc.reducers.equivalent.hysteresis import (
@@ -30,7 +29,7 @@ from tolalloc.reducers.equivalent.outputs import Solved
 from tolalloc.reducers.equivalent.perfect import preload
 from tolalloc.reducers.reducer.bearings import CONTACTS, CRANK_BEARINGS, Friction, loss_factor
 from tolalloc.reducers.reducer.design import Clearances
-from tolalloc.reducers.reducer.files import PRESETS, load_reducer
+from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.idle_torque import IdleTorque
 
 ANGLES = TURN_ANGLES[::3]
@@ -40,15 +39,13 @@ NONE = Friction(**dict.fromkeys(CONTACTS, 0.0))
 def ground(reducer):
     """The model and its one unit without part errors, teeth modified as designed."""
     model = EquivalentModel(reducer)
-    return model, np.array([[reducer.modification.deviations.get(name, 0.0) for name in model.columns]])
+    return model, unit_with(model)
 
 
 def drawn_units(count):
     bound = prepared(reducer={"name": "rv20e"}, name="friction")
-    errors = bound.errors
-    uniform = next(SeedTree(1).uniform_chunks(count, len(errors.columns)))
     kernel = bound.model.kernel
-    return kernel.model, kernel.errors(errors.deviations(errors.standard_values(uniform), errors.zones))
+    return kernel.model, kernel.errors(seeded_units(bound.errors, count))
 
 
 @pytest.mark.parametrize("contact_ratio", [1.0, 1.3, 1.5, 1.9, 2.0])
@@ -229,11 +226,9 @@ def test_outputs_with_friction_can_be_limited_where_dimensions_are_known():
 
 
 def test_a_file_states_its_own_coefficients(tmp_path):
-    text = (PRESETS / "rv20e.reducer.toml").read_text(encoding="utf-8")
-    path = tmp_path / "mine.toml"
-    path.write_text(text + "\n[friction]\npins = 0.1\n", encoding="utf-8")
+    path = reducer_file(tmp_path / "mine.toml", "rv20e", added="\n[friction]\npins = 0.1\n")
     assert load_reducer(path).friction == Friction(pins=0.1)
-    path.write_text(text + "\n[friction]\npins = 0.6\n", encoding="utf-8")
+    reducer_file(path, "rv20e", added="\n[friction]\npins = 0.6\n")
     with pytest.raises(InputError, match=r"friction\.pins is 0\.6"):
         load_reducer(path)
 
@@ -251,17 +246,15 @@ def test_seals_grease_and_preload_by_hand():
 
 
 def test_a_file_states_what_seals_and_grease_take_and_a_catalogue_leaves_room_for_them(tmp_path):
-    text = (PRESETS / "rv20e.reducer.toml").read_text(encoding="utf-8")
     path = tmp_path / "mine.toml"
-    path.write_text(text + "\n[friction]\nseals_nm = 4.5\ngrease_nm = 0\n", encoding="utf-8")
+    reducer_file(path, "rv20e", added="\n[friction]\nseals_nm = 4.5\ngrease_nm = 0\n")
     found = IdleTorque.of(load_reducer(path))
     assert (found.seals, found.grease, found.turning) == (4.5, 0.0, 4.5)
-    stated = text.replace("[catalogue]", "[catalogue]\nno_load_torque_nm = 1.5")
-    assert stated != text
-    path.write_text(stated, encoding="utf-8")
+    stated = ("[catalogue]", "[catalogue]\nno_load_torque_nm = 1.5")
+    reducer_file(path, "rv20e", stated)
     with pytest.raises(InputError, match=r"no_load_torque_nm is 1\.5; allowed is more than 1\.6.*friction\.seals_nm"):
         load_reducer(path)
-    path.write_text(stated + "\n[friction]\nseals_nm = 0.1\n", encoding="utf-8")
+    reducer_file(path, "rv20e", stated, added="\n[friction]\nseals_nm = 0.1\n")
     assert load_reducer(path).catalogue.no_load_torque == 1.5
 
 

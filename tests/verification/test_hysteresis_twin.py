@@ -8,11 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.builders import prepared
+from tests.builders import prepared, seeded_units
 from tests.random_cases import is_angle
 from tests.verification.dense_twin import DenseModel, dense_model, least_energy
 from tests.verification.dense_twin_bearings import standing, turning, with_bearings, with_secants
-from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reading.files import validated
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop, own_load_loop
 from tolalloc.reducers.equivalent.model import EquivalentModel
@@ -103,9 +102,8 @@ def test_what_secants_leave_out_of_exact_parts(size, lost, stiff):
 def test_what_secants_leave_out_of_units_of_the_baseline_drawing():
     """Part errors load the bearings without torque, which stiffens them: lost motion is less than secants say."""
     bound = prepared(reducer={"name": "rv20e"}, name="own loads")
-    uniform = next(SeedTree(1).uniform_chunks(20, len(bound.errors.columns)))
     kernel = bound.model.kernel
-    units = kernel.errors(bound.errors.deviations(bound.errors.standard_values(uniform), bound.errors.zones))
+    units = kernel.errors(seeded_units(bound.errors, 20))
     secants, own = (loop(kernel.model, units, TURN_ANGLES) for loop in (hysteresis_loop, own_load_loop))
     lost = own.lost_motion / secants.lost_motion - 1
     assert lost.max() == pytest.approx(-0.019, abs=0.001)

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.builders import baseline_errors
+from tests.builders import baseline_errors, random_units
 from tests.studies.command import ROOT
 from tolalloc.models.model import Evaluation
 from tolalloc.reducers import LOST_MOTION, RADIAL_CLEARANCE
@@ -65,8 +65,7 @@ def model() -> ReducerModel:
 
 @pytest.fixture
 def x() -> np.ndarray:
-    uniform = np.random.default_rng(20261123).uniform(size=(UNITS, len(ERRORS.columns)))
-    return ERRORS.deviations(ERRORS.standard_values(uniform), ERRORS.zones)
+    return random_units(ERRORS, UNITS, 20261123)
 
 
 def test_what_was_solved_is_not_solved_again(model, x, solved, tmp_path):

@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.builders import prepared
+from tests.builders import prepared, seeded_units
 from tests.random_cases import random_units
-from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.cycloid.solvers import LINEAR
 from tolalloc.reducers.cycloid.solvers.pins import pin_force
@@ -172,8 +171,7 @@ def test_what_repeats_with_the_crank_and_changes_evenly_is_guessed_exactly(gener
 @pytest.mark.parametrize("name", ["rv20e_liu2020", "rv20e"])
 def test_guesses_from_turns_of_the_crank_are_nearer_and_lead_to_the_same_equilibria(name):
     study = prepared(reducer={"name": name})
-    model, uniform = study.model.kernel.model, next(SeedTree(1).uniform_chunks(24, len(study.errors.columns)))
-    units = study.errors.deviations(study.errors.standard_values(uniform), study.errors.zones)
+    model, units = study.model.kernel.model, seeded_units(study.errors, 24)
     errors, angles = study.model.kernel.errors(units), 2 * np.pi * np.arange(936) / 936
     by_turns, by_lines = model.equilibria(errors, -1.0), model.equilibria(errors, -1.0, angles)
     assert (by_turns.status == by_lines.status).all()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tolalloc.drawings.seeds import SeedTree
+from tests.builders import seeded_units
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reducers.model import ReducerModel
 from tolalloc.study.prepared import Prepared
@@ -35,9 +35,7 @@ def model(drawing) -> ReducerModel:
 
 @pytest.fixture(scope="module")
 def units(drawing) -> np.ndarray:
-    errors = drawing.errors
-    uniform = np.concatenate(list(SeedTree(1).uniform_chunks(6, len(errors.columns))))
-    return errors.deviations(errors.standard_values(uniform), errors.zones)
+    return seeded_units(drawing.errors, 6)
 
 
 def test_output_under_a_load_case_is_that_of_the_study_under_its_conditions(model, drawing, units):
@@ -187,9 +185,7 @@ def test_three_cranks_and_a_single_stage_take_load_cases(name, table):
     cases = (ta.LoadCase("rated", torque=-rated), ta.LoadCase("reversed", torque=rated, disc_temperature=3.0))
     model = ta.reducer(name, neglected=("disc*.tilt",), load_cases=cases).bound(drawing.errors, "test")
     names = (ta.worst(ta.PEAK_TO_PEAK), ta.at(ta.LOST_MOTION, cases[1]), ta.at(PRESSURE, cases[0]), PRESSURE)
-    errors = drawing.errors
-    uniform = np.concatenate(list(SeedTree(1).uniform_chunks(2, len(errors.columns))))
-    found = model.reading(names)(0.3 * errors.deviations(errors.standard_values(uniform), errors.zones))
+    found = model.reading(names)(0.3 * seeded_units(drawing.errors, 2))
     assert found.good.all()
     np.testing.assert_allclose(found.values[:, 2], found.values[:, 3], rtol=1e-12)
 

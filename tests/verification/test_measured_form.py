@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import prepared, refusal
 
+from tests.builders import prepared, reducer_file, refusal
 from tolalloc.bench.sources import has_half_turn
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND
@@ -25,7 +25,7 @@ from tolalloc.reducers.equivalent.outputs import radial_clearance
 from tolalloc.reducers.equivalent.springs import Positions
 from tolalloc.reducers.modification import ModificationRequest, choose
 from tolalloc.reducers.reducer.design import Modification, Reducer
-from tolalloc.reducers.reducer.files import PRESETS, load_reducer, write_modified
+from tolalloc.reducers.reducer.files import load_reducer, write_modified
 from tolalloc.reducers.reducer.form import FlankForm, Form, PinForm, flank_form, load_designed
 from tolalloc.reducers.transmission_error import transmission_error
 from tolalloc.reducers.unit_file import BuiltUnit, load_unit
@@ -405,8 +405,7 @@ def test_a_reducer_file_names_a_free_profile(reducer, tmp_path):
 
 
 def test_a_reducer_file_with_a_profile_is_read_written_again_and_not_modified(tmp_path):
-    text = (PRESETS / "rv20e.reducer.toml").read_text()
-    (tmp_path / "own.toml").write_text(text.replace("equidistant_um", 'profile = "flank.csv"\nequidistant_um', 1))
+    reducer_file(tmp_path / "own.toml", "rv20e", ("\nequidistant_um", '\nprofile = "flank.csv"\nequidistant_um'))
     rows = np.array([(angle, 2.0 * np.sin(np.radians(angle)) ** 2 - 2.0) for angle in range(0, 181, 5)])
     write(tmp_path / "flank.csv", rows, "phi [deg],deviation [µm]")
     design = load_reducer(tmp_path / "own.toml")
@@ -450,8 +449,8 @@ def test_a_diagnosis_takes_a_measured_profile_for_known(reducer, tmp_path):
 
 
 def test_a_study_is_known_by_its_profile_too(tmp_path):
-    text = (PRESETS / "rv20e_liu2020.reducer.toml").read_text()
-    (tmp_path / "own.toml").write_text(text.replace("equidistant_um", 'profile = "flank.csv"\nequidistant_um', 1))
+    profile = ("\nequidistant_um", '\nprofile = "flank.csv"\nequidistant_um')
+    reducer_file(tmp_path / "own.toml", "rv20e_liu2020", profile)
     known = []
     for height in (0.0, -1.0):
         rows = np.array([(angle, height) for angle in range(0, 181, 5)])

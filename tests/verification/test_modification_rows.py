@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
+from tests.builders import deviations_at
 from tests.studies.command import ROOT
 from tolalloc.reducers.model import ReducerModel
 from tolalloc.study.prepared import Prepared
@@ -66,8 +67,7 @@ def model_of(study: Prepared, clearances: tuple[float, float]) -> ReducerModel:
 def units_of(study: Prepared, count: int) -> np.ndarray:
     """Return random units: rows that come last draw numbers of their own."""
     generators = [np.random.default_rng([7, at]) for at in range(len(study.errors.columns))]
-    uniform = np.stack([own.random(count) for own in generators], axis=1)
-    return study.errors.deviations(study.errors.standard_values(uniform), study.errors.zones)
+    return deviations_at(study.errors, np.stack([own.random(count) for own in generators], axis=1))
 
 
 @pytest.mark.parametrize("clearances", CLEARANCES)

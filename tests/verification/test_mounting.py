@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.builders import baseline_errors
+from tests.builders import baseline_errors, seeded_units
 from tolalloc.assembly.mounting import best_mounting, random_mounting, units_from
 from tolalloc.assembly.places import (
     PartTurn,
@@ -267,9 +267,7 @@ def test_what_is_mounted_can_be_unmounted(rv20e: EquivalentModel, generator: np.
 
 def test_drawn_parts_as_they_come_are_the_units_that_were_drawn(errors: ErrorModel, rv20e: EquivalentModel) -> None:
     stock = stock_of(errors, rv20e.reducer, 3, 0)
-    uniform = np.concatenate(list(SeedTree(0).uniform_chunks(3, len(errors.columns))))
-    drawn = errors.deviations(errors.standard_values(uniform), errors.zones)
-    assert np.abs(stock.errors(stock.as_they_come) - drawn).max() < 1e-18
+    assert np.abs(stock.errors(stock.as_they_come) - seeded_units(errors, 3, 0)).max() < 1e-18
     assert stock.units == 3
 
 

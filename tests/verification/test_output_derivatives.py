@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.builders import baseline_errors, table_of_three_cranks
+from tests.builders import baseline_errors, random_units, table_of_three_cranks
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.model import ReducerModel
@@ -46,8 +46,7 @@ def with_play() -> tuple[ReducerModel, np.ndarray]:
 
 
 def deviations(errors: ErrorModel) -> np.ndarray:
-    uniform = np.random.default_rng(20261123).uniform(size=(UNITS, len(errors.columns)))
-    return errors.deviations(errors.standard_values(uniform), errors.zones)
+    return random_units(errors, UNITS, 20261123)
 
 
 @pytest.mark.parametrize("output", DIFFERENTIABLE)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.builders import unit_with
 from tests.random_cases import random_case, seeds
 from tests.verification.dense_twin import dense_equilibrium
 from tolalloc.reading.units import ARCSECOND
@@ -78,7 +79,7 @@ def test_backlash_is_the_first_gap_that_closes_over_its_lever(preset):
     """
     reducer = replace(load_reducer(preset), parts=(), stiffness=load_reducer("rv20e_liu2020").stiffness)
     model, stage = EquivalentModel(reducer), reducer.cycloid_stage
-    errors = np.array([[reducer.modification.deviations.get(name, 0.0) for name in model.columns]])
+    errors = unit_with(model)
     angles = np.array([0.1, 0.11, 1.0, 4.0])
     contact = spring_groups(reducer, angles)[-1]
     gap = -contact.error @ np.array([reducer.modification.deviations.get(name, 0.0) for name in contact.columns])

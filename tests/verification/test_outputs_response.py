@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tolalloc.drawings.seeds import SeedTree
+from tests.builders import seeded_units
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop
 from tolalloc.reducers.equivalent.model import Status, count_statuses
@@ -19,9 +19,7 @@ ORDERS = (1, 39, 40)
 
 @pytest.fixture(scope="module")
 def x(prepared):
-    errors = prepared.errors
-    uniform = next(SeedTree(1).uniform_chunks(24, len(errors.columns)))
-    return errors.deviations(errors.standard_values(uniform), errors.zones)
+    return seeded_units(prepared.errors, 24)
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.builders import unit_with
 from tolalloc.reading.units import MEGAPASCAL, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.clearance import exact_clearance
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
@@ -20,19 +21,10 @@ from tolalloc.reducers.response.outputs import OutputsResponse, requirements_of
 CLEARANCE = "radial clearance at tip and root [µm]"
 
 
-def unit(model, **columns: float) -> np.ndarray:
-    """Return one unit with the modification of its reducer and the named errors, dots written as __."""
-    named = {**model.reducer.modification.deviations, **{name.replace("__", "."): by for name, by in columns.items()}}
-    errors = np.zeros((1, len(model.columns)))
-    for name, value in named.items():
-        errors[0, model.columns.index(name)] = value
-    return errors
-
-
 @pytest.mark.parametrize(("equidistant", "shift"), [(-17e-6, -25e-6), (8e-6, 0.0), (3e-6, 5e-6)])
 def test_an_exact_unit_has_the_clearance_of_its_modification(rv20e, equidistant, shift):
     amounts = Modification(equidistant=equidistant, shift=shift)
-    errors = unit(rv20e, **{name.replace(".", "__"): value for name, value in amounts.deviations.items()})
+    errors = unit_with(rv20e, **{name.replace(".", "__"): value for name, value in amounts.deviations.items()})
     assert radial_clearance(rv20e, errors)[0] == pytest.approx(amounts.radial_clearance, abs=1e-18)
 
 
@@ -46,7 +38,7 @@ def test_changed_radii_change_it_as_they_change_the_exact_distance(rv20e, diamet
     )
     same_teeth = Modification(equidistant=ground.equidistant - diameter / 2, shift=ground.shift - outward)
     exact = exact_clearance([ToothProfile(stage=built, modification=same_teeth)], np.array([0.0, np.pi]))
-    found = radial_clearance(rv20e, unit(rv20e, pin__diameter=diameter, housing__groove__radius=groove))[0]
+    found = radial_clearance(rv20e, unit_with(rv20e, pin__diameter=diameter, housing__groove__radius=groove))[0]
     np.testing.assert_allclose(exact[0], found, rtol=0, atol=1e-12)
 
 
@@ -66,7 +58,7 @@ def test_it_is_the_smallest_gap_of_all_rows_at_tips_and_roots(rv20e, generator):
 
 
 def test_errors_that_are_tangential_or_move_a_disc_do_not_count(rv20e):
-    exact = radial_clearance(rv20e, unit(rv20e))
+    exact = radial_clearance(rv20e, unit_with(rv20e))
     for name in (
         "housing.pitch.cos1",
         "disc1.pitch.sin2",
@@ -74,10 +66,10 @@ def test_errors_that_are_tangential_or_move_a_disc_do_not_count(rv20e):
         "carrier.assembly.x",
         "disc1.tilt.x",
     ):
-        named = unit(rv20e, **{name.replace(".", "__"): 5e-6})
+        named = unit_with(rv20e, **{name.replace(".", "__"): 5e-6})
         np.testing.assert_allclose(radial_clearance(rv20e, named), exact, rtol=0, atol=1e-18, err_msg=name)
     for name in ("housing.runout.cos1", "disc2.runout.sin2", "each_pin.diameter.3", "disc1.each_tooth.runout.7"):
-        named = unit(rv20e, **{name.replace(".", "__"): 5e-6})
+        named = unit_with(rv20e, **{name.replace(".", "__"): 5e-6})
         assert radial_clearance(rv20e, named) == pytest.approx(exact - 5e-6, abs=0.02e-6), name
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.builders import unit_with
 from tests.validation_manual import shown
 from tolalloc.exceptions import TolallocError
 from tolalloc.reducers.equivalent.model import EquivalentModel
@@ -198,7 +199,7 @@ def test_forces_by_statics_are_those_of_the_model(tmp_path):
     reducer = load_reducer(written(tmp_path))
     model = EquivalentModel(reducer)
     angles = 2 * np.pi / 40 * np.arange(16) / 16
-    errors = np.array([[reducer.modification.deviations.get(name, 0.0) for name in model.columns]])
+    errors = unit_with(model)
     found = forces(model.equilibria(errors, -167.0, angles))
     for name, wanted in interface_forces(reducer, -167.0).items():
         if wanted:

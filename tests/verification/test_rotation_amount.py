@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
+from tests.builders import few_sources, random_units, unit_with
 from tests.random_cases import random_cycloid_stage, seeds
-from tests.studies.test_allocate_command import few_sources
 from tests.verification.test_cycloid_clearance import second_order
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import ARCSECOND, MICROMETRE
@@ -67,8 +67,7 @@ def test_an_allocation_with_turned_flanks_is_not_dearer_than_without(tmp_path):
 
 def units(study, count):
     """Return random units of a study's drawing."""
-    uniform = np.random.default_rng(7).random((count, len(study.errors.columns)))
-    return study.errors.deviations(study.errors.standard_values(uniform), study.errors.zones)
+    return random_units(study.errors, count, 7)
 
 
 @pytest.mark.parametrize("seed", seeds(20))
@@ -109,7 +108,7 @@ def test_turned_flanks_let_both_discs_turn_by_their_angle_and_take_no_radial_cle
     found = []
     for design in (own, exact):
         model = EquivalentModel(design)
-        errors = np.array([[design.modification.deviations.get(name, 0.0) for name in model.columns]])
+        errors = unit_with(model)
         found.append(model.equilibria(errors, torque, angle).transmission_error[0])
         assert radial_clearance(model, errors)[0] == pytest.approx(0.0, abs=1e-18)
     np.testing.assert_allclose(found[0] - found[1], -turned * (1 - 1 / reducer.ratio) * 39 / 40, rtol=1e-9)

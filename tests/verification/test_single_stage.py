@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from scipy.optimize import root
 
+from tests.builders import reducer_file, unit_with
 from tolalloc.exceptions import InputError, TolallocError
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.cycloid.tooth_profile import normals
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import attribute, forces
 from tolalloc.reducers.reducer.design import Reducer
-from tolalloc.reducers.reducer.files import PRESETS, load_reducer
+from tolalloc.reducers.reducer.files import load_reducer
 
 RIGID = 1e11
 
@@ -29,16 +30,10 @@ def model(drive) -> EquivalentModel:
     return EquivalentModel(drive)
 
 
-def named(model: EquivalentModel, **values: float) -> np.ndarray:
-    """Return one unit with the drive's modification; ``__`` stands for a point in a name."""
-    given = model.reducer.modification.deviations | {name.replace("__", "."): own for name, own in values.items()}
-    return np.array([[given.get(name, 0.0) for name in model.columns]])
-
-
 def random_unit(model: EquivalentModel, seed: int, size: float = 3e-6) -> np.ndarray:
     errors = size * np.random.default_rng(seed).standard_normal((1, len(model.columns)))
     errors[0, [name.endswith((".tilt.x", ".tilt.y", "rotation")) for name in model.columns]] = 0.0
-    return errors + named(model)
+    return errors + unit_with(model)
 
 
 def rigid(drive: Reducer, gap: float = 0.0, count: int = 8) -> Reducer:
@@ -170,7 +165,7 @@ def test_equilibria_balance_all_forces_of_the_plain_geometry(model, seed, torque
 
 def test_pins_of_the_housing_are_those_of_the_shared_formula(model):
     """The complex numbers above and the package's normals say one thing."""
-    own = Plain(model, named(model), 0.3)
+    own = Plain(model, unit_with(model), 0.3)
     into, contact = own.normals(0)
     stage = model.reducer.cycloid_stage
     direction = -stage.disc_teeth * 0.3
@@ -184,7 +179,7 @@ def test_a_pattern_of_pins_or_holes_that_is_turned_turns_the_output(drive):
     model = EquivalentModel(drive)
     around = 2 * np.pi * np.arange(8) / 8
     tangent = {"x": -np.sin(around), "y": np.cos(around)}
-    at, before = np.array([0.4]), model.equilibria(named(model), -20.0, np.array([0.4])).transmission_error
+    at, before = np.array([0.4]), model.equilibria(unit_with(model), -20.0, np.array([0.4])).transmission_error
     for names, sign in ((["output.pin"], -1.0), (["disc1.hole", "disc2.hole"], 1.0)):
         moved = {
             f"{name}.position.{pin + 1}.{axis}": 4e-6 * float(way[pin])
@@ -192,7 +187,7 @@ def test_a_pattern_of_pins_or_holes_that_is_turned_turns_the_output(drive):
             for pin in range(8)
             for axis, way in tangent.items()
         }
-        after = model.equilibria(named(model, **moved), -20.0, at).transmission_error
+        after = model.equilibria(unit_with(model, **moved), -20.0, at).transmission_error
         assert (after - before)[0, 0] == pytest.approx(sign * 4e-6 / drive.holes.circle_radius, rel=1e-9)
 
 
@@ -217,7 +212,7 @@ def test_room_in_the_holes_is_lost_motion(drive, gap):
         twist = []
         for room in (0.0, gap):
             model = EquivalentModel(rigid(drive, room))
-            found = [model.equilibria(named(model), torque, np.array([angle])) for torque in (-0.05, 0.05)]
+            found = [model.equilibria(unit_with(model), torque, np.array([angle])) for torque in (-0.05, 0.05)]
             twist.append(float(np.diff([own.transmission_error[0, 0] for own in found])[0]))
         direction = [-29 * angle, -29 * angle + np.pi]
         best = [max(np.sin(side * (around + angle - own)).max() for own in direction) for side in (1, -1)]
@@ -260,10 +255,7 @@ def test_what_every_source_adds_sums_to_the_curve(model):
     ],
 )
 def test_a_wrong_file_is_refused_in_one_sentence(tmp_path, line, wrong, says):
-    text = (PRESETS / "cd29.reducer.toml").read_text(encoding="utf-8")
-    assert line in text
-    path = tmp_path / "own.reducer.toml"
-    path.write_text(text.replace(line, wrong, 1), encoding="utf-8")
+    path = reducer_file(tmp_path / "own.reducer.toml", "cd29", (line, wrong))
     with pytest.raises(TolallocError) as raised:
         load_reducer(path)
     assert says in str(raised.value)

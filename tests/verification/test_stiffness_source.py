@@ -8,7 +8,7 @@ from math import exp
 import numpy as np
 import pytest
 
-from tests.builders import Sum, prepared
+from tests.builders import Sum, prepared, seeded_units
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.drawings.error_model import ErrorModel
@@ -56,9 +56,7 @@ def source(sigma: float, correlation: float) -> CorrelatedSource:
 
 
 def units(count: int, seed: int) -> np.ndarray:
-    errors = few_sources()
-    uniform = np.concatenate(list(SeedTree(seed).uniform_chunks(count, len(errors.columns))))
-    return errors.deviations(errors.standard_values(uniform), errors.zones)
+    return seeded_units(few_sources(), count, seed)
 
 
 def first_order_error(response: StiffnessResponse, x: np.ndarray, changes: np.ndarray) -> FirstOrderError:

@@ -10,7 +10,7 @@ from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
-from tests.builders import baseline_errors
+from tests.builders import baseline_errors, seeded_units
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
@@ -125,8 +125,7 @@ def kernel(rv20e: EquivalentModel, errors: ErrorModel) -> KernelResponse:
 
 @pytest.fixture(scope="module")
 def units(errors: ErrorModel) -> np.ndarray:
-    uniform = next(SeedTree(5).uniform_chunks(200, len(errors.columns)))
-    return errors.deviations(errors.standard_values(uniform), errors.zones)
+    return seeded_units(errors, 200, 5)
 
 
 def test_every_candidate_becomes_a_response(kernel):
@@ -316,7 +315,7 @@ def test_contact_at_fewer_angles_passes_and_more_angles_miss_less(kernel, units)
 @pytest.mark.slow
 def test_contact_at_fewer_angles_holds_at_other_zones_than_it_was_fitted_at(kernel, errors, units):
     fitted = ContactCandidate(kernel=kernel, angles=936).fit(units, kernel(units).values[:, 0])
-    smaller = errors.deviations(errors.standard_values(next(SeedTree(6).uniform_chunks(100, 60))), errors.zones / 2)
+    smaller = seeded_units(errors, 100, 6, scale=0.5)
     error = fitted(smaller).values[:, 0] - kernel(smaller).values[:, 0]
     # On 1,024 units the mean error is 0.25″ and the deviation 0.41″: four standard errors of 100 units are 0.17″.
     assert abs(error.mean()) < 0.45

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tests.builders import with_ovality
+from tests.builders import seeded_units, with_ovality
 from tolalloc.cli.start import new
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import limited_measure
@@ -103,7 +103,6 @@ def test_ovality_of_the_ring_adds_to_the_peak_to_peak():
         drawing = with_ovality(ta.drawing("rv20e_drawing"), amplitude)
         errors = drawing.errors
         model = ta.reducer("rv20e", neglected=("disc*.tilt",)).set_to(drawing.settings).bound(errors, "test")
-        uniform = np.concatenate(list(SeedTree(1).uniform_chunks(200, len(errors.columns))))
-        found = model.reading((ta.PEAK_TO_PEAK,))(errors.deviations(errors.standard_values(uniform), errors.zones))
+        found = model.reading((ta.PEAK_TO_PEAK,))(seeded_units(errors, 200))
         medians.append(float(np.median(found.values[:, 0])))
     assert 4.0 < medians[1] - medians[0] < 11.0

@@ -226,7 +226,7 @@ def test_a_size_is_measured_from_the_middle_of_its_zone():
 def test_a_joint_source_is_measured_in_its_own_deviations(generator):
     joint = CorrelatedSource(name="k", columns=("k1", "k2"), covariance=np.diag([4.0, 0.0]))
     errors = ErrorModel((source("a"),), joint=(joint,))
-    x = errors.deviations(errors.standard_values(generator.random((4000, 3))), errors.zones)
+    x = builders.deviations_at(errors, generator.random((4000, 3)))
     assert limited_measures(errors, x).shape == (4000, 2)
     sample = monte_carlo(Experiment.of(builders.Sum(errors.columns), errors, SeedTree(4)), 4000)
     found = target_sensitivity(sample, errors, 1.0, SeedTree(4), permutations=9, resamples=9)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.builders import baseline_errors
+from tests.builders import baseline_errors, deviations_at
 from tolalloc.drawings.distributions import Distribution
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.measured_parts import MeasuredParts
@@ -104,7 +104,7 @@ def test_like_features_deviate_alone_and_angles_are_taken_over_a_length(generato
     )
     assert pins.columns[:3] == ("each_pin.position.1.x", "each_pin.position.1.y", "each_pin.position.2.x")
     errors = ErrorModel((pins, tilt))
-    x = errors.deviations(errors.standard_values(generator.random((20_000, 82))), errors.zones)
+    x = deviations_at(errors, generator.random((20_000, 82)))
     assert np.abs(np.corrcoef(x.T) - np.eye(82)).max() < 5 / np.sqrt(20_000)
     radius = np.hypot(x[:, 0::2], x[:, 1::2])
     share = (radius <= [2e-6] * 40 + [2e-6 / 0.03]).mean(axis=0)

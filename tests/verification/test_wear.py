@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tolalloc.drawings.seeds import SeedTree
+from tests.builders import seeded_units
 from tolalloc.exceptions import InputError
 from tolalloc.reducers.cycloid.tooth_profile import path_curvature
 from tolalloc.reducers.equivalent.wear import flank_depth_per_force, pin_depth_per_work, wear_of
@@ -41,9 +41,7 @@ def model(drawing) -> ReducerModel:
 
 
 def units(drawing: ta.Drawing, count: int) -> np.ndarray:
-    errors = drawing.errors
-    uniform = np.concatenate(list(SeedTree(1).uniform_chunks(count, len(errors.columns))))
-    return errors.deviations(errors.standard_values(uniform), errors.zones)
+    return seeded_units(drawing.errors, count)
 
 
 def test_one_contact_wears_as_archard_says(reducer):
