@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
+from tests.builders import says
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reducers.duty import duty_of, lever
 from tolalloc.reducers.equivalent.perfect import perfect_reducer
@@ -178,8 +179,8 @@ def test_the_answer_says_life_pressure_and_heat(tmp_path):
     file.write_text("case,torque,speed,share,moment\nstart,-200,15,1,300\nrun,-100,20,4,\n")
     answer = ta.duty(file, reducer="rv20e")
     said = " ".join(answer.sentences)
-    assert f"{answer.result.life:,.0f} h together" in said
-    assert "W become heat" in said
-    assert "300 N·m, tilts the output" in said
+    assert says(said, "duty.life", life=answer.result.life)
+    assert says(said, "duty.heat")
+    assert says(said, "duty.tilt", moment=300.0)
     assert answer.to_frame("load cases")["share of the time [%]"].tolist() == [20.0, 80.0]
     assert len(answer.to_frame("bearings")) == 3

@@ -12,6 +12,7 @@ from scipy import stats
 from scipy.special import ndtr
 
 import tolalloc as ta
+from tests.builders import says
 from tolalloc.allocation.space.requirement import AtCpk, AtYield
 from tolalloc.allocation.verify.verification import verifier_of_sum
 from tolalloc.capability.experiment import measured_size
@@ -238,17 +239,17 @@ def studied(tmp_path_factory):
 def test_allocation_says_what_few_parts_do_and_what_a_hundred_would(studied):
     answer = studied.allocate(effort="quick")
     said = " ".join(answer.sentences)
-    assert "The interval holds what 20 measured parts of one source leave open" in said
-    assert "Were they 100 parts of the same kind, it would be" in said
-    assert "further inside the limit than the units show" in said
-    assert "With 100 measured parts of the same kind" in said and "which saves about" in said
+    assert says(said, "check.few_parts_one", parts=20)
+    assert says(said, "check.more_parts", more=100)
+    assert says(said, "allocation.margin")
+    assert says(said, "allocation.margin_saves", more=100)
     achieved = answer.result.chosen.achieved
     assert answer.result.met and achieved.low < achieved.widening.counted.low
 
 
 def test_ranking_says_what_few_parts_do(studied):
     answer = studied.rank(effort="quick")
-    assert "The interval holds what 20 measured parts of one source leave open" in " ".join(answer.sentences)
+    assert says(" ".join(answer.sentences), "check.few_parts_one", parts=20)
     found = answer.result.capabilities[0].inside
     assert found.widening is not None
     assert answer.result.beyond.interval.low <= found.widening.counted.low
