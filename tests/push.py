@@ -132,7 +132,7 @@ class Push:
         )
 
 
-def chosen(tests: Sequence[str], every: set[str], run: WholeRun, touched: Touched, commits: int) -> Push:
+def chosen(tests: Sequence[str], every: set[str], run: WholeRun, touched: Touched, commits: int | None) -> Push:
     """Return the tests of a push among all slow ones.
 
     Parameters
@@ -146,11 +146,12 @@ def chosen(tests: Sequence[str], every: set[str], run: WholeRun, touched: Touche
     touched
         What has changed since.
     commits
-        Number of commits in all [-]; the turn follows from it.
+        Number of commits in all [-]; the turn follows from it. It is nobody's turn where that is None.
     """
     cost = {test: NEW if (own := run.taken_by(test)) is None else own for test in tests}
     always = [test for test in tests if test in every]
-    turn = [test for test in tests if test not in every and zlib.crc32(test.encode()) % TURNS == commits % TURNS]
+    now = None if commits is None else commits % TURNS
+    turn = [test for test in tests if test not in every and zlib.crc32(test.encode()) % TURNS == now]
     taken = {*always, *turn}
     steps = {test: found for test in tests if test not in taken and (found := touched.steps(test)) is not None}
     near, left, seconds = list[str](), list[str](), sum(cost[test] for test in taken)

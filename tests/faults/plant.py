@@ -1,11 +1,12 @@
 """Plant one fault at a time in a copy of the tree, and say whether the tests catch it.
 
-    python tests/faults/plant.py                     # every fault against the default run
-    python tests/faults/plant.py --full              # the slow tests too
-    python tests/faults/plant.py --hinted --only zones --only costs
+    python -m tests.faults.plant                     # every fault against the default run
+    python -m tests.faults.plant --gate push         # what the gate runs of a push with that fault alone, too
+    python -m tests.faults.plant --gate all          # all slow tests too
+    python -m tests.faults.plant --hinted --only zones --only costs
 
 The test files that a fault names are tried first; the rest run only where these pass. A fault of a compiled file costs
-a compilation of the kernel, about a minute.
+a compilation of the kernel, about a minute. Of a push no test is run because it is its turn.
 """
 
 from __future__ import annotations
@@ -20,34 +21,49 @@ import tempfile
 import time
 import tomllib
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+from tests.import_graph import ROOT
+from tests.push import Touched, chosen, slow_tests
+from tests.whole_run import last_whole_run
+
 FAULTS = Path(__file__).with_name("faults.toml")
 COPIED = ("tolalloc", "tests", "studies", "docs", ".ci", "pyproject.toml", "README.md", "LICENSE")
 FAILED, NOTHING_COLLECTED = (1, 2), 5  # tests or collection failed; exit codes of pytest
 
 
 @dataclass(frozen=True)
-class Fault:
-    """What stands in a file, what is put in its place, and the test files to try first."""
+class Edit:
+    """What stands in a file, and what is put in its place."""
 
-    name: str
     file: str
     old: str
     new: str
-    tests: tuple[str, ...]
 
     def places(self, root: Path = ROOT) -> int:
         """Return how often the old text stands in the file."""
         return (root / self.file).read_text(encoding="utf-8").count(self.old)
 
-    def plant(self, root: Path) -> None:
-        """Put the fault into a copy of the tree."""
+    def make(self, root: Path) -> None:
+        """Put the new text into a copy of the tree."""
         if self.places(root) != 1:
             raise SystemExit(f"{self.file}: {self.old!r} stands there {self.places(root)} times instead of once.")
         path = root / self.file
         rewrite(path, path.read_text(encoding="utf-8").replace(self.old, self.new))
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What it is, the edits that make it, and the test files to try first."""
+
+    name: str
+    edits: tuple[Edit, ...]
+    tests: tuple[str, ...]
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        return tuple(edit.file for edit in self.edits)
 
 
 def rewrite(path: Path, text: str) -> None:
@@ -60,7 +76,14 @@ def rewrite(path: Path, text: str) -> None:
 def load_faults() -> tuple[Fault, ...]:
     """Return all faults, those of compiled files last."""
     content = tomllib.loads(FAULTS.read_text(encoding="utf-8"))
-    return tuple(Fault(**{**fault, "tests": tuple(fault["tests"])}) for fault in content["fault"])
+    return tuple(
+        Fault(
+            fault["name"],
+            tuple(Edit(own["file"], own["old"], own["new"]) for own in (fault, *fault.get("also", ()))),
+            tuple(fault["tests"]),
+        )
+        for fault in content["fault"]
+    )
 
 
 def copied_tree(folder: Path) -> Path:
@@ -86,39 +109,52 @@ def first_failure(root: Path, arguments: list[str]) -> str | None:
     return failure[1] if failure else "collection"
 
 
-def caught_by(root: Path, fault: Fault, full: bool, hinted: bool) -> str | None:
+collected = cache(slow_tests)
+
+
+def slow_of_push(fault: Fault) -> tuple[str, ...]:
+    """Return the slow tests that the gate runs of a push with this fault alone, whosever turn it is."""
+    run = last_whole_run()
+    if run is None:
+        raise SystemExit("No whole run is written down; `.ci/run --all` writes one.")
+    found, touched = collected(), Touched.of(fault.files)
+    return chosen(found.tests, found.every, run, touched, commits=None).tests
+
+
+def caught_by(root: Path, fault: Fault, gate: str, hinted: bool) -> str | None:
     """Return the test that catches a planted fault, or None."""
-    marks = ["-m", ""] if full else []
-    for path in fault.tests:
-        if found := first_failure(root, [*marks, path]):
-            return found
-    if hinted:
-        return None
+    slow = {"default": (), "push": slow_of_push(fault) if gate == "push" else (), "all": fault.tests}[gate]
+    first = [[path] for path in fault.tests]
+    first += [["-m", "slow", test] for test in slow if test.partition("::")[0] in fault.tests]
     # That every old text stands in its file is not what catches a fault.
-    return first_failure(root, [*marks, "--deselect", "tests/architecture/test_faults.py", "tests"])
+    rest = [["--deselect", "tests/architecture/test_faults.py", "tests"]]
+    rest += {"default": [], "push": [["-m", "slow", *slow]], "all": [["-m", "slow", "tests"]]}[gate]
+    return next((test for tests in (first if hinted else first + rest) if (test := first_failure(root, tests))), None)
 
 
 def main() -> None:
     """Plant the faults and print a line for each, then how many were caught."""
     parser = argparse.ArgumentParser(description="Plant faults one at a time and see whether the tests catch them.")
-    parser.add_argument("--full", action="store_true", help="run the slow tests too")
+    parser.add_argument("--gate", choices=("default", "push", "all"), default="default", help="which tests are run")
     parser.add_argument("--hinted", action="store_true", help="run only the test files that a fault names")
     parser.add_argument("--only", action="append", default=[], help="faults whose name begins so; may be repeated")
     options = parser.parse_args()
-    chosen = [fault for fault in load_faults() if not options.only or fault.name.startswith(tuple(options.only))]
+    faults = [fault for fault in load_faults() if not options.only or fault.name.startswith(tuple(options.only))]
     caught = 0
     with tempfile.TemporaryDirectory() as name:
         root = copied_tree(Path(name))
-        for fault in chosen:
-            began, path = time.monotonic(), root / fault.file
-            sound = path.read_text(encoding="utf-8")
-            fault.plant(root)
-            found = caught_by(root, fault, options.full, options.hinted)
-            rewrite(path, sound)
+        for fault in faults:
+            began = time.monotonic()
+            sound = {file: (root / file).read_text(encoding="utf-8") for file in fault.files}
+            for edit in fault.edits:
+                edit.make(root)
+            found = caught_by(root, fault, options.gate, options.hinted)
+            for file, text in sound.items():
+                rewrite(root / file, text)
             caught += found is not None
             took = f"{time.monotonic() - began:6.0f} s"
             print(f"{'caught' if found else 'MISSED':<7} {took}  {fault.name:<72} {found or ''}", flush=True)
-    print(f"{caught} of {len(chosen)} faults caught by the {'full' if options.full else 'default'} run.")
+    print(f"{caught} of {len(faults)} faults caught by the {options.gate} run.")
 
 
 if __name__ == "__main__":

@@ -99,7 +99,7 @@ def recorded(case: Case, run: Run = tolalloc, look: Look = lambda *_: None) -> t
 def _recorded(case: Case, folder: Path, run: Run, look: Look) -> tuple[str, dict[str, object]]:
     for name, text in case.files.items():
         (folder / name).write_text(text, encoding="utf-8")
-    prose, numbers, seen = "", dict[str, object](), dict[bytes, str]()
+    prose, numbers, seen = "", dict[str, object](), dict[str, str]()
     for at, typed in enumerate(case.commands, start=1):
         before = set(folder.rglob("*"))
         done = run(*(f"{folder}/{word[1:]}" if word.startswith("@") else word for word in typed.split()))
@@ -112,8 +112,9 @@ def _recorded(case: Case, folder: Path, run: Run, look: Look) -> tuple[str, dict
             if typed.startswith("new ") and case.name != "start":
                 continue  # what `new` makes is kept once
             if path.suffix in (".json", ".csv", ".xlsx"):
-                same = name if path.suffix == ".xlsx" else seen.setdefault(path.read_bytes(), name)
-                numbers[name] = _numbers_of(path, case.wandering) if same == name else f"the same as {same}"
+                content = _numbers_of(path, case.wandering)
+                same = seen.setdefault(json.dumps(content), name)
+                numbers[name] = content if same == name else f"the same as {same}"
             else:
                 prose += f"--- {name}\n{_words_of(path)}"
     look(done, folder)

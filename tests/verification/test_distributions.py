@@ -38,6 +38,7 @@ KINDS = {
     "empirical": {"distribution": Distribution.EMPIRICAL},
 }
 BOUNDED = (Distribution.UNIFORM, Distribution.TRIANGULAR, Distribution.BETA, Distribution.TRAPEZOID)
+MADE_OF_OTHERS = (Distribution.MIXTURE, Distribution.EMPIRICAL)
 SHIFTED = (Batch(weight=7.0, shift=-0.3, spread=0.8), Batch(weight=3.0, shift=0.5, spread=0.6))
 CENTRED = (Batch(weight=0.7, shift=0.0, spread=0.6), Batch(weight=0.3, shift=0.0, spread=1.2))
 PARTS = 0.5e-6 + 0.6e-6 * stats.weibull_min(2.5).ppf((np.arange(60) + 0.5) / 60)
@@ -98,6 +99,19 @@ def mixture_share() -> float:
 def rayleigh_share() -> float:
     """Return the share of the centred batches inside the zone."""
     return sum(batch.weight * (1 - 0.0027 ** (1 / batch.spread**2)) for batch in CENTRED)
+
+
+def test_every_distribution_is_among_the_cases():
+    assert {*KINDS} == {own.value for own in Distribution}
+
+
+@pytest.mark.parametrize("kind", [own for own in Distribution if own not in MADE_OF_OTHERS])
+def test_a_distribution_that_ends_is_bounded_and_fills_its_zone(kind):
+    own = source(kind.value, Feature.SIZE)
+    ends = own.zone_mapping.base.quantile(np.array([0.0, 1.0]))
+    assert kind.is_bounded == np.isfinite(ends).all() == (kind in BOUNDED)
+    if kind.is_bounded:
+        np.testing.assert_allclose(np.ptp(own.standard_values(np.array([[0.0], [1.0]]))), 1.0, atol=1e-6)
 
 
 @pytest.mark.parametrize(("kind", "feature"), CASES)
