@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import subprocess
 import sys
@@ -11,6 +12,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
 from tolalloc.cli.main import main
@@ -80,3 +82,12 @@ def refused(result: subprocess.CompletedProcess[str], *words: str) -> None:
     assert sentence.splitlines()[-1].startswith("Error: ")
     for word in words:
         assert word in sentence, sentence
+
+
+def answer_of(*arguments: object) -> dict[str, Any]:
+    """Return what a command that is not refused answers to a program."""
+    result = tolalloc(*arguments, "--json")
+    assert result.returncode == 0, result.stderr
+    answer = json.loads(result.stdout)
+    assert isinstance(answer, dict)
+    return answer

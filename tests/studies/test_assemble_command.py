@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.studies.command import refused, tolalloc
+from tests.studies.command import answer_of, refused, tolalloc
 
 THREE_PARTS = """
 name = "pump"
@@ -61,9 +61,7 @@ def unit(tmp_path) -> Path:
 
 @pytest.mark.slow
 def test_measured_parts_are_adjusted_and_reported(unit, tmp_path):
-    result = tolalloc("assemble", "bx40e", "--measured", unit, "--out", tmp_path / "report", "--json")
-    assert result.returncode == 0, result.stderr
-    answer = json.loads(result.stdout)
+    answer = answer_of("assemble", "bx40e", "--measured", unit, "--out", tmp_path / "report")
     measured, tolerances = answer["measured"], answer["tolerances"]
     assert measured["norm unadjusted [arcsec]"] == pytest.approx(86.0307, abs=1e-4)
     assert measured["norm adjusted [arcsec]"] == pytest.approx(8.4957, abs=1e-4)
@@ -93,9 +91,7 @@ def test_a_chain_without_a_reducer_says_what_is_to_be_expected(pump):
 def test_a_chain_without_a_reducer_adjusts_measured_parts(pump, tmp_path):
     errors = np.array([[50, -20, 10], [-30, 15, 0], [5, 25, -12]])
     parts = errors_file(tmp_path / "seven.csv", ("bracket", "rotor", "cover"), errors)
-    result = tolalloc("assemble", pump, "--measured", parts, "--precision", "10", "--json")
-    assert result.returncode == 0, result.stderr
-    answer = json.loads(result.stdout)
+    answer = answer_of("assemble", pump, "--measured", parts, "--precision", "10")
     assert answer["precision [-]"] == 10
     assert answer["transmission"] is None and answer["tolerances"] is None
     # The rotor is turned by 90° about z: its x is the datum's y.
@@ -105,9 +101,7 @@ def test_a_chain_without_a_reducer_adjusts_measured_parts(pump, tmp_path):
 
 
 def test_a_precision_of_zero_turns_nothing(pump):
-    result = tolalloc("assemble", pump, "--precision", "0", "--json")
-    assert result.returncode == 0, result.stderr
-    answer = json.loads(result.stdout)
+    answer = answer_of("assemble", pump, "--precision", "0")
     assert [row["turn"] for row in answer["steps"]] == ["nothing"] * 3
     assert answer["expected rms adjusted [arcsec]"] == answer["expected rms unadjusted [arcsec]"]
 
@@ -128,9 +122,7 @@ def test_impossible_limits_keep_nobody_from_the_turns(unit, tmp_path):
     chain.write_text(tight, encoding="utf-8")
     for arguments in (["--measured", unit], []):
         folder = tmp_path / f"report{len(arguments)}"
-        result = tolalloc("assemble", chain, *arguments, "--out", folder, "--json")
-        assert result.returncode == 0, result.stderr
-        answer = json.loads(result.stdout)
+        answer = answer_of("assemble", chain, *arguments, "--out", folder)
         assert answer["tolerances"] is None and answer["steps"]
         (warning,) = (own for own in answer["warnings"] if "angular tolerances" in own)
         assert warning.split(":")[0] in (folder / "report.html").read_text(encoding="utf-8")

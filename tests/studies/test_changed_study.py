@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tests.builders import prepared, says
+from tests.builders import deviations_at, prepared, says
 from tests.studies.command import command
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import with_zones
@@ -28,7 +28,7 @@ def test_a_changed_study_is_the_model_at_other_settings_and_zones_to_the_last_bi
     assert after.study.name == "tighter"
     uniform = next(SeedTree(3).uniform_chunks(32, len(before.errors.columns)))
     x = before.errors.deviations(before.errors.standard_values(uniform), np.array(zones))
-    same = after.errors.deviations(after.errors.standard_values(uniform), after.errors.zones)
+    same = deviations_at(after.errors, uniform)
     np.testing.assert_allclose(same, x, rtol=1e-14)  # a table says its zones in µm
     outputs = (ta.PEAK_TO_PEAK, ta.PRELOAD)
     found = after.model.reading(outputs)(x).values

@@ -11,8 +11,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from tests.builders import says
-from tests.studies.command import ROOT, refused, tolalloc
+from tests.builders import reducer_file, says
+from tests.studies.command import ROOT, answer_of, refused, tolalloc
 from tests.studies.scripts import study_script
 from tolalloc.drawings.table_file import DATA
 from tolalloc.drawings.tolerance_table import load_tolerance_table
@@ -74,11 +74,7 @@ DRAWN = {"drawing.xlsx", "frames.dxf"}
 @pytest.mark.slow
 def test_te_of_table_4(tmp_path):
     folder = tmp_path / "report"
-    result = tolalloc(
-        "te", "--reducer", "rv20e_liu2020", "--unit", "table4", "--torque", "-1", "--json", "--out", folder
-    )
-    answer = json.loads(result.stdout)
-    assert result.returncode == 0
+    answer = answer_of("te", "--reducer", "rv20e_liu2020", "--unit", "table4", "--torque", "-1", "--out", folder)
     assert json.loads((folder / "summary.json").read_text(encoding="utf-8")) == answer
     assert {path.stem for path in (folder / "figures").iterdir()} == {"transmission_error", "orders", "forces"}
     assert len(pd.read_csv(folder / "tables" / "one turn.csv")) > 20
@@ -91,14 +87,14 @@ def test_te_of_table_4(tmp_path):
 @pytest.mark.slow
 def test_te_for_a_person_names_units():
     result = tolalloc("te", "--unit", "table4")
-    assert "peak-to-peak over one output turn [arcsec]" in result.stdout
+    assert result.returncode == 0, result.stderr
     assert "N·m/arcmin" in result.stdout
 
 
 def test_check_says_what_is_read_and_that_the_drawing_cannot_be_built():
     result = tolalloc("check", STUDY)
     assert result.returncode == 0
-    assert "is in order" not in result.stdout
+    assert not says(result.stdout, "check.in_order")
     assert "100.0 %" in result.stdout.splitlines()[-1]
     assert "σ =" in result.stdout
     # Rows that say the same stand in one line, others do not; the zones of the shipped table cost what they add up to.
@@ -281,16 +277,11 @@ def test_scatter_tilt_and_other_orders_are_sources_too(tmp_path, cells, words):
 
 @pytest.mark.slow
 def test_a_reducer_with_clearance_is_studied_like_any_other(tmp_path):
-    from tolalloc.reducers.reducer.files import PRESETS
-
-    text = (PRESETS / "rv20e_liu2020.reducer.toml").read_text(encoding="utf-8")
-    path = tmp_path / "loose.toml"
-    path.write_text(text + "\n[clearances]\ncrank_disc_bearing_um = 2\ncarrier_bearing_um = 1\n", encoding="utf-8")
+    clearances = "\n[clearances]\ncrank_disc_bearing_um = 2\ncarrier_bearing_um = 1\n"
+    path = reducer_file(tmp_path / "loose.toml", "rv20e_liu2020", added=clearances)
     assert tolalloc("check", study_script(tmp_path, reducer={"name": str(path), "unit": "table4"})).returncode == 0
-    answer = json.loads(tolalloc("te", "--reducer", path, "--unit", "table4", "--torque", "-10", "--json").stdout)
-    tight = json.loads(
-        tolalloc("te", "--reducer", "rv20e_liu2020", "--unit", "table4", "--torque", "-10", "--json").stdout
-    )
+    answer = answer_of("te", "--reducer", path, "--unit", "table4", "--torque", "-10")
+    tight = answer_of("te", "--reducer", "rv20e_liu2020", "--unit", "table4", "--torque", "-10")
     assert answer["statuses"]["equilibrium found"] == 936
     assert answer["lost_motion_arcmin"]["this_unit"] > 2 * tight["lost_motion_arcmin"]["this_unit"]
 
@@ -300,7 +291,7 @@ def test_a_reducer_with_clearance_is_studied_like_any_other(tmp_path):
     "reducer", ["rv20e", "rv40e", "rv80e", "rv110e", "rv160e", "rv20e_liu2020", "rv40e_xi2015", "bx40e"]
 )
 def test_every_preset_turns(reducer):
-    answer = json.loads(tolalloc("te", "--reducer", reducer, "--attribute", "--json").stdout)
+    answer = answer_of("te", "--reducer", reducer, "--attribute")
     assert answer["statuses"]["equilibrium found"] == 936
     assert 0 < answer["peak_to_peak_arcsec"] < 5  # no errors: the modification and the elastic twist alone
     assert answer["backlash_arcmin"]["this_unit"] > 10 * answer["backlash_arcmin"]["perfect_reducer"]
@@ -338,12 +329,7 @@ def test_a_truncated_table_is_refused(tmp_path):
     ],
 )
 def test_bad_reducers_are_refused_in_one_sentence(tmp_path, old, new, words):
-    from tolalloc.reducers.reducer.files import PRESETS
-
-    text = (PRESETS / "rv20e_liu2020.reducer.toml").read_text(encoding="utf-8")
-    assert old in text
-    path = tmp_path / "mine.toml"
-    path.write_text(text.replace(old, new), encoding="utf-8")
+    path = reducer_file(tmp_path / "mine.toml", "rv20e_liu2020", (old, new))
     refused(tolalloc("te", "--reducer", path), "mine.toml", *words)
 
 

@@ -11,7 +11,7 @@ from scipy.stats import norm
 
 import tolalloc as ta
 from tests.builders import says
-from tests.studies.command import refused, tolalloc
+from tests.studies.command import answer_of, refused, tolalloc
 from tolalloc.reports.finished_run import Member, read_run
 from tolalloc.sensitivity.effort import QUICK_RANKING
 from tolalloc.study.answer import Answer
@@ -64,9 +64,7 @@ def runs(tmp_path):
 
 
 def test_two_runs_side_by_side(runs, tmp_path):
-    result = tolalloc("compare", *runs, "--out", tmp_path / "report", "--json")
-    assert result.returncode == 0, result.stderr
-    answer = json.loads(result.stdout)
+    answer = answer_of("compare", *runs, "--out", tmp_path / "report")
     assert (answer["A"], answer["B"], answer["same question"]) == ("first", "second", True)
     cost = next(row for row in answer["answers"] if row["quantity"] == "cost [cost units]")
     assert cost["B − A"] == pytest.approx(8.4)
@@ -98,10 +96,10 @@ def test_two_runs_of_one_study_are_told_apart_by_their_folders_and_by_what_diffe
 
 def test_runs_of_other_questions_and_the_same_run_are_told(runs, tmp_path):
     other = run_folder(tmp_path / "other", **{"limit [arcsec]": 45.0})
-    warnings = json.loads(tolalloc("compare", runs[0], other, "--json").stdout)["warnings"]
-    assert any("not asked the same question" in sentence for sentence in warnings)
-    warnings = json.loads(tolalloc("compare", runs[0], runs[0], "--json").stdout)["warnings"]
-    assert any("one and the same study" in sentence for sentence in warnings)
+    warnings = answer_of("compare", runs[0], other)["warnings"]
+    assert says(warnings, "comparison.other_question")
+    warnings = answer_of("compare", runs[0], runs[0])["warnings"]
+    assert says(warnings, "comparison.same_study")
 
 
 @pytest.mark.parametrize(
@@ -111,7 +109,7 @@ def test_runs_of_other_questions_and_the_same_run_are_told(runs, tmp_path):
 def test_another_reducer_torque_yield_or_side_is_another_question(tmp_path, changes):
     runs = (run_folder(tmp_path / "one", asked="ranking"), run_folder(tmp_path / "two", asked="ranking", **changes))
     for pair in (runs, runs[::-1]):
-        assert json.loads(tolalloc("compare", *pair, "--json").stdout)["same question"] is False
+        assert answer_of("compare", *pair)["same question"] is False
 
 
 def test_a_limit_beside_the_leading_one_is_part_of_the_question(tmp_path):
@@ -121,7 +119,7 @@ def test_a_limit_beside_the_leading_one_is_part_of_the_question(tmp_path):
 
     asked = (required(1), required(1), required(1.2), required(1, "99 % of units"), {})
     one, *others = (run_folder(tmp_path / f"run{at}", **own) for at, own in enumerate(asked))
-    same = [json.loads(tolalloc("compare", one, own, "--json").stdout)["same question"] for own in others]
+    same = [answer_of("compare", one, own)["same question"] for own in others]
     assert same == [True, False, False, True]  # the last is of a version that did not say it
 
 
@@ -134,7 +132,7 @@ def test_rankings_of_the_same_limits_are_of_one_question(tmp_path):
     shown = {"requirement": "lost motion [arcmin]", "limit": "at most 1 arcmin", "shown for": "99.73 % of units"}
     allocated = run_folder(tmp_path / "allocated", requirements=[shown])
     pairs = ((one, one), (one, other), (one, allocated))
-    same = [json.loads(tolalloc("compare", *pair, "--json").stdout)["same question"] for pair in pairs]
+    same = [answer_of("compare", *pair)["same question"] for pair in pairs]
     assert same == [True, False, True]
 
 
@@ -154,7 +152,7 @@ def test_rankings_with_a_lower_limit_alone_are_compared(tmp_path):
 def test_a_source_of_one_run_alone_is_shown(runs):
     table = pd.read_csv(runs[1] / "tables" / "shares.csv").iloc[:1]
     table.to_csv(runs[1] / "tables" / "shares.csv", index=False)
-    answer = json.loads(tolalloc("compare", *runs, "--json").stdout)
+    answer = answer_of("compare", *runs)
     assert answer["rankings"][1]["90 % intervals"] == "only in one"
     assert answer["rankings"][1]["total index B [-]"] is None
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
 
-from tests.studies.command import tolalloc
+from tests.studies.command import answer_of, tolalloc
 
 SHOP = "process,tolerance [unit],unit,cost [cost units]\n"
 
@@ -21,9 +19,7 @@ def shop(tmp_path):
 
 @pytest.mark.slow
 def test_shop_data_become_the_form_that_made_them(shop):
-    done = tolalloc("costs", str(shop), "--json")
-    assert done.returncode == 0, done.stderr
-    taken = [fit for fit in json.loads(done.stdout)["fits"] if fit["taken"] == "yes"]
+    taken = [fit for fit in answer_of("costs", str(shop))["fits"] if fit["taken"] == "yes"]
     assert [fit["form, t in µm [cost units]"] for fit in taken] == ["0.5 + 40/t"]
     assert taken[0]["largest error [%]"] < 1e-6
     assert (taken[0]["valid from [µm]"], taken[0]["valid to [µm]"]) == (5, 40)

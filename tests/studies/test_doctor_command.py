@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
-
-from tests.studies.command import refused, tolalloc
+from tests.studies.command import answer_of, refused, tolalloc
 from tolalloc.cli import doctor
 
 
 def test_the_doctor_tells_what_it_runs_on_and_solves_a_published_unit():
-    found = json.loads(tolalloc("doctor", "--json").stdout)
+    found = answer_of("doctor")
     assert abs(found["self-test [arcsec]"] - 96.629) < 1e-3
     assert {"tolalloc", "numpy", "python"} <= set(found["versions"])
     assert found["threads"] >= 1

@@ -17,6 +17,7 @@ import pytest
 from openpyxl import load_workbook
 
 import tolalloc as ta
+from tests.builders import wording
 from tests.studies.command import refused, tolalloc
 from tests.studies.scripts import study_script
 from tolalloc.cli.console import Bars, Lines, print_table
@@ -58,7 +59,7 @@ def calculation(tmp_path):
 def test_check_says_that_a_study_is_a_program_that_it_runs(calculation):
     result = tolalloc("check", calculation)
     assert result.returncode == 0
-    assert f"A study is a Python program: {calculation} was run to read it." in result.stdout
+    assert wording("check.program", script=calculation) in result.stdout
 
 
 def test_names_are_shown_as_they_are_and_never_as_markup(capsys):

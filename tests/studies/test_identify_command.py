@@ -10,6 +10,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from tests.builders import says, wording
 from tests.studies.bench_files import (
     NAME,
     NOISE,
@@ -23,7 +24,7 @@ from tests.studies.bench_files import (
     lines,
     value,
 )
-from tests.studies.command import refused, tolalloc
+from tests.studies.command import answer_of, refused
 from tolalloc.reducers.reducer.files import load_identified_stiffness
 from tolalloc.reports.wording import number
 
@@ -111,9 +112,10 @@ def test_the_truth_is_found(run):
 @pytest.mark.slow
 def test_choices_are_judged_by_units_left_out(run):
     choices = {item["fitted"]: item["left out [noise]"] for item in run.answer["choices"]}
-    assert list(choices) == ["nothing (the reducer as given)", "K_pd"]
+    given = wording("identification.nothing_fitted")
+    assert list(choices) == [given, "K_pd"]
     assert run.answer["chosen"] == "K_pd"
-    assert choices["K_pd"] < choices["nothing (the reducer as given)"]
+    assert choices["K_pd"] < choices[given]
 
 
 @pytest.mark.slow
@@ -125,9 +127,9 @@ def test_the_stiffness_file_is_read_back_and_taken_by_te(run):
     assert identified.standard_uncertainty == {NAME: pytest.approx(found["value"] * relative)}
     assert identified.source == "simulated on the equivalent model"
     assert "identified by Gauss–Newton from 6 units of RV-20E" in identified.notes[0]
-    result = tolalloc("te", "--reducer", "rv20e_liu2020", "--stiffness", run.stiffness, "--json")
-    assert result.returncode == 0, result.stderr
-    perfect = json.loads(result.stdout)["torsional_stiffness_nm_per_arcmin"]["perfect_reducer"]
+    perfect = answer_of("te", "--reducer", "rv20e_liu2020", "--stiffness", run.stiffness)[
+        "torsional_stiffness_nm_per_arcmin"
+    ]["perfect_reducer"]
     assert perfect > 2530  # 2519 with the preset's own bearing
 
 
@@ -232,7 +234,7 @@ def test_weak_data_leave_the_stiffness_open_and_say_so(peak_to_peaks, tmp_path):
     assert low < identified.values[NAME] < high
     even = log(4) / sqrt(12)
     assert 0.5 * even < identified.standard_uncertainty[NAME] / identified.values[NAME] <= even
-    assert any("not identified" in note for note in identified.notes)
+    assert says(identified.notes, "identification.not_identified", symbol="K_pd")
 
 
 @pytest.mark.slow

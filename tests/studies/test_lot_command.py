@@ -9,7 +9,8 @@ import pandas as pd
 import pytest
 
 import tolalloc as ta
-from tests.studies.command import refused, tolalloc
+from tests.builders import headed, says
+from tests.studies.command import answer_of, refused, tolalloc
 from tolalloc.bench import lot_orders
 
 DRAWING = """id,feature,nominal [mm],plus [unit],minus [unit],unit,min [unit],max [unit],cost,spectrum,systematic,locked
@@ -63,9 +64,7 @@ def test_a_lot_of_the_drawing_s_processes_moves_nothing(tmp_path):
 def test_a_row_of_gauges_is_taken_off_the_spread_and_said(tmp_path):
     rows = ("part", [*map(str, range(1, 8)), "Gauge"]), ("hub [µm]", [*HUB, "0.5"]), ("bore.radius [µm]", [*BORE, ""])
     lot, drawing = written(tmp_path, *rows)
-    done = tolalloc("lot", lot, drawing, "--json", "--out", tmp_path / "report")
-    assert done.returncode == 0, done.stderr
-    summary = json.loads(done.stdout)
+    summary = answer_of("lot", lot, drawing, "--out", tmp_path / "report")
     hub, bore = summary["processes"]
     square = pd.Series(map(float, HUB)).var()
     assert hub["readings [-]"] == 7
@@ -181,8 +180,8 @@ def test_curves_of_a_lot_tell_the_orders_that_moved_and_what_makes_them(tmp_path
     refused(tolalloc(*asked, "--out", tmp_path / "report"), "--reducer is missing: where a file is written")
     refused(tolalloc(*asked, "--noise", "0"), "--noise is 0.0; allowed is above 0 up to 60")
     teller = ta.lot(lot, "rv20e_drawing", curves=curves, reducer="rv20e").teller
-    assert any("the order does not say which of their processes moved" in said for said in teller.sentences)
-    assert "Orders of the curves" in [section.heading for section in teller.sections]
+    assert says(teller.sentences, "lot.order_of_several")
+    assert headed(teller.sections, "lot.orders_heading")
     summary = json.loads(json.dumps(teller.summary))
     orders = {row["order"]: row for row in summary["orders of the curves"]}
     assert orders[2]["root mean square amplitude of the lot [arcsec]"] == pytest.approx(9.0, abs=1e-4)

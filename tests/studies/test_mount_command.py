@@ -7,7 +7,7 @@ import json
 import pytest
 
 from tests.builders import baseline_errors
-from tests.studies.command import refused, tolalloc
+from tests.studies.command import answer_of, refused, tolalloc
 from tolalloc.assembly.stock import drawn_parts
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reading.units import MICROMETRE
@@ -26,7 +26,7 @@ def parts_file(folder, units, seed=5):
 
 
 def test_one_unit_is_mounted_in_the_best_of_all_ways(tmp_path):
-    answer = json.loads(tolalloc("mount", str(parts_file(tmp_path, 1)), "--json").stdout)
+    answer = answer_of("mount", str(parts_file(tmp_path, 1)))
     assert answer["every mounting tried"] is True
     assert answer["units solved [-]"] == 8
     unit = answer["units"][0]

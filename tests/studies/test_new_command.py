@@ -11,7 +11,7 @@ import pytest
 from openpyxl import load_workbook
 
 import tolalloc as ta
-from tests.studies.command import refused, tolalloc
+from tests.studies.command import answer_of, refused, tolalloc
 from tolalloc.allocation.cost.process_costs import load_process_costs
 from tolalloc.assembly.files import load_errors, load_plan
 from tolalloc.bench.measurements import load_measurements
@@ -44,9 +44,7 @@ def test_a_new_folder_is_in_order_and_has_every_source(tmp_path, preset, cranks,
     for own in drawing.sources:
         first_stage = own.name.startswith(("sun.", "planet", "mesh"))
         assert own.locked == (first_stage or own.zone == 0.0)
-    checked = tolalloc("check", place / "study.py", "--json")
-    assert checked.returncode == 0, checked.stderr
-    found = json.loads(checked.stdout)
+    found = answer_of("check", place / "study.py")
     assert found["sources"] == len(drawing.sources)
     assert found["neglected"] == [own.name for own in drawing.sources if own.zone == 0.0]
     assert {"crank1.tilt", "each_pin.position"} <= {*found["neglected"]}
@@ -100,9 +98,8 @@ CLEARANCES = ("rotation clearance", "flank clearance", "radial clearance")
 
 def mean_twist(reducer) -> float:
     """Return the mean transmission error of exact parts that the command prints [arcsec]."""
-    result = tolalloc("te", "--reducer", reducer, "--json")
-    assert result.returncode == 0, result.stderr
-    (mean,) = (own for own in json.loads(result.stdout)["outputs"] if own["name"] == "mean transmission error")
+    outputs = answer_of("te", "--reducer", reducer)["outputs"]
+    (mean,) = (own for own in outputs if own["name"] == "mean transmission error")
     return mean["value"]
 
 

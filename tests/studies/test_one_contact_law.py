@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,10 +9,10 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tests.studies.command import tolalloc
+from tests.builders import reducer_file
+from tests.studies.command import answer_of
 from tolalloc.reducers.cycloid.loaded_contact import assess
 from tolalloc.reducers.equivalent.perfect import perfect_reducer
-from tolalloc.reducers.reducer.files import PRESETS
 
 TORQUE = 572.0
 
@@ -22,16 +21,7 @@ TORQUE = 572.0
 def overloaded(tmp_path_factory) -> Path:
     """An RV-40E whose rated torque is the 572 N·m at which the commands are compared."""
     path = tmp_path_factory.mktemp("own") / "rv40e.reducer.toml"
-    text = (PRESETS / "rv40e.reducer.toml").read_text(encoding="utf-8")
-    assert text.count("rated_torque_nm = 412") == 1
-    path.write_text(text.replace("rated_torque_nm = 412", f"rated_torque_nm = {TORQUE:g}"), encoding="utf-8")
-    return path
-
-
-def answer_of(*arguments: object) -> dict:
-    result = tolalloc(*arguments, "--json")
-    assert result.returncode == 0, result.stderr
-    return json.loads(result.stdout)
+    return reducer_file(path, "rv40e", ("rated_torque_nm = 412", f"rated_torque_nm = {TORQUE:g}"))
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import replace
 
@@ -10,7 +9,8 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tests.studies.command import tolalloc
+from tests.builders import random_units, says
+from tests.studies.command import answer_of, tolalloc
 from tests.studies.scripts import study_script
 from tolalloc.allocation.space.requirement import Requirement
 from tolalloc.allocation.verify.verification import Verifier
@@ -86,10 +86,7 @@ def test_a_check_counts_the_preloaded_among_random_units(tmp_path):
     assert counted["units [-]"] == 1000
     # The same share of other random units, within four standard errors of the difference.
     asked = prepared("rv20e")
-    generator, errors = np.random.default_rng(77), asked.errors
-    uniform = generator.uniform(size=(500, len(errors.columns)))
-    x = errors.deviations(errors.standard_values(uniform), errors.zones)
-    found = preload(asked.model.kernel.model, asked.model.kernel.errors(x))
+    found = preload(asked.model.kernel.model, asked.model.kernel.errors(random_units(asked.errors, 500, 77)))
     share = (found.pin_force > rated_pin_force(asked.model.reducer)).mean()
     pooled = (said * 1000 + share * 500) / 1500
     assert abs(said - share) <= 4 * np.sqrt(pooled * (1 - pooled) * (1 / 1000 + 1 / 500))
@@ -97,7 +94,7 @@ def test_a_check_counts_the_preloaded_among_random_units(tmp_path):
 
 def test_a_check_for_a_program_says_the_same(tmp_path):
     script = study_script(tmp_path, reducer={"name": "rv20e"})
-    said = json.loads(tolalloc("check", script, "--json").stdout)
+    said = answer_of("check", script)
     assert list(said["limits"]) == [ta.PEAK_TO_PEAK, ta.PRELOAD]
     assert any("are preloaded" in sentence for sentence in said["examined"])
     assert re.search(r"preloaded \(.* N of rated torque\).*: a tooth modification", said["but"])
@@ -105,7 +102,7 @@ def test_a_check_for_a_program_says_the_same(tmp_path):
 
 def test_the_last_sentence_of_a_check_says_that_units_are_preloaded_and_what_frees_them(tmp_path):
     *_, said, last = tolalloc("check", study_script(tmp_path, reducer={"name": "rv20e"})).stdout.splitlines()
-    assert said.startswith("A study is a Python program")
+    assert says(said, "check.program")
     assert "preloaded" in last and "in order" not in last
     assert "`tolalloc modify`" in last and "flank_clearance" in last
 
@@ -113,8 +110,7 @@ def test_the_last_sentence_of_a_check_says_that_units_are_preloaded_and_what_fre
 def test_a_verdict_says_that_units_are_preloaded_by_printed_stiffnesses_too():
     def verdict(reducer: ReducerChoice, scale: float) -> str:
         asked = Prepared(study=ta.Study(reducer, ta.drawing("rv20e_table4"), limits=LIMITS))
-        errors, uniform = asked.errors, np.random.default_rng(5).uniform(size=(200, len(asked.errors.columns)))
-        counted = asked.model.examined(errors.deviations(errors.standard_values(uniform), scale * errors.zones))
+        counted = asked.model.examined(random_units(asked.errors, 200, 5, scale))
         return portrait_of(asked.model).examination(counted).but
 
     assert "preloaded" in verdict(ta.reducer("rv20e"), 1.0)
@@ -131,8 +127,7 @@ def test_no_load_torque_is_said_at_output_and_motor_beside_the_one_that_the_cata
         stated = replace(choice.reducer.catalogue, no_load_torque=allowed)
         choice = replace(choice, reducer=replace(choice.reducer, catalogue=stated))
         asked = Prepared(study=ta.Study(choice, ta.drawing("rv20e_table4"), limits=LIMITS))
-        uniform = np.random.default_rng(6).uniform(size=(200, len(asked.errors.columns)))
-        x = asked.errors.deviations(asked.errors.standard_values(uniform), scale * asked.errors.zones)
+        x = random_units(asked.errors, 200, 6, scale)
         return asked.model, x, portrait_of(asked.model).examination(asked.model.examined(x))
 
     model, x, said = examined(2.75, 1.0)

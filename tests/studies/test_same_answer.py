@@ -11,7 +11,7 @@ import pytest
 
 import tolalloc as ta
 from tests.golden.record import steady
-from tests.studies.command import tolalloc
+from tests.studies.command import answer_of, tolalloc
 from tolalloc.exceptions import InputError, TolallocError
 
 RV40E = {"reducer": "rv40e_xi2015"}
@@ -25,9 +25,7 @@ def same(word: str, *positional: object, typed: str = "", **named: object) -> ta
     """
     answer = getattr(ta, word)(*positional, **named)
     given = [part for name, value in named.items() if value is not True for part in (f"--{name}", value)]
-    done = tolalloc(word, *positional, *given, *typed.split(), "--json")
-    assert done.returncode == 0, done.stderr
-    assert _plain(answer.summary) == _plain(json.loads(done.stdout))
+    assert _plain(answer.summary) == _plain(answer_of(word, *positional, *given, *typed.split()))
     return answer
 
 
@@ -94,18 +92,16 @@ def test_identify(mine):
     names = ["crank_disc_bearing=1e8:1e9", "carrier_bearing"]
     typed = f"--parameter {names[0]} --parameter {names[1]} --reducer {mine / 'reducer.toml'}"
     answer = ta.identify(mine / "bench.toml", reducer=str(mine / "reducer.toml"), parameters=names)
-    done = tolalloc("identify", mine / "bench.toml", *typed.split(), "--json")
-    assert done.returncode == 0, done.stderr
-    assert _plain(answer.summary) == _plain(json.loads(done.stdout))
+    assert _plain(answer.summary) == _plain(answer_of("identify", mine / "bench.toml", *typed.split()))
     assert [item.parameter.symbol for item in answer.result.estimates] == ["K_pd", "K_ca"]
 
 
 def test_identify_from_the_catalogue(tmp_path):
     files = [tmp_path / f"{name}.stiffness.toml" for name in ("scripted", "typed")]
     answer = ta.identify(reducer="rv20e", catalogue=True, write_to=files[0])
-    done = tolalloc("identify", "--catalogue", "--reducer", "rv20e", "--write", files[1], "--json")
-    assert done.returncode == 0, done.stderr
-    assert _plain(answer.summary) == _plain(json.loads(done.stdout))
+    assert _plain(answer.summary) == _plain(
+        answer_of("identify", "--catalogue", "--reducer", "rv20e", "--write", files[1])
+    )
     assert files[0].read_bytes() == files[1].read_bytes()
     assert 1.0 < answer.result.factor < 1.5
 
@@ -241,34 +237,27 @@ def script(tmp_path):
     return path
 
 
-def typed(*words: object) -> Any:
-    """Return what a command prints for a program."""
-    done = tolalloc(*words, "--json")
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
-
-
 def test_check(script):
     answer = ta.check(script)
-    assert _plain(answer.summary) == _plain(typed("check", script))
+    assert _plain(answer.summary) == _plain(answer_of("check", script))
     assert "\n".join(answer.sentences) == tolalloc("check", script).stdout.rstrip("\n")
     assert answer.summary["questions"] == ["allocation"]
 
 
 def test_whatif(script):
     answer = ta.whatif(script, {"shaft": 20.0}, units=200)
-    assert _plain(answer.summary) == _plain(typed("whatif", script, "shaft=0.02mm", "--units", 200))
+    assert _plain(answer.summary) == _plain(answer_of("whatif", script, "shaft=0.02mm", "--units", 200))
 
 
 @pytest.mark.slow
 def test_series_and_compare(script, tmp_path):
     answer = ta.series([script], tmp_path / "runs")
     assert answer.summary["studies"][0]["answer"] == "met"
-    assert _plain(answer.summary) == _plain(typed("series", script, "--out", tmp_path / "runs"))
+    assert _plain(answer.summary) == _plain(answer_of("series", script, "--out", tmp_path / "runs"))
     runs = [tmp_path / "runs" / "own"] * 2
     compared = ta.compare(*runs)
     assert compared.result.same_question
-    assert _plain(compared.summary) == _plain(typed("compare", *runs))
+    assert _plain(compared.summary) == _plain(answer_of("compare", *runs))
 
 
 def test_new_and_schema(tmp_path):

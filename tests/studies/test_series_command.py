@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from tests.studies.command import refused, tolalloc
+from tests.studies.command import answer_of, refused, tolalloc
 
 STUDY = """
 import tolalloc as ta
@@ -36,9 +36,8 @@ def script(folder, name, half=0.03, function="gap"):
 def test_a_series_is_one_table_and_is_not_run_twice(tmp_path):
     wide, tight = script(tmp_path, "wide"), script(tmp_path, "tight", half=0.02)
     broken = script(tmp_path, "broken", function="lambda housing, shaft: float('nan')")
-    first = tolalloc("series", wide, tight, broken, "--out", tmp_path / "runs", "--json")
-    assert first.returncode == 0, first.stderr
-    rows = {row["study"]: row for row in json.loads(first.stdout)["studies"]}
+    answered = answer_of("series", wide, tight, broken, "--out", tmp_path / "runs")
+    rows = {row["study"]: row for row in answered["studies"]}
     assert list(rows) == ["wide", "tight", "broken"]
     assert rows["wide"]["answer"] == rows["tight"]["answer"] == "met"
     assert rows["tight"]["cost [cost units]"] > 1.3 * rows["wide"]["cost [cost units]"]
@@ -97,9 +96,8 @@ def scaled(by):
 
 
 def costs_of(*arguments):
-    found = tolalloc("series", *arguments, "--json")
-    assert found.returncode == 0, found.stderr
-    return {row["study"]: (row["cost [cost units]"], row["folder"]) for row in json.loads(found.stdout)["studies"]}
+    studies = answer_of("series", *arguments)["studies"]
+    return {row["study"]: (row["cost [cost units]"], row["folder"]) for row in studies}
 
 
 @pytest.mark.slow

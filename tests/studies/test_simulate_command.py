@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from tests.builders import says
-from tests.studies.command import process, refused, tolalloc
+from tests.studies.command import answer_of, process, refused, tolalloc
 from tolalloc.exceptions import TolallocError
 from tolalloc.reducers.simulation import SimulationRequest, prepare_simulation
 
@@ -64,9 +64,7 @@ def test_the_compliance_decides_how_many_pins_carry():
 @pytest.mark.slow
 @INSTALLED
 def test_the_prototype_turns_with_the_same_ratio():
-    answer = json.loads(
-        tolalloc("simulate", "--reducer", "rv40e_xi2015", *SHORT, "--engine", "exudyn", "--json").stdout
-    )
+    answer = answer_of("simulate", "--reducer", "rv40e_xi2015", *SHORT, "--engine", "exudyn")
     assert answer["in motion"]["ratio [-]"] == pytest.approx(81, rel=1e-5)
     assert answer["in motion"]["mean transmission error [arcsec]"] == pytest.approx(
         answer["at rest"]["mean transmission error [arcsec]"], abs=1.5

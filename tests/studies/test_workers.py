@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tests.builders import prepared
+from tests.builders import prepared, seeded_units
 from tests.studies.command import tolalloc
 from tests.studies.scripts import study_script
-from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.running.result_cache import ResultCache
 from tolalloc.running.workers import workers_at
@@ -35,8 +34,7 @@ def study():
 
 @pytest.fixture(scope="module")
 def units(study):
-    uniform = np.concatenate([*SeedTree(5).uniform_chunks(UNITS, len(study.errors.columns))])
-    return study.errors.deviations(study.errors.standard_values(uniform), study.errors.zones)
+    return seeded_units(study.errors, UNITS, 5)
 
 
 @pytest.fixture(scope="module")

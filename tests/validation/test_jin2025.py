@@ -15,6 +15,7 @@ import pytest
 from scipy.stats import spearmanr
 
 import tolalloc as ta
+from tests.builders import deviations_at
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
@@ -59,9 +60,7 @@ def model() -> EquivalentModel:
 def outputs(model: EquivalentModel, errors: ErrorModel, uniform: np.ndarray) -> np.ndarray:
     """Return the peak-to-peak and the largest transmission error, mean included, from uniform numbers [arcsec]."""
     units = np.zeros((uniform.shape[0], len(model.columns)))
-    units[:, [model.columns.index(name) for name in errors.columns]] = errors.deviations(
-        errors.standard_values(uniform), errors.zones
-    )
+    units[:, [model.columns.index(name) for name in errors.columns]] = deviations_at(errors, uniform)
     for name, amount in model.reducer.modification.deviations.items():
         units[:, model.columns.index(name)] += amount
     solved = model.equilibria(units, model.reducer.load.test_torque, ANGLES)

@@ -13,6 +13,7 @@ from operator import add
 import numpy as np
 import pytest
 
+from tests.builders import source
 from tests.first_order import design_point
 from tests.reliability import FOUR_BRANCHES, MARGINS, PROBLEMS, problem
 from tolalloc.capability.experiment import Experiment, SumOfSizes
@@ -20,8 +21,7 @@ from tolalloc.capability.limit_state import RareFailure, ResponseLimit
 from tolalloc.capability.rare_failure import scaled_sigma_sampling, subset_simulation
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import Source
-from tolalloc.drawings.zones import Distribution, Feature
+from tolalloc.drawings.zones import Distribution
 
 ot = pytest.importorskip("openturns", reason="OpenTURNS, the oracle of rare failures, is not installed.")
 pytestmark = pytest.mark.slow
@@ -39,15 +39,8 @@ SAMPLES = 10_000
 
 def stack() -> ResponseLimit:
     """Return the limit of a chain of sizes as a drawing states them."""
-    errors = ErrorModel(
-        tuple(
-            Source(
-                name=name, part="part", feature=Feature.SIZE, zone=zone, minimum=zone / 10, maximum=zone * 10, cost=1.0,
-                distribution=Distribution.UNIFORM if name in UNIFORM else Distribution.NORMAL,
-            )
-            for name, zone in ZONES.items()
-        )
-    )  # fmt: skip
+    forms = {name: Distribution.UNIFORM if name in UNIFORM else Distribution.NORMAL for name in ZONES}
+    errors = ErrorModel(tuple(source(name, zone=zone, distribution=forms[name]) for name, zone in ZONES.items()))
     return ResponseLimit(experiment=Experiment.of(SumOfSizes(errors.columns), errors, SeedTree(1)), limit=LIMIT)
 
 

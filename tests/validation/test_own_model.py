@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
+from tests.builders import says
 from tolalloc.allocation.space.effort import QUICK_ALLOCATION
 from tolalloc.reports.portrait import portrait_of
 
@@ -159,7 +160,7 @@ def test_grades_of_a_model_without_settings(study):
     assert found.met
     assert all(source.grade for source in found.drawing.sources)
     assert found.cost >= published()["total"]
-    assert str(answer).startswith("The cheapest verified drawing of contact angle")
+    assert says(str(answer), "allocation.title", model="contact angle")
 
 
 def test_what_a_function_takes_and_returns_is_checked(study):

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.builders import deviations_at
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.ladder import grade_zones
 from tolalloc.drawings.seeds import SeedTree
@@ -46,9 +47,7 @@ def indices(grade: str, blocks: int = BLOCKS) -> SaltelliIndices:
     design = SaltelliDesign(factor_groups=errors.block_of_column, seed=7, second_order=True)
     uniform = np.clip(np.concatenate(list(design.chunks(0, blocks))), 2.0**-31, None)
     units = np.zeros((uniform.shape[0], len(model.columns)))
-    units[:, [model.columns.index(name) for name in errors.columns]] = errors.deviations(
-        errors.standard_values(uniform), errors.zones
-    )
+    units[:, [model.columns.index(name) for name in errors.columns]] = deviations_at(errors, uniform)
     for name, amount in reducer.modification.deviations.items():
         units[:, model.columns.index(name)] += amount
     solved = model.equilibria(units, reducer.load.test_torque, ANGLES)

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.builders import says
-from tests.studies.command import refused, tolalloc
+from tests.builders import numbers_of, says
+from tests.studies.command import answer_of, refused, tolalloc
 from tests.validation_manual import shown
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCMINUTE
@@ -118,22 +118,15 @@ def test_preload_is_what_presses_at_the_torque_of_backlash():
 
 @pytest.mark.slow
 def test_te_says_that_the_unit_of_table_4_is_preloaded():
-    answer = json.loads(tolalloc("te", "--reducer", "rv20e", "--unit", "table4", "--json").stdout)
+    answer = answer_of("te", "--reducer", "rv20e", "--unit", "table4")
     assert says(answer["warnings"][0], "transmission_error.preloaded", force=answer["pin_force_without_torque_n"])
     assert answer["pin_force_without_torque_n"] > 1000
-    exact = json.loads(tolalloc("te", "--reducer", "rv20e", "--unit", "exact", "--json").stdout)
+    exact = answer_of("te", "--reducer", "rv20e", "--unit", "exact")
     assert not any("preloaded" in warning for warning in exact["warnings"])
     friction = exact["friction"]
     assert 80 < friction["efficiency_at_rated_torque_percent"] < 92
     assert friction["no_load_torque_nm"] < 1 < 10 < answer["friction"]["no_load_torque_nm"]
     assert friction["by_contact"][0]["contact"] == "pins"
-    assert any("coefficients of friction" in own for own in exact["assumptions"])
-
-
-def numbers(found):
-    """Every number of an answer, in its order."""
-    inner = found.values() if isinstance(found, dict) else found if isinstance(found, list) else ()
-    return [found] if isinstance(found, int | float) else [number for one in inner for number in numbers(one)]
 
 
 @pytest.mark.parametrize("method", ["li2018", "song2019"])
@@ -142,8 +135,8 @@ def test_written_amounts_give_what_modify_promises(tmp_path, preset, method):
     written = tmp_path / "new.reducer.toml"
     given = ("--reducer", preset, "--rotation", "0.0005", "--radial", "12", "--json")
     promised = json.loads(tolalloc("modify", method, *given, "--write", written).stdout)
-    found = json.loads(tolalloc("contact", "--reducer", written, "--json").stdout)
-    assert numbers(found) == pytest.approx(numbers(promised["contact"]), rel=1e-6, abs=1e-6)
+    found = answer_of("contact", "--reducer", written)
+    assert numbers_of(found) == pytest.approx(numbers_of(promised["contact"]), rel=1e-6, abs=1e-6)
     old, new = load_reducer(preset), load_reducer(written)
     assert new.modification.equidistant * 1e6 == pytest.approx(promised["equidistant amount [µm]"], rel=1e-12)
     assert new.modification.shift * 1e6 == pytest.approx(promised["shift amount [µm]"], rel=1e-12)

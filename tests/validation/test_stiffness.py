@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from studies.published.liu2020_table2 import mesh_as_printed, pin_contact_as_printed
+from tests.builders import reducer_file
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reducers.cycloid.loaded_contact import pin_contact_table2
 from tolalloc.reducers.reducer.design import CycloidStage
 from tolalloc.reducers.reducer.files import (
-    PRESETS,
     load_identified_stiffness,
     load_reducer,
     with_stiffness,
@@ -130,31 +131,28 @@ def test_every_sound_row_is_a_force_over_a_length():
     assert scaled(lambda s, f, e: largest_preload(0.003 * s, 19, e, 0.3)) == pytest.approx(force)
 
 
-def reducer_with(tmp_path, old: str, new: str):
-    text = (PRESETS / "rv20e_liu2020.reducer.toml").read_text(encoding="utf-8")
-    assert old in text
-    path = tmp_path / "mine.toml"
-    path.write_text(text.replace(old, new), encoding="utf-8")
-    return path
+def altered(folder: Path, old: str, new: str) -> Path:
+    """Return the file of a reducer with one text changed."""
+    return reducer_file(folder / "mine.toml", "rv20e_liu2020", (old, new))
 
 
 def test_carrier_bearing_from_a_file(tmp_path):
     balls = "{{ ball_radius_mm = 3, balls = 19, preload_n = {} }}"
-    path = reducer_with(tmp_path, "carrier_bearing = 7.85e10", "carrier_bearing = " + balls.format(1000))
+    path = altered(tmp_path, "carrier_bearing = 7.85e10", "carrier_bearing = " + balls.format(1000))
     assert load_reducer(path).stiffness.carrier_bearing == ball_bearing(0.003, 19, 1000.0, 206e9, 0.3)
-    path = reducer_with(tmp_path, "carrier_bearing = 7.85e10", "carrier_bearing = " + balls.format(30000))
+    path = altered(tmp_path, "carrier_bearing = 7.85e10", "carrier_bearing = " + balls.format(30000))
     with pytest.raises(InputError, match=r"mine\.toml: stiffness\.carrier_bearing\.preload_n is 30000; .* 2\.581e\+04"):
         load_reducer(path)
 
 
 def test_a_shaft_too_short_to_bend_is_refused(tmp_path):
-    path = reducer_with(tmp_path, "sun_support = 1e8 ", "sun_support = { diameter_mm = 20, length_mm = 15 } ")
+    path = altered(tmp_path, "sun_support = 1e8 ", "sun_support = { diameter_mm = 20, length_mm = 15 } ")
     with pytest.raises(InputError, match=r"sun_support: length_mm is 15; allowed is diameter_mm = 20 or more"):
         load_reducer(path)
-    path = reducer_with(tmp_path, "sun_support = 1e8 ", "sun_support = { diameter_mm = -2, length_mm = 15 } ")
+    path = altered(tmp_path, "sun_support = 1e8 ", "sun_support = { diameter_mm = -2, length_mm = 15 } ")
     with pytest.raises(InputError, match=r"stiffness\.sun_support\.diameter_mm is -2; input should be greater than 0"):
         load_reducer(path)
-    path = reducer_with(tmp_path, "sun_support = 1e8 ", "sun_support = { diameter = 20, length_mm = 15 } ")
+    path = altered(tmp_path, "sun_support = 1e8 ", "sun_support = { diameter = 20, length_mm = 15 } ")
     with pytest.raises(
         UnknownNameError, match=r"stiffness\.sun_support\.diameter' .* stiffness\.sun_support\.diameter_mm"
     ):
@@ -162,12 +160,9 @@ def test_a_shaft_too_short_to_bend_is_refused(tmp_path):
 
 
 def test_formulas_from_a_file(tmp_path):
-    text = (PRESETS / "rv20e_liu2020.reducer.toml").read_text(encoding="utf-8")
-    text = text.replace("crank_disc_bearing = 1.09e10", "crank_disc_bearing = { loaded_length_mm = 122.6 }")
-    text = text.replace("sun_support = 1e8 ", "sun_support = { diameter_mm = 20, length_mm = 100 } ")
-    path = tmp_path / "mine.toml"
-    path.write_text(text, encoding="utf-8")
-    stiffness = load_reducer(path).stiffness
+    bearing = ("crank_disc_bearing = 1.09e10", "crank_disc_bearing = { loaded_length_mm = 122.6 }")
+    support = ("sun_support = 1e8 ", "sun_support = { diameter_mm = 20, length_mm = 100 } ")
+    stiffness = load_reducer(reducer_file(tmp_path / "mine.toml", "rv20e_liu2020", bearing, support)).stiffness
     assert stiffness.crank_disc_bearing == roller_bearing(0.1226, 206e9, 0.3)
     assert stiffness.sun_support == shaft_support(0.02, 0.1, 206e9)
 

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from tests.builders import reducer_file
 from tests.validation_manual import shown
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
@@ -27,7 +28,7 @@ from tolalloc.reducers.cycloid.loaded_contact import (
     pressed_linear,
 )
 from tolalloc.reducers.reducer.design import Reducer
-from tolalloc.reducers.reducer.files import PRESETS, load_reducer
+from tolalloc.reducers.reducer.files import load_reducer
 
 DEFLECTION = 17.603 * MICROMETRE
 PIN_0 = np.zeros(1)
@@ -188,10 +189,7 @@ def test_sixteen_teeth_need_pins_that_bend_between_supports_31_mm_apart(rv40e, m
 
 
 def test_forty_disc_teeth_as_printed_are_refused(tmp_path):
-    path = tmp_path / "printed.toml"
-    text = (PRESETS / "rv40e_xi2015.reducer.toml").read_text(encoding="utf-8")
-    assert "disc_teeth = 39" in text
-    path.write_text(text.replace("disc_teeth = 39", "disc_teeth = 40"), encoding="utf-8")
+    path = reducer_file(tmp_path / "printed.toml", "rv40e_xi2015", ("disc_teeth = 39", "disc_teeth = 40"))
     with pytest.raises(InputError, match="disc_teeth must be pin_count − 1 = 39"):
         load_reducer(path)
 

@@ -15,10 +15,9 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tests.builders import FIRST_STAGE, STANDING, drawn_units, only, table_of_three_cranks, with_ovality
+from tests.builders import FIRST_STAGE, STANDING, drawn_units, only, seeded_units, table_of_three_cranks, with_ovality
 from tests.validation_manual import shown
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import order_spectrum
@@ -177,8 +176,7 @@ def test_prototypes_beside_a_drawing_that_can_be_built(scale, oval, kelvin, band
     drawing = with_ovality(drawing.with_sources(wider), oval)
     reducer = ta.reducer("rv80e", neglected=("disc*.tilt",), disc_temperature=kelvin)
     model, errors = reducer.set_to(drawing.settings).bound(drawing.errors, "test"), drawing.errors
-    uniform = np.concatenate(list(SeedTree(1).uniform_chunks(512, len(errors.columns))))
-    x = errors.deviations(errors.standard_values(uniform), errors.zones)
-    found = np.quantile(model.reading((ta.PEAK_TO_PEAK,))(x).values[:, 0], [0.025, 0.5, 0.975])
+    values = model.reading((ta.PEAK_TO_PEAK,))(seeded_units(errors, 512)).values
+    found = np.quantile(values[:, 0], [0.025, 0.5, 0.975])
     assert found == pytest.approx(band, abs=2.5)  # the ends of 512 units are known to 1.2" (one standard error)
     assert bool((found[2] > MEASURED).all() and (found[0] < MEASURED).all()) is inside

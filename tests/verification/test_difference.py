@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +10,7 @@ from scipy.stats import norm
 
 import tolalloc as ta
 from tests.builders import says
-from tests.studies.command import tolalloc
+from tests.studies.command import answer_of, tolalloc
 from tolalloc.capability.monte_carlo import quantile_change, share_change
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, UnknownNameError
@@ -151,9 +150,8 @@ def test_the_command_says_what_python_says(tmp_path):
         "import tolalloc as ta\nfrom tests.verification.test_difference import fit\nstudy = fit()\n",
         encoding="utf-8",
     )
-    result = tolalloc("whatif", script, "hous*=20", "--units", "2048", "--json", "--out", tmp_path / "report")
-    assert result.returncode == 0, result.stderr
-    told, own = json.loads(result.stdout), fit().ask(ta.Difference(zones={"hous*": 20.0}, units=2048)).summary
+    told = answer_of("whatif", script, "hous*=20", "--units", "2048", "--out", tmp_path / "report")
+    own = fit().ask(ta.Difference(zones={"hous*": 20.0}, units=2048)).summary
     assert told["changes"] == own["changes"]
     assert (tmp_path / "report" / "report.html").stat().st_size > 0
     for text in ("shaft", "shaft=x"):

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import pytest
 
-from tests.studies.command import refused, tolalloc
+from tests.builders import says
+from tests.studies.command import answer_of, refused, tolalloc
 from tolalloc.bench.catalogue import identify_from_catalogue, with_bearings
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCMINUTE
@@ -47,7 +47,7 @@ def test_printed_stiffnesses_are_scaled_alike():
     found = identify_from_catalogue(printed)
     assert found.factor < 0.05
     answer = Answer(kind="catalogue", header=Header(name="catalogue", model=printed.name), result=found)
-    assert "look for another part" in answer.warnings[0]
+    assert says(answer.warnings[0], "catalogue.warning", factor=found.factor)
     for name in RV.identified:
         ratio = getattr(found.after.stiffness, name) / getattr(printed.stiffness, name)
         assert ratio == pytest.approx(found.factor, rel=1e-12)
@@ -56,9 +56,7 @@ def test_printed_stiffnesses_are_scaled_alike():
 @pytest.mark.slow
 def test_the_file_gives_a_study_the_same_rigidity(tmp_path):
     path = tmp_path / "bearings.toml"
-    result = tolalloc("identify", "--catalogue", "--reducer", "rv20e", "--write", path, "--json")
-    assert result.returncode == 0, result.stderr
-    said = json.loads(result.stdout)
+    said = answer_of("identify", "--catalogue", "--reducer", "rv20e", "--write", path)
     identified = load_identified_stiffness(path)
     assert dict(identified.values) == said["stiffness at rated torque [N/m]"]
     rigidity = exact_loop(with_stiffness(load_reducer("rv20e"), identified)).torsional_stiffness[0] * ARCMINUTE
