@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.golden.cases import SHIPPED
+from tests.golden.cases import PUSHED, SHIPPED
 from tests.studies.command import ROOT, process, refused
 from tests.studies.paper import can_print, lost
 from tests.studies.test_golden import require_golden
@@ -62,7 +62,10 @@ SAYS: dict[str, Callable[[subprocess.CompletedProcess[str], Path], None]] = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("script", STUDIES, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "script",
+    [pytest.param(own, marks=pytest.mark.push if own.stem in PUSHED else (), id=own.stem) for own in STUDIES],
+)
 def test_a_study_runs_and_writes_its_report(script, tmp_path):
     def look(result: subprocess.CompletedProcess[str], made: Path) -> None:
         folder = made / "run"

@@ -13,7 +13,7 @@ from math import isclose
 
 import pytest
 
-from tests.golden.cases import LONGER, SMALL, Case
+from tests.golden.cases import LONGER, PUSHED, SMALL, Case
 from tests.golden.record import CASES, Look, Run, kept, recorded
 from tests.studies.command import tolalloc
 
@@ -62,9 +62,11 @@ def _settled(case: Case, text: str) -> str:
     return "\n".join(line for line in text.splitlines() if not re.search(case.wandering, line))
 
 
-@pytest.mark.parametrize(
-    "name",
-    [*(case.name for case in SMALL), *(pytest.param(case.name, marks=pytest.mark.slow) for case in LONGER)],
-)
-def test_a_command_says_and_writes_what_it_did(name):
-    require_golden(name)
+def marks_of(case: Case) -> list[pytest.MarkDecorator]:
+    """Return the marks of the test of a case."""
+    return [] if case in SMALL else [pytest.mark.slow, *([pytest.mark.push] if case.name in PUSHED else [])]
+
+
+@pytest.mark.parametrize("case", [pytest.param(own, marks=marks_of(own), id=own.name) for own in (*SMALL, *LONGER)])
+def test_a_command_says_and_writes_what_it_did(case):
+    require_golden(case.name)
