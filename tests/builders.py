@@ -33,7 +33,9 @@ from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import TolallocError
 from tolalloc.models.model import Evaluation
 from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import PRESETS
+from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.reports.document import Section
 from tolalloc.reports.wording import Spoken, number
 from tolalloc.study.prepared import Prepared
@@ -92,7 +94,7 @@ def source(name: str, feature: Feature = Feature.SIZE, zone: float = 6.0, **chan
     return Source(name=name, feature=feature, zone=zone, **own)
 
 
-def sizes(names: Iterable[str], *, correlation: Correlation | None = None, **changes: Any) -> ErrorModel:
+def sizes(names: Iterable[str], correlation: Correlation | None = None, **changes: Any) -> ErrorModel:
     """Return independent sizes of standard deviation 1 by these names, unless fields are changed."""
     return ErrorModel(tuple(source(name, **changes) for name in names), correlation=correlation or Correlation())
 
@@ -121,6 +123,12 @@ class Sum:
 
     def __call__(self, x: np.ndarray) -> Evaluation:
         return Evaluation(values=x.sum(axis=1, keepdims=True), status=np.zeros(x.shape[0], np.uint8))
+
+
+def written(path: Path, content: str | bytes, encoding: str = "utf-8") -> Path:
+    """Write a file byte by byte and return its path."""
+    path.write_bytes(content if isinstance(content, bytes) else content.encode(encoding))
+    return path
 
 
 def refusal(read: Callable[[Path], object], path: Path) -> str:
@@ -237,6 +245,18 @@ def unit_with(model: EquivalentModel, **errors: float) -> np.ndarray:
     return np.array([[known.get(name, 0.0) for name in model.columns]])
 
 
+def kernel_of(model: EquivalentModel, errors: ErrorModel, torque: float) -> KernelResponse:
+    """Return the model at a torque as a function of the errors alone, its modification as designed, the rest 0."""
+    still = dict.fromkeys(model.columns, 0.0) | model.reducer.modification.deviations
+    fixed = {name: value for name, value in still.items() if name not in errors.columns}
+    return KernelResponse(model=model, torque=torque, columns=errors.columns, fixed=fixed)
+
+
+def at_constant_contact(reducer: Reducer) -> Reducer:
+    """Return a reducer whose pin contacts are springs of one stiffness at every force."""
+    return replace(reducer, stiffness=replace(reducer.stiffness, pin_contact_law="constant"))
+
+
 def reducer_file(path: Path, preset: str, *changes: tuple[str, str], added: str = "") -> Path:
     """Write the file of a shipped reducer with texts changed, each of which stands in it once, and return its path."""
     text = (PRESETS / f"{preset}.reducer.toml").read_text(encoding="utf-8")
@@ -245,6 +265,14 @@ def reducer_file(path: Path, preset: str, *changes: tuple[str, str], added: str 
         text = text.replace(old, new)
     path.write_text(text + added, encoding="utf-8")
     return path
+
+
+SHOP = "process,tolerance [unit],unit,cost [cost units]\n"
+
+
+def shop_file(path: Path) -> Path:
+    """Write what a shop asks for a process at five zones t in µm, 0.5 + 40/t, and return the file's path."""
+    return written(path, SHOP + "".join(f"ground,{zone},µm,{0.5 + 40 / zone}\n" for zone in (5, 8, 12, 20, 40)))
 
 
 def few_sources(folder: Path, *names: str, **columns: str) -> Path:

@@ -11,7 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 import tolalloc as ta
-from tests.verification.test_own_words import ROWS, summed
+from tests.builders import study_of_lengths, written
+from tests.verification.test_own_words import ROWS
 from tolalloc.cli.main import app
 from tolalloc.drawings.tolerance_table import table_text
 from tolalloc.exceptions import InputError
@@ -27,20 +28,12 @@ TURNED = "*,turned,reciprocal,0.5,40,5,200,x\n*,ground,reciprocal,1.5,25,5,60,x\
 
 
 def table(folder: Path, unit: str) -> Path:
-    path = folder / "zones.csv"
     text = table_text(ta.Drawing.of_rows(ROWS).sources, folder)
-    path.write_text(text.replace("[cost units]", f"[{unit}]"), encoding="utf-8")
-    return path
+    return written(folder / "zones.csv", text.replace("[cost units]", f"[{unit}]"))
 
 
 def study(drawing: ta.Drawing) -> ta.Study:
-    return ta.Study(
-        ta.model(summed, inputs=dict.fromkeys("abc", 0.0), outputs=("length [mm]",)),
-        drawing,
-        limits={"length [mm]": ta.Limit(lower=-0.03, upper=0.03)},
-        questions=[ta.Ranking(), ta.Allocation(front=False, what_if=False)],
-        effort="quick",
-    )
+    return study_of_lengths(drawing, questions=[ta.Ranking(), ta.Allocation(front=False, what_if=False)])
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 import tolalloc as ta
-from tests.verification.test_own_words import ROWS, summed
+from tests.builders import study_of_lengths
+from tests.verification.test_own_words import ROWS
 from tolalloc.study.duration import Duration, durations
 from tolalloc.study.prepared import Prepared
 
@@ -26,15 +27,8 @@ def require_foretold(study: ta.Study) -> None:
 
 @pytest.mark.slow
 def test_the_units_of_an_own_function_are_foretold():
-    require_foretold(
-        ta.Study(
-            ta.model(summed, inputs=dict.fromkeys("abc", 0.0), outputs=("length [mm]",)),
-            ta.Drawing.of_rows(ROWS),
-            limits={"length [mm]": ta.Limit(lower=-0.03, upper=0.03)},
-            questions=[ta.Ranking(), ta.Allocation(front=False, what_if=False)],
-            effort="quick",
-        )
-    )
+    questions = [ta.Ranking(), ta.Allocation(front=False, what_if=False)]
+    require_foretold(study_of_lengths(ta.Drawing.of_rows(ROWS), questions=questions))
 
 
 @pytest.mark.slow

@@ -5,15 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.builders import sizes
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.limit_state import ResponseLimit
 from tolalloc.capability.monte_carlo import monte_carlo
 from tolalloc.capability.rare_failure import scaled_sigma_sampling, subset_simulation
 from tolalloc.capability.yield_at_limit import yield_at_limit
-from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import Source
-from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError
 from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.effort import RankingEffort, SobolEffort
@@ -24,9 +22,7 @@ from tolalloc.sensitivity.surrogate.validation import answers_of
 from tolalloc.sensitivity.target import target_sensitivity
 from tolalloc.study.problem import QUICK
 
-ERRORS = ErrorModel(
-    (Source(name="a", part="part", feature=Feature.SIZE, zone=6.0, minimum=1.0, maximum=9.0, cost=1.0),)
-)
+ERRORS = sizes("a", minimum=1.0, maximum=9.0)
 SEEDS = SeedTree(0)
 
 

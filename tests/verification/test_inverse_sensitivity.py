@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from tests.builders import source
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import Source
-from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.inverse import inverse_sensitivity
@@ -24,21 +23,9 @@ TARGET = 0.99
 
 
 def errors_with(group: str = "") -> ErrorModel:
-    return ErrorModel(
-        tuple(
-            Source(
-                name=name,
-                part="part",
-                feature=Feature.SIZE,
-                zone=6.0 * deviation,
-                minimum=0.001,
-                maximum=9.0,
-                cost=1.0,
-                group=group,
-            )
-            for name, deviation in zip(NAMES, DEVIATIONS, strict=True)
-        )
-    )
+    limits = {"minimum": 0.001, "maximum": 9.0, "group": group}
+    sources = (source(name, zone=6.0 * own, **limits) for name, own in zip(NAMES, DEVIATIONS, strict=True))
+    return ErrorModel(tuple(sources))
 
 
 ERRORS = errors_with()

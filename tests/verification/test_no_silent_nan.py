@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
+from tests.builders import sizes
 from tests.first_order import DesignPoints, design_point, design_points, importance_sampling
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.indices import Limits, capability, quantile_interval
@@ -19,10 +20,7 @@ from tolalloc.capability.limit_state import ResponseLimit
 from tolalloc.capability.monte_carlo import monte_carlo
 from tolalloc.capability.rare_failure import scaled_sigma_sampling, subset_simulation
 from tolalloc.capability.yield_at_limit import YieldAtLimit, yield_at_limit
-from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import Source
-from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.derivatives import classical_estimate
@@ -30,12 +28,7 @@ from tolalloc.sensitivity.saltelli import saltelli_indices
 
 KINDS = ("NaN", "status")
 NAMES = ("a", "b", "c")
-ERRORS = ErrorModel(
-    tuple(
-        Source(name=name, part="part", feature=Feature.SIZE, zone=6.0, minimum=1.0, maximum=9.0, cost=1.0)
-        for name in NAMES
-    )
-)
+ERRORS = sizes(NAMES, minimum=1.0, maximum=9.0)
 SEEDS = SeedTree(0, ("planted",))
 
 

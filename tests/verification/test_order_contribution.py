@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from tests.builders import sizes
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import Source
-from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.effort import SobolEffort
@@ -31,9 +30,7 @@ SHARES = AMPLITUDES**2 / (AMPLITUDES**2).sum(axis=1, keepdims=True)
 
 
 def errors() -> ErrorModel:
-    """Return normal sources of standard deviation 1."""
-    common = {"part": "part", "feature": Feature.SIZE, "minimum": 1.0, "maximum": 10.0, "cost": 1.0}
-    return ErrorModel(tuple(Source(name=name, zone=6.0, **common) for name in NAMES))
+    return sizes(NAMES, minimum=1.0, maximum=10.0)
 
 
 @dataclass(frozen=True)

@@ -7,27 +7,18 @@ import pandas as pd
 import pytest
 
 import tolalloc as ta
+from tests.builders import ZONE_OF_A_LENGTH, study_of_lengths
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_text
 
-ZONE = {"plus": 20.0, "minus": -20.0, "unit": "µm", "min": 5.0, "max": 100.0, "cost": 1.0}
 ROWS = (
-    {"id": "a", "label": "Hülse Ø55", "drawing": "4711-B", "group": "sleeves", **ZONE},
-    {"id": "b", "drawing": "4711-B", "group": "sleeves", **ZONE},
-    {"id": "c", **ZONE},
+    {"id": "a", "label": "Hülse Ø55", "drawing": "4711-B", "group": "sleeves", **ZONE_OF_A_LENGTH},
+    {"id": "b", "drawing": "4711-B", "group": "sleeves", **ZONE_OF_A_LENGTH},
+    {"id": "c", **ZONE_OF_A_LENGTH},
 )
 
 
-def summed(a, b, c):
-    return a + b + c
-
-
 def study(rows) -> ta.Study:
-    return ta.Study(
-        ta.model(summed, inputs=dict.fromkeys("abc", 0.0), outputs=("length [mm]",)),
-        ta.Drawing.of_rows(rows),
-        limits={"length [mm]": ta.Limit(lower=-0.03, upper=0.03)},
-        questions=[ta.Allocation(front=False, what_if=False)],
-    )
+    return study_of_lengths(ta.Drawing.of_rows(rows))
 
 
 @pytest.fixture(scope="module")

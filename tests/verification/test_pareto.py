@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 from dataclasses import dataclass, replace
 
@@ -11,6 +10,7 @@ import pytest
 from hypervolume import hypervolume_ratio
 from stack_front import LOWER, UPPER, StackProblem, stack_problem
 
+from tests.builders import digest
 from tolalloc.allocation.front.genetic import best_front, nondominated, reference_directions, search, thinned
 from tolalloc.allocation.front.pareto_problem import (
     Genes,
@@ -40,10 +40,6 @@ def exact(stack):
 
 def cheaper_than_certified(stack, losses) -> float:
     return max(float(stack.cost_bound(budget) / cost - 1) for cost, budget in losses)
-
-
-def digest(found) -> str:
-    return hashlib.sha256(found.designs.tobytes() + found.answers.values.tobytes()).hexdigest()
 
 
 # --- against exact fronts ---

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import pickle
 import subprocess
 import sys
@@ -12,6 +11,7 @@ import numpy as np
 import pytest
 from stack_front import StackProblem, stack_problem
 
+from tests.builders import digest
 from tolalloc.allocation.front.genetic import search
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
@@ -23,10 +23,6 @@ POPULATION = 80
 @pytest.fixture(scope="module")
 def stack() -> StackProblem:
     return stack_problem()
-
-
-def digest(found) -> str:
-    return hashlib.sha256(found.designs.tobytes() + found.answers.values.tobytes()).hexdigest()
 
 
 class Interrupted(StackProblem):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import replace
 
 import numpy as np
@@ -22,10 +21,6 @@ from tolalloc.reducers.settings import RADIAL
 from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
 
 POPULATION = 80
-
-
-def digest(found) -> str:
-    return hashlib.sha256(found.designs.tobytes() + found.answers.values.tobytes()).hexdigest()
 
 
 @pytest.fixture(scope="module")

@@ -8,13 +8,10 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tests.builders import says
+from tests.builders import says, sizes
 from tolalloc.capability.indices import Limits
 from tolalloc.drawings.correlation import CorrelatedSource
-from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import Source
-from tolalloc.drawings.zones import Feature
 from tolalloc.models.model import Evaluation, Model, Response
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
@@ -79,12 +76,7 @@ class Chain(Model):
         return Chain(self.deviation, float(change[0]))
 
 
-ERRORS = ErrorModel(
-    tuple(
-        Source(name=name, part="part", feature=Feature.SIZE, zone=20e-6, minimum=1e-6, maximum=1e-3, cost=1.0)
-        for name in "ab"
-    )
-)
+ERRORS = sizes("ab", zone=20e-6, minimum=1e-6, maximum=1e-3)
 
 
 def ranked(limits: dict[str, Limits], model: Chain = Chain()) -> Answer[RankingResult]:

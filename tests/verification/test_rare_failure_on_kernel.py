@@ -9,7 +9,7 @@ import pytest
 from scipy.special import ndtr
 from scipy.stats import chi2, norm
 
-from tests.builders import prepared, source
+from tests.builders import prepared, sizes, source
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.limit_state import RareFailure, ResponseLimit
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo, proportion
@@ -25,7 +25,7 @@ from tolalloc.models.model import Evaluation
 
 def normals(count: int) -> ErrorModel:
     """Independent columns that are standard normal."""
-    return ErrorModel(tuple(source(f"s{number}") for number in range(count)))
+    return sizes(f"s{number}" for number in range(count))
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,8 @@ import pytest
 from SALib.analyze import delta, pawn, sobol
 from SALib.plotting.bar import plot as bar_plot
 
-from tests.verification.test_sobol_growth import CORRELATED, Linear, sizes
+from tests.builders import sizes
+from tests.verification.test_sobol_growth import CORRELATED, Linear
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.sensitivity.effort import SobolEffort

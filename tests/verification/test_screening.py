@@ -11,6 +11,7 @@ from SALib.analyze import morris as salib_morris
 from SALib.sample import morris
 from scipy.stats import norm
 
+from tests import builders
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import MonteCarlo, monte_carlo
 from tolalloc.drawings.correlation import Correlation, Pair
@@ -30,16 +31,7 @@ from tolalloc.sensitivity.screening import (
 
 
 def source(name: str, feature: Feature = Feature.SIZE, distribution: Distribution = Distribution.UNIFORM) -> Source:
-    return Source(
-        name=name,
-        part="part",
-        feature=feature,
-        zone=1.0,
-        minimum=0.1,
-        maximum=10.0,
-        cost=1.0,
-        distribution=distribution,
-    )
+    return builders.source(name, feature, 1.0, distribution=distribution)
 
 
 SIZES = ErrorModel((source("a"), source("b"), source("c")))

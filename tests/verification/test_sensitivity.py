@@ -8,35 +8,21 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from tests.builders import sizes
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import allowed_rejections, monte_carlo, proportion
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import Source
-from tolalloc.drawings.zones import Distribution, Feature
+from tolalloc.drawings.zones import Distribution
 from tolalloc.exceptions import SolveError
 from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.sobol import SobolIndices, sobol_indices
 
 
-def sizes(*names: str) -> ErrorModel:
+def angles(*names: str) -> ErrorModel:
     """Return sources that are uniform in ±π."""
-    return ErrorModel(
-        tuple(
-            Source(
-                name=name,
-                part="part",
-                feature=Feature.SIZE,
-                zone=2 * np.pi,
-                minimum=1.0,
-                maximum=10.0,
-                cost=1.0,
-                distribution=Distribution.UNIFORM,
-            )
-            for name in names
-        )
-    )
+    return sizes(names, zone=2 * np.pi, minimum=1.0, maximum=10.0, distribution=Distribution.UNIFORM)
 
 
 @dataclass(frozen=True)
@@ -56,7 +42,7 @@ class Ishigami:
 
 
 def ranked(response: Ishigami, seeds: SeedTree, blocks: int) -> SobolIndices:
-    errors = sizes("x1", "x2", "x3")
+    errors = angles("x1", "x2", "x3")
     return sobol_indices(Experiment.of(response, errors, seeds), SobolEffort(start=blocks, limit=blocks)).of("y [-]")
 
 
@@ -89,7 +75,7 @@ def test_a_failed_sample_drops_its_block_and_nothing_else():
 
 
 def test_too_many_failed_samples_stop_the_analysis():
-    errors = sizes("x1", "x2", "x3")
+    errors = angles("x1", "x2", "x3")
     with pytest.raises(SolveError, match="blocks hold a failed sample"):
         ranked(Ishigami(fail=tuple(range(0, 400, 5))), SeedTree(3), 128)
     with pytest.raises(SolveError, match="no usable answer"):
@@ -115,7 +101,7 @@ def test_quantile_bound_and_yield_bound_are_the_same_verdict():
         def __call__(self, x: np.ndarray) -> Evaluation:
             return Evaluation(values=norm.ppf(x / (2 * np.pi) + 0.5), status=np.zeros(x.shape[0], np.uint8))
 
-    errors = sizes("x1")
+    errors = angles("x1")
     sample = monte_carlo(Experiment.of(First(), errors, SeedTree(5)), 4000)
     bound = sample.quantile_bound(0.99)
     assert sample.within(bound).bound >= 0.99 > sample.within(bound - 1e-9).bound

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 from SALib.sample import sobol as salib
 
+from tests.builders import sizes
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.correlation import Correlation, Pair
-from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import Source
-from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
 from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.effort import SobolEffort
@@ -23,13 +21,6 @@ from tolalloc.sensitivity.sobol import SobolAnalysis, sobol_indices
 
 FACTOR_GROUPS = ("a", "b", "b", "c", "a", "d")
 CORRELATED = Correlation(pairs=(Pair(one="a", other="c", correlation=-0.6),))
-
-
-def sizes(names: str, correlation: Correlation | None = None) -> ErrorModel:
-    """Return normal sources of standard deviation 1."""
-    common = {"part": "part", "feature": Feature.SIZE, "minimum": 1.0, "maximum": 10.0, "cost": 1.0}
-    sources = tuple(Source(name=name, zone=6.0, **common) for name in names)
-    return ErrorModel(sources, correlation=correlation or Correlation())
 
 
 @dataclass(frozen=True)
