@@ -25,7 +25,9 @@ for name in ("rv20e_liu2020", "rv20e"):
     reducer = ta.reducer(name, flank_clearance=(1.0, 5.0), radial_clearance=(5.0, 20.0))
     limits = {ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)}
     known = Prepared(study=ta.Study(reducer, ta.drawing("rv20e_table4"), limits=limits, questions=[ta.Ranking()]))
-    values = known.model.reading((ta.PEAK_TO_PEAK, ta.LOST_MOTION))(seeded_units(known.errors, 64, 5)).values
+    uniform = next(SeedTree(5).uniform_chunks(64, len(known.errors.columns)))
+    deviations = known.errors.deviations(known.errors.standard_values(uniform), known.errors.zones)
+    values = known.model.reading((ta.PEAK_TO_PEAK, ta.LOST_MOTION))(deviations).values
     assert np.isfinite(values).all()
     found |= {f"{name} deviations": deviations, f"{name} values": values}
 np.savez(sys.argv[1], processor=list(processor().values())[1:], **found)
