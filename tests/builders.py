@@ -83,9 +83,10 @@ def verifier_of(
     return Verifier(space=space or prepared.space, model=prepared.model, requirements=(first, *others), **fields)
 
 
-def baseline_errors() -> ErrorModel:
-    """Return the sources of the shipped baseline table as the columns that they move."""
-    return ErrorModel(load_tolerance_table("rv20e_table4"))
+def baseline_errors(*names: str) -> ErrorModel:
+    """Return the sources of the shipped baseline table, or these of them, as the columns that they move."""
+    table = {own.name: own for own in load_tolerance_table("rv20e_table4")}
+    return ErrorModel(tuple(table[name] for name in names or table))
 
 
 def source(name: str, feature: Feature = Feature.SIZE, zone: float = 6.0, **changes: Any) -> Source:
@@ -216,7 +217,7 @@ def seeded_units(errors: ErrorModel, count: int, seeds: int | SeedTree = 1, scal
     return deviations_at(errors, uniform, scale)
 
 
-def random_units(errors: ErrorModel, count: int, seed: int = 1, scale: float = 1.0) -> np.ndarray:
+def units_at_random(errors: ErrorModel, count: int, seed: int = 1, scale: float = 1.0) -> np.ndarray:
     """Return units of random numbers that no experiment draws, a column for each of the errors."""
     return deviations_at(errors, np.random.default_rng(seed).random((count, len(errors.columns))), scale)
 
@@ -225,7 +226,7 @@ def drawn_units(errors: ErrorModel, model: EquivalentModel, units: int, scale: f
     """Return the columns of random units at the reducer's modification, all zones scaled alike [m, angles rad]."""
     found = np.zeros((units, len(model.columns)))
     at = [model.columns.index(name) for name in errors.columns]
-    found[:, at] = random_units(errors, units, 20260101, scale)
+    found[:, at] = units_at_random(errors, units, 20260101, scale)
     for name, amount in model.reducer.modification.deviations.items():
         found[:, model.columns.index(name)] = amount
     return found

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tests.studies.command import tolalloc
+from tests.studies.command import refused, tolalloc
 from tolalloc.assembly.places import places_of
 from tolalloc.bench.sources import has_half_turn
 from tolalloc.reducers.equivalent.model import EquivalentModel
@@ -105,13 +105,10 @@ def test_a_centre_gear_is_mounted_as_one_part_with_the_sun():
     ],
 )
 def test_what_no_folder_can_be_made_of_is_refused_in_one_sentence(tmp_path, arguments, says):
-    done = tolalloc("new", tmp_path / "other", *arguments)
-    assert done.returncode == 2
-    assert says in done.stderr
+    refused(tolalloc("new", tmp_path / "other", *arguments), says)
     assert not (tmp_path / "other").exists()
 
 
 def test_a_command_that_knows_no_centre_gear_says_so(folder):
     done = tolalloc("simulate", "--reducer", folder / "reducer.toml")
-    assert done.returncode == 2
-    assert "a centre gear is not moved in time" in done.stderr
+    refused(done, "a centre gear is not moved in time")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tests.builders import random_units, says
+from tests.builders import says, units_at_random, wording
 from tests.studies.command import answer_of, tolalloc
 from tests.studies.scripts import study_script
 from tolalloc.allocation.space.requirement import Requirement
@@ -86,7 +86,7 @@ def test_a_check_counts_the_preloaded_among_random_units(tmp_path):
     assert counted["units [-]"] == 1000
     # The same share of other random units, within four standard errors of the difference.
     asked = prepared("rv20e")
-    found = preload(asked.model.kernel.model, asked.model.kernel.errors(random_units(asked.errors, 500, 77)))
+    found = preload(asked.model.kernel.model, asked.model.kernel.errors(units_at_random(asked.errors, 500, 77)))
     share = (found.pin_force > rated_pin_force(asked.model.reducer)).mean()
     pooled = (said * 1000 + share * 500) / 1500
     assert abs(said - share) <= 4 * np.sqrt(pooled * (1 - pooled) * (1 / 1000 + 1 / 500))
@@ -110,7 +110,7 @@ def test_the_last_sentence_of_a_check_says_that_units_are_preloaded_and_what_fre
 def test_a_verdict_says_that_units_are_preloaded_by_printed_stiffnesses_too():
     def verdict(reducer: ReducerChoice, scale: float) -> str:
         asked = Prepared(study=ta.Study(reducer, ta.drawing("rv20e_table4"), limits=LIMITS))
-        counted = asked.model.examined(random_units(asked.errors, 200, 5, scale))
+        counted = asked.model.examined(units_at_random(asked.errors, 200, 5, scale))
         return portrait_of(asked.model).examination(counted).but
 
     assert "preloaded" in verdict(ta.reducer("rv20e"), 1.0)
@@ -127,7 +127,7 @@ def test_no_load_torque_is_said_at_output_and_motor_beside_the_one_that_the_cata
         stated = replace(choice.reducer.catalogue, no_load_torque=allowed)
         choice = replace(choice, reducer=replace(choice.reducer, catalogue=stated))
         asked = Prepared(study=ta.Study(choice, ta.drawing("rv20e_table4"), limits=LIMITS))
-        x = random_units(asked.errors, 200, 6, scale)
+        x = units_at_random(asked.errors, 200, 6, scale)
         return asked.model, x, portrait_of(asked.model).examination(asked.model.examined(x))
 
     model, x, said = examined(2.75, 1.0)
@@ -146,7 +146,8 @@ def test_no_load_torque_is_said_at_output_and_motor_beside_the_one_that_the_cata
 
 
 def test_a_model_of_a_user_is_in_order_without_a_but():
-    assert tolalloc("check", "studies/choi2000_clutch.py").stdout.splitlines()[-1].endswith(" is in order.")
+    last = tolalloc("check", "studies/choi2000_clutch.py").stdout.splitlines()[-1]
+    assert says(last, "check.verdict", state=wording("check.in_order"))
 
 
 def test_teeth_that_rated_torque_presses_harder_allow_no_more_preload():

@@ -7,7 +7,7 @@ import openpyxl
 import pytest
 
 import tolalloc as ta
-from tests.studies.command import tolalloc
+from tests.studies.command import refused, tolalloc
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.scene import scene_of
@@ -85,13 +85,10 @@ def test_a_picture_shows_holes_and_output_pins():
     ],
 )
 def test_what_no_folder_can_be_made_of_is_refused_in_one_sentence(tmp_path, arguments, says):
-    done = tolalloc("new", tmp_path / "other", *arguments)
-    assert done.returncode == 2
-    assert says in done.stderr
+    refused(tolalloc("new", tmp_path / "other", *arguments), says)
     assert not (tmp_path / "other").exists()
 
 
 def test_a_command_that_only_an_rv_reducer_knows_says_so(folder):
     done = tolalloc("simulate", "--reducer", folder / "reducer.toml")
-    assert done.returncode == 2
-    assert "a single stage has neither sun nor planets; this needs an RV reducer" in done.stderr
+    refused(done, "a single stage has neither sun nor planets; this needs an RV reducer")

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.builders import FIRST_STAGE, STANDING, drawn_units, only, table_of_three_cranks
+from tests.builders import FIRST_STAGE, STANDING, at_constant_contact, drawn_units, only, table_of_three_cranks
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.model import EquivalentModel
@@ -44,12 +44,11 @@ MICROMETRES = {
 
 @pytest.fixture(scope="module")
 def model() -> EquivalentModel:
-    reducer = load_reducer("rv160e")
+    reducer = at_constant_contact(load_reducer("rv160e"))
     stage = reducer.cycloid_stage
     eccentricity = stage.shortening * stage.pin_circle_radius / PINS
     stage = replace(stage, pin_count=PINS, disc_teeth=TEETH, eccentricity=eccentricity)
-    stiffness = replace(reducer.stiffness, pin_contact_law="constant")
-    return EquivalentModel(replace(reducer, cycloid_stage=stage, stiffness=stiffness))
+    return EquivalentModel(replace(reducer, cycloid_stage=stage))
 
 
 CASES = {

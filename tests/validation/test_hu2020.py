@@ -8,13 +8,11 @@ units of the shipped drawing of each with constant contact, and as elastic part 
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 import tolalloc as ta
-from tests.builders import drawn_units
+from tests.builders import at_constant_contact, drawn_units
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.files import load_reducer
 
@@ -35,8 +33,7 @@ def test_the_printed_share_is_that_of_a_few_percent_of_the_rated_torque(size, re
 
     Load brings more pins to carry, which evens their errors out: the whole peak-to-peak is smaller than at 1 N·m.
     """
-    reducer = load_reducer(size)
-    reducer = replace(reducer, stiffness=replace(reducer.stiffness, pin_contact_law="constant"))
+    reducer = at_constant_contact(load_reducer(size))
     errors = ta.drawing(f"{size}_drawing").errors
     model = EquivalentModel(reducer, orders=errors.orders)
     units = drawn_units(errors, model, 48)

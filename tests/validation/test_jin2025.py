@@ -15,7 +15,7 @@ import pytest
 from scipy.stats import spearmanr
 
 import tolalloc as ta
-from tests.builders import deviations_at
+from tests.builders import at_constant_contact, deviations_at
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
@@ -52,9 +52,7 @@ ZONES = {"drawing": of_the_drawing, "6 µm": lambda: at_equal_zones(6)}
 
 @pytest.fixture(scope="module")
 def model() -> EquivalentModel:
-    reducer = load_reducer("rv40e")
-    constant = replace(reducer, stiffness=replace(reducer.stiffness, pin_contact_law="constant"))
-    return EquivalentModel(constant, orders=of_the_drawing().orders)
+    return EquivalentModel(at_constant_contact(load_reducer("rv40e")), orders=of_the_drawing().orders)
 
 
 def outputs(model: EquivalentModel, errors: ErrorModel, uniform: np.ndarray) -> np.ndarray:

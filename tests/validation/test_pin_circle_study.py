@@ -8,12 +8,10 @@ hole of 8 mm as the diameter in which its centre lies, and of a pin of 8 mm.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from tests.builders import deviations_at
+from tests.builders import at_constant_contact, deviations_at
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.ladder import grade_zones
 from tolalloc.drawings.seeds import SeedTree
@@ -32,8 +30,7 @@ PRINTED_TOGETHER = 0.08
 
 def indices(grade: str, blocks: int = BLOCKS) -> SaltelliIndices:
     """Return the indices of the peak-to-peak with zones of a grade."""
-    reducer = load_reducer("rv80e")
-    reducer = replace(reducer, stiffness=replace(reducer.stiffness, pin_contact_law="constant"))
+    reducer = at_constant_contact(load_reducer("rv80e"))
     model = EquivalentModel(reducer)
     circle, small = (grade_zones(size * MILLIMETRE)[grade] / MICROMETRE for size in (155.0, 8.0))
     common = {"unit": "µm", "min": 0.1, "max": 100, "cost": 1}

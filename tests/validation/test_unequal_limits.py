@@ -11,7 +11,7 @@ import pytest
 
 import tolalloc as ta
 from studies.published.stacks import root_sum_square, stack_limits, worst_case
-from tests.builders import random_units
+from tests.builders import units_at_random
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import MILLIMETRE
 
@@ -47,7 +47,7 @@ def test_units_keep_to_the_centred_limits_and_not_to_those_from_the_nominal():
         for name, size, plus, minus in zip(("housing", "part"), SIZES, PLUS, MINUS, strict=True)
     ]
     errors = ta.Drawing.of_rows(rows).errors
-    gap = 0.2 + random_units(errors, 1_000_000, 10) @ DIRECTIONS / MILLIMETRE
+    gap = 0.2 + units_at_random(errors, 1_000_000, 10) @ DIRECTIONS / MILLIMETRE
     found = stack_limits(DIRECTIONS, SIZES, PLUS, MINUS)
     assert np.round(found.centred, 3) == pytest.approx((0.139, 0.251), abs=1e-12)
     assert gap.mean() == pytest.approx(0.195, abs=1e-4)

@@ -15,7 +15,16 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tests.builders import FIRST_STAGE, STANDING, drawn_units, only, seeded_units, table_of_three_cranks, with_ovality
+from tests.builders import (
+    FIRST_STAGE,
+    STANDING,
+    at_constant_contact,
+    drawn_units,
+    only,
+    seeded_units,
+    table_of_three_cranks,
+    with_ovality,
+)
 from tests.validation_manual import shown
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.reading.units import ARCSECOND
@@ -41,9 +50,7 @@ def errors() -> ErrorModel:
 
 @pytest.fixture(scope="module")
 def model(errors) -> EquivalentModel:
-    reducer = load_reducer("rv80e")
-    constant = replace(reducer.stiffness, pin_contact_law="constant")
-    return EquivalentModel(replace(reducer, stiffness=constant), orders=errors.orders)
+    return EquivalentModel(at_constant_contact(load_reducer("rv80e")), orders=errors.orders)
 
 
 @pytest.fixture(scope="module")

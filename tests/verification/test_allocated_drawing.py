@@ -14,7 +14,7 @@ from openpyxl import load_workbook
 from typer.testing import CliRunner
 
 import tolalloc as ta
-from tests.builders import prepared, random_units, source
+from tests.builders import prepared, source, units_at_random
 from tests.sheets import cells, frames
 from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.cost.model import Combined, Exponential, Reciprocal, ReciprocalPower, SumOfCosts, Weighted
@@ -348,7 +348,7 @@ def test_the_files_read_back_have_the_verified_yield_and_cost(drawn, tmp_path):
     sources, stated = load_tolerance_table(folder / "allocation.csv"), stated_settings(folder / "allocation.csv")
     errors = replace(results.space.errors, sources=sources)
     model = results.model.at(np.array([stated[name] for name in results.space.shared.names]))
-    x = random_units(errors, 6144, 3)
+    x = units_at_random(errors, 6144, 3)
     requirement = results.requirements[0]
     found = model.reading((requirement.output,))(x)
     kept = requirement.limits.kept_by(np.where(found.good, found.values[:, 0], np.nan)).mean()

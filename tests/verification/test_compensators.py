@@ -13,7 +13,7 @@ from scipy import optimize, stats
 from scipy.optimize import linear_sum_assignment
 
 import tolalloc as ta
-from tests.builders import baseline_errors, random_units, source, wording
+from tests.builders import baseline_errors, says, source, units_at_random, wording
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.capability.linear_function import LinearFunction, LinearLaw
 from tolalloc.drawings.compensators import Compensator, all_choices, assembly_cost, in_force
@@ -37,7 +37,7 @@ def errors_of(*compensators: Compensator, sources=SIZES, **others) -> ErrorModel
 
 
 def units_of(errors: ErrorModel, units: int = UNITS, seed: int = 1) -> np.ndarray:
-    return random_units(errors, units, seed)
+    return units_at_random(errors, units, seed)
 
 
 def class_means(classes: int) -> np.ndarray:
@@ -468,7 +468,7 @@ def test_every_file_that_leaves_says_which_classes_the_zones_hold_with(sorted_ga
     assert any(said in str(cell.value) for sheet in sheets for row in sheet.iter_rows() for cell in row)
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert wording("allocation.heading_assembly") in page
-    assert f"{result.assembled.best.cost:.2f} cost units in all" in page
+    assert says(page, "allocation.assembly_cost", cost=result.assembled.best.cost, cost_unit="cost units")
     again = ta.drawing(folder / "allocation.csv")
     drawn = [own.zone for own in result.drawn_sources]
     assert [own.zone for own in again.sources] == pytest.approx(drawn, rel=1e-6)

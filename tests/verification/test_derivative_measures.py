@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from tests.builders import baseline_errors, source
+from tests.builders import baseline_errors, kernel_of, source
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.correlation import Correlation, Pair
 from tolalloc.drawings.error_model import ErrorModel
@@ -17,7 +17,6 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.zones import Distribution, Feature
 from tolalloc.exceptions import SolveError
 from tolalloc.models.model import Evaluation
-from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.sensitivity.derivatives import ResponseWithDerivatives, derivative_measures, local_derivatives
 
 
@@ -169,13 +168,7 @@ def test_failed_units_are_counted_and_too_many_stop():
 
 def test_the_kernel_knows_its_derivatives(rv20e):
     errors = baseline_errors()
-    fixed = dict.fromkeys((name for name in rv20e.columns if name not in errors.columns), 0.0)
-    kernel = KernelResponse(
-        model=rv20e,
-        torque=rv20e.reducer.load.test_torque,
-        columns=errors.columns,
-        fixed=fixed | rv20e.reducer.modification.deviations,
-    )
+    kernel = kernel_of(rv20e, errors, rv20e.reducer.load.test_torque)
     assert isinstance(kernel, ResponseWithDerivatives)
     found = derivative_measures(Experiment.of(kernel, errors, SeedTree(7)), 64, resamples=10)
     assert np.isfinite(found.bound).all()

@@ -10,7 +10,7 @@ from scipy.stats import norm
 
 import tolalloc as ta
 from tests.builders import says
-from tests.studies.command import answer_of, tolalloc
+from tests.studies.command import answer_of, refused, tolalloc
 from tolalloc.capability.monte_carlo import quantile_change, share_change
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, UnknownNameError
@@ -155,9 +155,7 @@ def test_the_command_says_what_python_says(tmp_path):
     assert told["changes"] == own["changes"]
     assert (tmp_path / "report" / "report.html").stat().st_size > 0
     for text in ("shaft", "shaft=x"):
-        refused = tolalloc("whatif", script, text)
-        assert refused.returncode == 2
-        assert "allowed is SOURCE=µm, such as pin.diameter=3" in refused.stderr
+        refused(tolalloc("whatif", script, text), "allowed is SOURCE=µm, such as pin.diameter=3")
 
 
 def test_the_next_question_of_a_reducer_finds_its_tables():

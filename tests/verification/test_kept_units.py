@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.builders import baseline_errors, random_units
+from tests.builders import baseline_errors, kernel_of, units_at_random
 from tests.studies.command import ROOT
 from tolalloc.models.model import Evaluation
 from tolalloc.reducers import LOST_MOTION, RADIAL_CLEARANCE
@@ -18,7 +18,6 @@ from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
 from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.running import result_cache as kept_units
 from tolalloc.running.result_cache import ResultCache
 
@@ -50,22 +49,13 @@ def solved(monkeypatch) -> Solved:
 
 @pytest.fixture
 def model() -> ReducerModel:
-    reducer = load_reducer("rv20e_liu2020")
-    equivalent = EquivalentModel(reducer, AngleSearch(coarse=24))
-    fixed = {name: 0.0 for name in equivalent.columns if name not in ERRORS.columns}
-    return ReducerModel(
-        kernel=KernelResponse(
-            model=equivalent,
-            torque=-1.0,
-            columns=ERRORS.columns,
-            fixed=fixed | reducer.modification.deviations,
-        )
-    )
+    equivalent = EquivalentModel(load_reducer("rv20e_liu2020"), AngleSearch(coarse=24))
+    return ReducerModel(kernel=kernel_of(equivalent, ERRORS, -1.0))
 
 
 @pytest.fixture
 def x() -> np.ndarray:
-    return random_units(ERRORS, UNITS, 20261123)
+    return units_at_random(ERRORS, UNITS, 20261123)
 
 
 def test_what_was_solved_is_not_solved_again(model, x, solved, tmp_path):

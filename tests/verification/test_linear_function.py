@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import beta, norm
 
-from tests.builders import random_units, source
+from tests.builders import source, units_at_random
 from tolalloc.allocation.space.output_sample import LimitedSample
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.linear_function import LinearFunction, LinearLaw
@@ -72,7 +72,7 @@ def test_correlated_normal_sizes_add_as_their_covariance_says():
 def test_the_share_beyond_is_that_of_random_units(mix):
     """400,000 units: within four standard errors."""
     errors = errors_of(MIXES[mix])
-    x = random_units(errors, 400_000)
+    x = units_at_random(errors, 400_000)
     slopes = 1e3 * np.arange(1, 1 + x.shape[1]) * (-1.0) ** np.arange(x.shape[1])
     y = 3.0 + x @ slopes
     limits = Limits(lower=float(np.quantile(y, 0.002)), upper=float(np.quantile(y, 0.997)))
@@ -96,7 +96,7 @@ def test_derivatives_by_the_zones_are_those_of_differences(mix):
 
 def test_a_plane_is_found_through_linear_samples_alone():
     errors = errors_of([{}, UNIFORM, {}])
-    x, slopes = random_units(errors, 5000), np.array([1000.0, 0.0, -500.0])
+    x, slopes = units_at_random(errors, 5000), np.array([1000.0, 0.0, -500.0])
     linear = 7.0 + x @ slopes
     found = LinearFunction.through(x, linear)
     assert found is not None
@@ -115,7 +115,7 @@ def test_a_plane_is_found_through_linear_samples_alone():
 
 def test_few_samples_show_no_plane():
     errors = errors_of([{}, {}])
-    x = random_units(errors, 60)
+    x = units_at_random(errors, 60)
     assert LinearFunction.through(x, x @ np.ones(2)) is None
 
 

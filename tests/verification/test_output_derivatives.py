@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.builders import baseline_errors, random_units, table_of_three_cranks
+from tests.builders import baseline_errors, kernel_of, table_of_three_cranks, units_at_random
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.reducer.design import Clearances, Reducer
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.reducers.response.outputs import DIFFERENTIABLE
 
 UNITS = 12
@@ -22,11 +21,7 @@ STEP = 1e-10
 
 
 def bound(reducer: Reducer, errors: ErrorModel) -> tuple[ReducerModel, np.ndarray]:
-    equivalent = EquivalentModel(reducer)
-    fixed = {name: 0.0 for name in equivalent.columns if name not in errors.columns}
-    fixed |= reducer.modification.deviations
-    kernel = KernelResponse(model=equivalent, torque=-1.0, columns=errors.columns, fixed=fixed)
-    return ReducerModel(kernel=kernel), deviations(errors)
+    return ReducerModel(kernel=kernel_of(EquivalentModel(reducer), errors, -1.0)), deviations(errors)
 
 
 def two_cranks() -> tuple[ReducerModel, np.ndarray]:
@@ -46,7 +41,7 @@ def with_play() -> tuple[ReducerModel, np.ndarray]:
 
 
 def deviations(errors: ErrorModel) -> np.ndarray:
-    return random_units(errors, UNITS, 20261123)
+    return units_at_random(errors, UNITS, 20261123)
 
 
 @pytest.mark.parametrize("output", DIFFERENTIABLE)

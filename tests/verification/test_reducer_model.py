@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tolalloc.drawings.error_model import ErrorModel
+from tests.builders import baseline_errors, kernel_of
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reducers import PEAK_TO_PEAK
@@ -19,7 +18,7 @@ from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.reducer.design import Modification
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
-from tolalloc.reducers.response.kernel import KernelResponse, StiffnessResponse
+from tolalloc.reducers.response.kernel import StiffnessResponse
 from tolalloc.reducers.response.outputs import OutputsResponse, orders_reading, requirements_of
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.study.prepared import Prepared
@@ -30,11 +29,7 @@ WAVE = "order 1 cosine [arcsec]"
 
 @pytest.fixture(scope="module")
 def model(rv20e: EquivalentModel) -> ReducerModel:
-    table = {source.name: source for source in load_tolerance_table("rv20e_table4")}
-    errors = ErrorModel((table["disc1.bore1.position"], table["pin.diameter"]))
-    fixed = dict.fromkeys(rv20e.columns, 0.0) | rv20e.reducer.modification.deviations
-    fixed = {name: value for name, value in fixed.items() if name not in errors.columns}
-    kernel = KernelResponse(model=rv20e, torque=-167.0, columns=errors.columns, fixed=fixed)
+    errors = baseline_errors("disc1.bore1.position", "pin.diameter")
     own = rv20e.reducer.stiffness
     names = ("crank_disc_bearing", "pin_contact", "sun_support")
     known = IdentifiedStiffness(
@@ -44,6 +39,7 @@ def model(rv20e: EquivalentModel) -> ReducerModel:
             name: part * getattr(own, name) for name, part in zip(names, (0.1, 0.2, 0.0), strict=True)
         },
     )
+    kernel = kernel_of(rv20e, errors, -167.0)
     return ReducerModel(kernel=kernel, flank=(1e-6, 5e-6), radial=(5e-6, 20e-6), identified=known)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tests.builders import few_sources, random_units, unit_with
+from tests.builders import few_sources, unit_with, units_at_random
 from tests.random_cases import random_cycloid_stage, seeds
 from tests.verification.test_cycloid_clearance import second_order
 from tolalloc.exceptions import InputError, UnknownNameError
@@ -67,7 +67,7 @@ def test_an_allocation_with_turned_flanks_is_not_dearer_than_without(tmp_path):
 
 def units(study, count):
     """Return random units of a study's drawing."""
-    return random_units(study.errors, count, 7)
+    return units_at_random(study.errors, count, 7)
 
 
 @pytest.mark.parametrize("seed", seeds(20))

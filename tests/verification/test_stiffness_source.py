@@ -8,12 +8,11 @@ from math import exp
 import numpy as np
 import pytest
 
-from tests.builders import Sum, prepared, seeded_units
+from tests.builders import Sum, baseline_errors, prepared, seeded_units
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, write_identified_stiffness
@@ -33,9 +32,7 @@ FIELDS = ("crank_disc_bearing", "pin_contact")
 
 
 def few_sources() -> ErrorModel:
-    """Return two sources of the shipped table."""
-    table = {source.name: source for source in load_tolerance_table("rv20e_table4")}
-    return ErrorModel((table["disc1.bore1.position"], table["pin.diameter"]))
+    return baseline_errors("disc1.bore1.position", "pin.diameter")
 
 
 @pytest.fixture(scope="module")

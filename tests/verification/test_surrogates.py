@@ -10,7 +10,7 @@ from sklearn.linear_model import Ridge
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
-from tests.builders import baseline_errors, seeded_units
+from tests.builders import baseline_errors, kernel_of, seeded_units
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
@@ -118,9 +118,7 @@ def errors() -> ErrorModel:
 
 @pytest.fixture(scope="module")
 def kernel(rv20e: EquivalentModel, errors: ErrorModel) -> KernelResponse:
-    fixed = {name: 0.0 for name in rv20e.columns if name not in errors.columns}
-    fixed |= rv20e.reducer.modification.deviations
-    return KernelResponse(model=rv20e, torque=-1.0, columns=errors.columns, fixed=fixed)
+    return kernel_of(rv20e, errors, -1.0)
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from tests.builders import baseline_errors, source
+from tests.builders import baseline_errors, kernel_of, source
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.worst_unit import worst_unit
 from tolalloc.drawings.correlation import CorrelatedSource
@@ -137,10 +137,7 @@ def errors() -> ErrorModel:
 
 @pytest.fixture(scope="module")
 def kernel(rv20e, errors) -> KernelResponse:
-    reducer = rv20e.reducer
-    still = {**dict.fromkeys(rv20e.columns, 0.0), **reducer.modification.deviations}
-    fixed = {name: value for name, value in still.items() if name not in errors.columns}
-    return KernelResponse(model=rv20e, torque=reducer.load.test_torque, columns=errors.columns, fixed=fixed)
+    return kernel_of(rv20e, errors, rv20e.reducer.load.test_torque)
 
 
 @pytest.fixture(scope="module")
