@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import tolalloc as ta
+
 SMALL_EFFORT = """ta.Effort(
         ranking=ta.RankingEffort(
             units=1000, sobol=ta.SobolEffort(start=16, limit=16, resamples=50), trajectories=2, moment_units=100,
@@ -19,6 +21,12 @@ SMALL_EFFORT = """ta.Effort(
             search=ta.SearchEffort(steps=2, front=ta.FrontEffort(population=8, generations=4, population_on_kernel=8,
                 generations_on_kernel=2, designs=10, rounds=1, points=3))),
         is_quick=True)"""
+
+
+def small_effort() -> ta.Effort:
+    """Return the effort of the cases."""
+    return eval(SMALL_EFFORT, {"ta": ta})
+
 
 PRESET = f"""import tolalloc as ta
 

@@ -6,6 +6,7 @@ import pytest
 
 import tolalloc as ta
 from tests.builders import study_of_lengths
+from tests.golden.cases import small_effort
 from tests.verification.test_own_words import ROWS
 from tolalloc.study.duration import Duration, durations
 from tolalloc.study.prepared import Prepared
@@ -38,8 +39,8 @@ def test_the_units_of_a_reducer_of_uncertain_stiffness_are_foretold():
         ta.Study(
             ta.reducer("rv20e_liu2020", stiffness="rv20e_table6", **modification),
             ta.drawing("rv20e_table4"),
-            limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)},
-            effort="quick",
+            limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0, show=ta.AtYield(target=0.95))},
+            effort=small_effort(),
         )
     )
 
