@@ -289,7 +289,7 @@ def test_bad_options_are_refused_in_one_sentence(tmp_path, options, words):
         ({"others": f", {LOST}: ta.Limit(upper=1.0, show=1.33)"}, ["show", "1.33", "AtCpk"]),
         ({"others": f", {LOST}: 1.0"}, ["limits['lost motion [arcmin]'] is 1.0", "Limit(...)"]),
         ({"others": f", {LOST}: ta.Limit(upper=float('inf'))"}, ["limit", "inf", "finite"]),
-        ({"others": f", {LOST}: ta.Limit(lower=2.0, upper=1.0)"}, ["upper limit is 1.0", "above the lower one"]),
+        ({"others": f", {LOST}: ta.Limit(lower=2.0, upper=1.0)"}, ["limit: upper is 1.0", "above the lower one"]),
         (
             {"others": f", {LOST}: ta.Limit(upper=1.0, show=ta.AtYield(target=0.999))"},
             ["effort.allocation.confirmation_units for lost motion", "512", "3282 or more"],

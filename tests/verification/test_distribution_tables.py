@@ -126,7 +126,7 @@ BAD_ROWS = [
     ({"distribution": "trapezoid", "shape": "0.2 0.4"}, "trapezoid needs a shape from 0.01 to 0.99: 0.2 0.4"),
     (
         {"distribution": "rayleigh", "shape": "2"},
-        "rayleigh has no shape; lognormal, weibull, beta and trapezoid have one",
+        "rayleigh has no shape; trapezoid, beta, lognormal and weibull have one",
     ),
     (POSITION | {"distribution": "rayleigh"}, "rayleigh is for radial sizes; for feature position allowed is normal"),
     (PITCH | {"distribution": "rayleigh"}, "rayleigh is for radial sizes; for feature pitch allowed is normal"),

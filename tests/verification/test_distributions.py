@@ -112,6 +112,19 @@ def test_a_distribution_that_ends_is_bounded_and_fills_its_zone(kind):
     assert kind.is_bounded == np.isfinite(ends).all() == (kind in BOUNDED)
     if kind.is_bounded:
         np.testing.assert_allclose(np.ptp(own.standard_values(np.array([[0.0], [1.0]]))), 1.0, atol=1e-6)
+        shapes = kind.form.to_scipy(own.shapes)
+        assert kind.form.support == getattr(stats, kind.form.scipy).support(*shapes)
+
+
+@pytest.mark.parametrize("kind", [own for own in Distribution if own not in MADE_OF_OTHERS])
+def test_a_distribution_is_symmetric_and_log_concave_where_it_is_said_to_be(kind):
+    own = source(kind.value, Feature.SIZE)
+    share = np.linspace(0.0, 1.0, 501)[1:-1]
+    values = own.zone_mapping.base.quantile(share)
+    is_symmetric = np.allclose(values + values[::-1], 2 * values[len(values) // 2], atol=1e-9)
+    density = np.diff(share) / np.diff(values)  # its logarithm is concave where it is concave over the share below
+    is_log_concave = (np.diff(density, 2) <= 1e-9).all()
+    assert kind.form.is_symmetric(own.shapes) == bool(is_symmetric and is_log_concave)
 
 
 @pytest.mark.parametrize(("kind", "feature"), CASES)

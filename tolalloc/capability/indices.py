@@ -27,9 +27,9 @@ class Limits:
 
     def __post_init__(self) -> None:
         if self.lower is None and self.upper is None:
-            raise InputError("Capability needs a lower limit, an upper limit or both.")
+            raise InputError("A limit needs a lower side, an upper side or both.")
         if self.lower is not None and self.upper is not None and not self.lower < self.upper:
-            raise InputError.at("capability", "upper limit", self.upper, f"a number above the lower one, {self.lower}")
+            raise InputError.at("limit", "upper", self.upper, f"a number above the lower one, {self.lower}")
 
     @property
     def turned(self) -> tuple[tuple[Literal[1, -1], float], ...]:

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
 from tolalloc.capability.indices import Limits
-from tolalloc.drawings.distributions import NORMAL, RAYLEIGH, Distribution, Marginal
+from tolalloc.drawings.distributions import NORMAL, RAYLEIGH, Marginal
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
@@ -428,11 +428,6 @@ def _is_normal(source: Source) -> bool:
     return mapping.marginal == RAYLEIGH
 
 
-_SYMMETRIC = (Distribution.NORMAL, Distribution.UNIFORM, Distribution.TRIANGULAR, Distribution.TRAPEZOID)
-
-
 def _is_symmetric(source: Source) -> bool:
     """Return whether a density is symmetric and its logarithm concave, as a beta density of equal shapes is."""
-    if source.distribution is Distribution.BETA:
-        return len(set(source.shapes)) == 1
-    return source.distribution in _SYMMETRIC
+    return source.distribution.form.is_symmetric(source.shapes)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
@@ -43,33 +43,33 @@ def ndtri(probability: Any) -> Any:
 
 
 class Distribution(StrEnum):
-    """Shape of the deviation inside its zone."""
+    """Shape of the deviation inside its zone; what is known of each stands in `FORMS`."""
 
     NORMAL = "normal"
     UNIFORM = "uniform"
     TRIANGULAR = "triangular"
+    TRAPEZOID = "trapezoid"
+    BETA = "beta"
     LOGNORMAL = "lognormal"
     WEIBULL = "weibull"
-    BETA = "beta"
-    TRAPEZOID = "trapezoid"
     RAYLEIGH = "rayleigh"
     MIXTURE = "mixture"
     EMPIRICAL = "empirical"
 
     @property
+    def form(self) -> Form:
+        """What is known of it."""
+        return FORMS[self]
+
+    @property
     def is_one_sided(self) -> bool:
         """Whether a size starts at the lower limit of its zone rather than spreading around the middle."""
-        return self in (Distribution.LOGNORMAL, Distribution.WEIBULL, Distribution.RAYLEIGH)
+        return self.form.is_one_sided
 
     @property
     def is_bounded(self) -> bool:
         """Whether it ends, at Cp = 1 at the limit of the zone."""
-        return self in (
-            Distribution.UNIFORM,
-            Distribution.TRIANGULAR,
-            Distribution.BETA,
-            Distribution.TRAPEZOID,
-        )
+        return self.form.support is not None
 
 
 @dataclass(frozen=True)
@@ -87,14 +87,66 @@ class Shapes:
         return f"{what} from {self.smallest:g} to {self.largest:g}"
 
 
-SHAPES = {
-    Distribution.LOGNORMAL: Shapes(1, 0.02, 1.5),
-    Distribution.WEIBULL: Shapes(1, 0.3, 20.0),
-    Distribution.BETA: Shapes(2, 1.0, 50.0),
-    Distribution.TRAPEZOID: Shapes(1, 0.01, 0.99),
+def _as_stated(shapes: tuple[float, ...]) -> tuple[float, ...]:
+    return shapes
+
+
+def _are_equal(shapes: tuple[float, ...]) -> bool:
+    return len(set(shapes)) == 1
+
+
+def _always(shapes: tuple[float, ...]) -> bool:  # noqa: ARG001
+    return True
+
+
+def _never(shapes: tuple[float, ...]) -> bool:  # noqa: ARG001
+    return False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Form:
+    """What is known of a distribution, in one place: a new one is a member of `Distribution` and its form."""
+
+    scipy: str = ""  # Its name in scipy.stats; none of what has a class of its own here, or is made of others
+    support: tuple[float, float] | None = None  # Where the standard one of scipy begins and ends, if it is bounded [-]
+    shapes: Shapes | None = None  # The shapes that a row states, if any
+    # Returns, of these shapes, those that scipy takes
+    to_scipy: Callable[[tuple[float, ...]], tuple[float, ...]] = _as_stated
+    is_one_sided: bool = False  # Whether a size starts at the lower limit of its zone
+    # Returns whether its density is symmetric and the logarithm of that concave
+    is_symmetric: Callable[[tuple[float, ...]], bool] = _never
+
+    def of(self, shapes: tuple[float, ...], start: float) -> Marginal:
+        """Return the distribution of these shapes; a bounded one from a start to 1."""
+        shapes = self.to_scipy(shapes)
+        if self.support is None:
+            return Family(self.scipy, shapes)
+        low, high = self.support
+        width = (1.0 - start) / (high - low)
+        return Family(self.scipy, (*shapes, start - low * width, width), 1.0)
+
+
+FORMS = {
+    Distribution.NORMAL: Form(is_symmetric=_always),
+    Distribution.UNIFORM: Form(scipy="uniform", support=(0.0, 1.0), is_symmetric=_always),
+    Distribution.TRIANGULAR: Form(scipy="triang", support=(0.0, 1.0), to_scipy=lambda _: (0.5,), is_symmetric=_always),
+    # Without a plateau a trapezoid is triangular, without sides uniform.
+    Distribution.TRAPEZOID: Form(
+        scipy="trapezoid",
+        support=(0.0, 1.0),
+        shapes=Shapes(1, 0.01, 0.99),
+        to_scipy=lambda shapes: tuple((1.0 + sign * own) / 2.0 for own in shapes for sign in (-1, 1)),
+        is_symmetric=_always,
+    ),
+    # With a shape below 1 a beta density has no end at a limit.
+    Distribution.BETA: Form(scipy="beta", support=(0.0, 1.0), shapes=Shapes(2, 1.0, 50.0), is_symmetric=_are_equal),
+    Distribution.LOGNORMAL: Form(scipy="lognorm", shapes=Shapes(1, 0.02, 1.5), is_one_sided=True),
+    Distribution.WEIBULL: Form(scipy="weibull_min", shapes=Shapes(1, 0.3, 20.0), is_one_sided=True),
+    Distribution.RAYLEIGH: Form(is_one_sided=True),
+    Distribution.MIXTURE: Form(),
+    Distribution.EMPIRICAL: Form(),
 }
-"""The shapes of the distributions that have any. Without a plateau a trapezoid is triangular, without sides uniform;
-with a shape below 1 a beta density has no end at a limit."""
+"""What is known of every distribution."""
 
 
 def parsed_shapes(text: str) -> tuple[float, ...]:
@@ -121,10 +173,10 @@ def require_shapes(distribution: Distribution, stated: tuple[float, ...]) -> Non
     ValueError
         What is wrong, for the record that holds both.
     """
-    own = SHAPES.get(distribution)
+    own = distribution.form.shapes
     if own is None:
         if stated:
-            *others, last = SHAPES
+            *others, last = (kind.value for kind, form in FORMS.items() if form.shapes)
             raise ValueError(f"distribution {distribution.value} has no shape; {', '.join(others)} and {last} have one")
         return
     if len(stated) != own.count or not all(own.smallest <= shape <= own.largest for shape in stated):

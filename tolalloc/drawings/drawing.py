@@ -112,7 +112,11 @@ class Drawing:
         >>> hub.errors.columns, hub.sources[0].zone
         (('hub',), 0.0002)
         """
-        numbered = [(number, dict(row)) for number, row in enumerate(rows, start=1)]
+        listed = list(rows) if isinstance(rows, Iterable) and not isinstance(rows, str | Mapping) else [rows]
+        if not all(isinstance(row, Mapping) and "id" in row for row in listed):
+            wrong = next(row for row in listed if not (isinstance(row, Mapping) and "id" in row))
+            raise InputError.at(place, "rows", wrong, 'a list of rows such as {"id": "hub", "plus": 0.1, …}')
+        numbered = [(number, dict(row)) for number, row in enumerate(listed, start=1)]
         for number, row in numbered:
             require_columns(f"{place}, row {number} ({row.get('id', 'no id')})", tuple(row), ToleranceRow)
         sources = sources_of_rows(numbered, processes, place, Path.cwd())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -83,6 +83,12 @@ class Column:
             return self.write(source)
         value: Cell = getattr(source, self.attribute)
         return value / self.scale if self.scale and isinstance(value, float) else value
+
+
+def _alternatives(words: Iterable[str]) -> str:
+    """Return words of which one is chosen, as a sentence lists them."""
+    *others, last = words
+    return f"{', '.join(others)} or {last}"
 
 
 def _plus(source: Source) -> float:
@@ -196,8 +202,7 @@ class ToleranceRow(Record):
     distribution: Annotated[
         Distribution,
         Column(
-            "`normal`, `uniform`, `triangular`, `trapezoid`, `beta`, `lognormal`, `weibull`, `rayleigh`, `mixture` or "
-            "`empirical`; normal unless given",
+            f"{_alternatives(f'`{kind}`' for kind in Distribution)}; normal unless given",
             attribute="distribution",
         ),
     ] = Distribution.NORMAL

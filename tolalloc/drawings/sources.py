@@ -16,7 +16,6 @@ from tolalloc.drawings.distributions import (
     RAYLEIGH,
     Batch,
     Distribution,
-    Family,
     Marginal,
     Mixture,
 )
@@ -247,21 +246,7 @@ class Source:
             return Mixture(normal, self.batches)
         if self.distribution in (Distribution.NORMAL, Distribution.RAYLEIGH):
             return normal if self.distribution is Distribution.NORMAL else RAYLEIGH
-        start = -1.0 if is_size else 0.0
-        name, shapes = {
-            Distribution.UNIFORM: ("uniform", ()),
-            Distribution.TRIANGULAR: ("triang", (0.5,)),
-            Distribution.TRAPEZOID: (
-                "trapezoid",
-                tuple((1.0 + sign * own) / 2.0 for own in self.shapes for sign in (-1, 1)),
-            ),
-            Distribution.BETA: ("beta", self.shapes),
-            Distribution.LOGNORMAL: ("lognorm", self.shapes),
-            Distribution.WEIBULL: ("weibull_min", self.shapes),
-        }[self.distribution]
-        return (
-            Family(name, (*shapes, start, 1.0 - start), 1.0) if self.distribution.is_bounded else Family(name, shapes)
-        )
+        return self.distribution.form.of(self.shapes, start=-1.0 if is_size else 0.0)
 
     @cached_property
     def zone_mapping(self) -> ZoneMapping:

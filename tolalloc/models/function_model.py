@@ -6,6 +6,8 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from inspect import signature
+from math import isclose
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +20,7 @@ from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.model import ARRAY_RATE, Evaluation, Model, Observer, SettingDerivatives, unobserved
 from tolalloc.models.settings import Setting, require_settings
 from tolalloc.models.unit_bounds import ScaledUnits, SlopeBounds
-from tolalloc.models.user_function import UserFunction, identity
+from tolalloc.models.user_function import UserFunction, by_name, identity
 from tolalloc.reading.named_fields import is_number
 from tolalloc.reading.units import MILLIMETRE
 
@@ -104,6 +106,9 @@ class FunctionModel:
     # [unit of the output per mm or in, per rad, per unit of the setting]
     slopes: Mapping[str, Mapping[str, tuple[float, float]]] = field(default_factory=dict)
     step: float = _STEP  # Step of these differences to either side, over the zone [-]
+    # Input → its nominal size where the row of the drawing states none [mm, or in where its row is in inches, of angles
+    # rad]
+    nominals: Mapping[str, float] = field(default_factory=dict)
     name: str = "own model"  # What a report calls the model
 
     def __post_init__(self) -> None:
@@ -114,7 +119,17 @@ class FunctionModel:
             if not re.fullmatch(r".*\S \[\S.*\]", output):
                 allowed = f"a name with its unit, such as '{output} [mm]', or [-] for a plain number"
                 raise InputError.at(f"model {self.name}", "outputs", output, allowed)
+        for name, nominal in self.nominals.items():
+            if not is_number(nominal) or not np.isfinite(nominal):
+                raise InputError.at(f"model {self.name}, inputs", name, nominal, "a finite number, its nominal size")
         self._require_slopes()
+        self.callable  # noqa: B018  # says what is wrong with the names before anything is solved
+
+    @cached_property
+    def callable(self) -> Callable[..., Any]:
+        """The function of inputs, then settings, in their order; its parameters of these names may have another one."""
+        names = (*self.inputs, *(setting.name for setting in self.settings))
+        return by_name(self.function, names, f"model {self.name}")
 
     def _require_slopes(self) -> None:
         """Raise unless slopes are stated of outputs of the model, by all of its inputs and settings, as two numbers."""
@@ -154,7 +169,6 @@ class FunctionModel:
         InputError, UnknownNameError
             A source that is no input, or an input without a row.
         """
-        nominal = {source.name: source.nominal for source in errors.sources}
         lengths = {column: LENGTHS[own.length_name] for own in errors.sources for column in own.columns}
         for column in (*errors.columns, *errors.fixed):
             if column not in self.inputs:
@@ -170,10 +184,21 @@ class FunctionModel:
             source=self,
             varied=errors.columns,
             steps=self.step * np.repeat(errors.zones, [len(source.columns) for source in errors.active]),
-            offsets=np.array([nominal.get(name, 0.0) + errors.fixed.get(name, 0.0) for name in self.inputs]),
+            offsets=np.array([self._nominal(name, errors, lengths, place) for name in self.inputs]),
             values=tuple(setting.value for setting in self.settings),
             lengths=tuple(lengths[name] for name in self.inputs),
         )
+
+    def _nominal(self, name: str, errors: ErrorModel, lengths: Mapping[str, float], place: str) -> float:
+        """Return where an input stands without its deviation: the nominal size of its row, or else of the model [m]."""
+        drawn = {source.name: source.nominal for source in errors.sources}.get(name, 0.0)
+        stated = self.nominals.get(name, 0.0) * (1.0 if is_angular(name) else lengths[name])
+        if drawn and stated and not isclose(drawn, stated, rel_tol=1e-9):
+            raise InputError(
+                f"{place}, model {self.name}: the nominal size of {name!r} is {self.nominals[name]:g} in inputs and "
+                f"{drawn / lengths[name]:g} in its row of the drawing; allowed is one of the two, or the same in both."
+            )
+        return (drawn or stated) + errors.fixed.get(name, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -225,7 +250,7 @@ class BoundFunction(Model):
         """Much higher for a function that takes whole columns [1/s]."""
         widths = self.steps / self.source.step
         arguments = self._arguments(np.linspace(-0.5, 0.5, _ASKED)[:, np.newaxis] * widths)
-        function = self._user_function(self.source.function, len(self.source.outputs))
+        function = self._user_function(self.source.callable, self.source.outputs)
         return ARRAY_RATE if function.takes_columns(arguments) else super().stated_rate
 
     @property
@@ -233,6 +258,8 @@ class BoundFunction(Model):
         """Names, settings, and the function's code."""
         own = (identity(self.source.function), identity(self.source.jacobian))
         own += (self.lengths,) if {*self.lengths} != {MILLIMETRE} else ()
+        if self.source.callable is not self.source.function:
+            own += (tuple(signature(self.source.function).parameters),)  # one code may have them in another order
         return (self.name, self.source.inputs, self.source.outputs, self.settings, *own)
 
     def observed(self, observe: Observer) -> BoundFunction:
@@ -252,7 +279,8 @@ class BoundFunction(Model):
 
     def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
         """Return the outputs of every sample; one for which the function raises or returns no number fails."""
-        found = self._called(self.source.function, x, len(self.source.outputs))
+        asked = self._user_function(self.source.callable, self.source.outputs)
+        found = self._called(asked, x)
         values = found[:, [self.source.outputs.index(name) for name in self.outputs]]
         status = np.where(np.isfinite(values).all(axis=1), 0, 1).astype(np.uint8)
         self.observe(status)
@@ -279,7 +307,10 @@ class BoundFunction(Model):
         """Return the derivative of one output by every column [unit of the output per m]."""
         if self.source.jacobian is not None:
             inputs, outputs = len(self.source.inputs), len(self.source.outputs)
-            found = self._called(self.source.jacobian, x, inputs * outputs).reshape(-1, outputs, inputs)
+            names = (*self.source.inputs, *(setting.name for setting in self.settings))
+            jacobian = by_name(self.source.jacobian, names, f"model {self.name}, jacobian")
+            asked = UserFunction(function=jacobian, values=inputs * outputs, place=f"model {self.name}")
+            found = self._called(asked, x).reshape(-1, outputs, inputs)
             varied = [self.source.inputs.index(name) for name in self.varied]
             own_rows = found[:, self.source.outputs.index(own.outputs[0])]
             return np.asarray(own_rows[:, varied] * self._per_input[varied])
@@ -322,16 +353,13 @@ class BoundFunction(Model):
 
         return SlopeBounds(units=units, respond=respond, low=low, high=high)
 
-    def _called(
-        self, function: Callable[..., Any], x: Float[np.ndarray, "sample column"], count: int
-    ) -> Float[np.ndarray, "sample value"]:
+    def _called(self, asked: UserFunction, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample value"]:
         """Return what a function says of every sample, NaN where it says nothing."""
-        asked = self._user_function(function, count)
         parts = np.split(x, range(_AT_ONCE, x.shape[0], _AT_ONCE))
         return np.concatenate([asked(self._arguments(part)) for part in parts])
 
-    def _user_function(self, function: Callable[..., Any], count: int) -> UserFunction:
-        return UserFunction(function=function, values=count, place=f"model {self.name}")
+    def _user_function(self, function: Callable[..., Any], names: tuple[str, ...]) -> UserFunction:
+        return UserFunction(function=function, values=len(names), place=f"model {self.name}", names=names)
 
     def _arguments(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample argument"]:
         """Return what the function takes: inputs [mm or in, angles rad], then settings [units of their names]."""
@@ -350,7 +378,7 @@ def _is_range(value: object) -> bool:
 
 def model(
     function: Callable[..., Any],
-    inputs: Sequence[str],
+    inputs: Sequence[str] | Mapping[str, float],
     outputs: Sequence[str],
     settings: Sequence[Setting] = (),
     jacobian: Callable[..., Any] | None = None,
@@ -380,6 +408,7 @@ def model(
         jacobian=jacobian,
         name=called,
         slopes=slopes or {},
+        nominals={own: size for own, size in inputs.items() if size is not None} if isinstance(inputs, Mapping) else {},
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import pickle
+import re
 import sys
 import sysconfig
 import traceback
@@ -25,6 +26,8 @@ FAILURES = (ArithmeticError, ValueError, RuntimeError)
 """What a function may raise for a sample that has no answer, such as a root finder that does not converge."""
 _FAULTS = (RecursionError, NotImplementedError)
 """What of these is the function's fault all the same; so is everything else that it raises."""
+_LARGEST = 1e100
+"""Size beyond which a value is no answer, as its square is none [unit of the output]."""
 _SAME = 1e-9
 """By how much a function of arrays may differ from itself called with numbers, over the largest value [-]."""
 
@@ -42,6 +45,7 @@ class UserFunction:
     function: Callable[..., Any]
     values: int  # Numbers that it returns for one sample [-]
     place: str  # Who is meant, for messages
+    names: tuple[str, ...] = ()  # What these numbers are called, with their units, where it may return them by name
 
     def __call__(self, arguments: Float[np.ndarray, "sample argument"]) -> Float[np.ndarray, "sample value"]:
         """Return the values of every sample, NaN where there are none.
@@ -88,7 +92,7 @@ class UserFunction:
         if samples < 2:
             return None
         try:
-            found = self.function(*(column.copy() for column in arguments.T))
+            found = self._in_order(self.function(*(column.copy() for column in arguments.T)))
             single = self.values == 1 and np.shape(found) in ((), (samples,))
             columns = [np.broadcast_to(self._numbers(one), samples) for one in _flat([found] if single else found)]
         except KeyboardInterrupt:
@@ -115,7 +119,7 @@ class UserFunction:
         if len(found) >= _FEWEST and not np.isfinite(found).any():
             raise SolveError(
                 f"{self.place}: the function returns no number for any of {len(found)} samples, as for "
-                f"({_listed(arguments[0])}); allowed are numbers that are real and finite."
+                f"({_listed(arguments[0])}); allowed are numbers that are real and within ±{_LARGEST:g}."
             )
 
     def _require_same(
@@ -144,7 +148,7 @@ class UserFunction:
                 return nothing, f"{_named(error)} for ({_listed(sample)})"
             raise InputError(f"{self.place}: the function has a fault: {_named(error)}{_line_of(error)}.") from error
         try:
-            found = self._numbers(said).ravel()
+            found = self._numbers(self._in_order(said)).ravel()
         except FAILURES as reason:
             return nothing, f"{_named(reason)} for ({_listed(sample)})"
         except TypeError as error:
@@ -161,6 +165,28 @@ class UserFunction:
             with suppress(Exception, SystemExit):
                 return self.function(*sample[:, np.newaxis].copy())
             raise
+
+    def _in_order(self, found: Any) -> Any:
+        """Return what the function returned in the order of its outputs, where it says them by name.
+
+        Raises
+        ------
+        InputError
+            Other names than those of the outputs, with or without their units.
+        """
+        labels = _labels(found)
+        if not labels or not self.names:
+            return found
+        said = {name: at for at, name in enumerate(labels)}
+        bare = [name.rpartition(" [")[0] for name in self.names]
+        places = [said.get(name, said.get(own, -1)) for name, own in zip(self.names, bare, strict=True)]
+        if -1 in places or len(labels) != len(self.names):
+            raise InputError(
+                f"{self.place}: the function returned {', '.join(map(repr, labels))}; allowed are its outputs by "
+                f"name, {', '.join(map(repr, bare))}, or without names in this order."
+            )
+        values = _values_of(found)
+        return [values[at] for at in places]
 
     def _numbers(self, found: Any) -> Float[np.ndarray, "..."]:
         """Return what the function returned as numbers of its own, NaN where that is no answer.
@@ -185,7 +211,8 @@ class UserFunction:
         if values.dtype.kind == "c" or (values.dtype.kind == "O" and any(isinstance(v, complex) for v in values.flat)):
             turned = values.astype(complex)
             values = np.where(np.abs(turned.imag) <= _SAME * np.abs(turned), turned.real, np.nan)
-        return np.where(masked, np.nan, values.astype(float))
+        values = values.astype(float)
+        return np.where(masked | ~(np.abs(values) <= _LARGEST), np.nan, values)
 
     def _require_arguments(self, count: int) -> None:
         """Raise if the function cannot be called with so many arguments; what hides its signature is tried."""
@@ -199,6 +226,58 @@ class UserFunction:
             raise InputError(
                 f"{self.place}: the function cannot be called with {count} values, inputs and settings ({error})."
             ) from None
+
+
+def _labels(found: Any) -> list[str]:
+    """Return the names of the values that a function returned: keys, columns, fields; nothing where there are none."""
+    if isinstance(found, Mapping):
+        own = list(found)
+    elif hasattr(found, "iloc"):  # a table or a series of pandas
+        own = list(getattr(found, "columns", found.index))
+    else:
+        own = list(getattr(getattr(found, "dtype", None), "names", None) or ())
+    return own if all(isinstance(name, str) for name in own) else []
+
+
+def _values_of(found: Any) -> list[Any]:
+    """Return the values that a function returned by name, in its own order."""
+    if isinstance(found, Mapping):
+        return list(found.values())
+    if hasattr(found, "iloc"):
+        return list(found.to_numpy().T)
+    return [found[name] for name in found.dtype.names]
+
+
+def by_name(function: Callable[..., Any], names: Sequence[str], place: str) -> Callable[..., Any]:
+    """Return a function that takes values in the order of some names, and gives each to its parameter of that name.
+
+    A name is compared as Python would spell it: ``crank1.play`` is ``crank1_play``. Where no parameter has a name of
+    these the values are given in their order.
+
+    Raises
+    ------
+    InputError
+        Some of the names are parameters and others are not, and one of them stands at another place.
+    """
+    try:
+        known = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):
+        return function
+    parameters = [own.name for own in known if own.kind in (own.POSITIONAL_ONLY, own.POSITIONAL_OR_KEYWORD)]
+    spelled = [re.sub(r"\W", "_", name) for name in names]
+    if spelled == parameters[: len(spelled)] or not {*spelled} & {*parameters}:
+        return function
+    needed = {own.name for own in known if own.default is own.empty and own.name in parameters}
+    if {*spelled} <= {*parameters} and needed <= {*spelled} and len({*spelled}) == len(spelled):
+        return lambda *values: function(**dict(zip(spelled, values, strict=True)))
+    for at, (name, own) in enumerate(zip(names, spelled, strict=True)):
+        if own in parameters and parameters.index(own) != at:
+            raise InputError(
+                f"{place}: the function takes {own!r} as number {parameters.index(own) + 1} of its arguments, and "
+                f"{name!r} is number {at + 1} of the inputs and settings; allowed are parameters that are all called "
+                f"as these are, or in their order: {', '.join(names)}."
+            )
+    return function
 
 
 def _named(error: BaseException) -> str:
@@ -287,7 +366,10 @@ def _inside(thing: Any) -> Sequence[Any] | None:
         return tuple(thing.items())
     if isinstance(thing, list | tuple):
         return thing
-    return _made_of(thing) if hasattr(thing, "__code__") else None
+    compiled = getattr(thing, "py_func", None)  # numba's, around the function that a user wrote
+    if compiled is not None:
+        return _made_of(compiled)
+    return _made_of(thing) if hasattr(thing, "__code__") and hasattr(thing, "__globals__") else None
 
 
 def _made_of(function: Any) -> tuple[Any, ...]:

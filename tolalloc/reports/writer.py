@@ -6,6 +6,7 @@ import json
 import platform
 import re
 from base64 import b64encode
+from collections.abc import Iterable
 from datetime import date
 from functools import singledispatch
 from importlib.metadata import version
@@ -149,15 +150,26 @@ def write_document(document: Document, folder: Path) -> None:
     figures.mkdir(parents=True)
     _write_page(document, folder / "report.html")
     (folder / "tables").mkdir()
-    for name, frame in document.tables.items():
-        write_csv(frame, folder / "tables" / f"{name}.csv")
+    for name, stem in _stems(document.tables).items():
+        write_csv(document.tables[name], folder / "tables" / f"{stem}.csv")
     write_sheets(_sheets(document), folder / "results.xlsx", document.figures.values())
-    for name, figure in document.figures.items():
-        save_png(figure, figures / f"{name}.png")
+    for name, stem in _stems(document.figures).items():
+        save_png(document.figures[name], figures / f"{stem}.png")
     write_json(document.summary, folder / "summary.json")
     known = {"title": document.title, "seed": document.seed, **(document.manifest or {})}
     machine = {"processor": processor(), "threads": thread_count(), "versions": versions()}
     write_json({**known, **machine}, folder / "manifest.json")
+
+
+def _stems(names: Iterable[str]) -> dict[str, str]:
+    """Return what a file of each name is called, another one for each: an output may be called ``gap/limit``."""
+    found: dict[str, str] = {}
+    for name in names:
+        stem = re.sub(r'[\\/:*?"<>|\x00-\x1f]', "-", name)
+        while stem in found.values():
+            stem += "-"
+        found[name] = stem
+    return found
 
 
 def _sheets(document: Document) -> dict[str, pd.DataFrame]:
