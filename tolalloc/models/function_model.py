@@ -256,7 +256,7 @@ class BoundFunction(Model):
     @property
     def content(self) -> Any:
         """Names, settings, and the function's code."""
-        own = (identity(self.source.function), identity(self.source.jacobian))
+        own: tuple[Any, ...] = (identity(self.source.function), identity(self.source.jacobian))
         own += (self.lengths,) if {*self.lengths} != {MILLIMETRE} else ()
         if self.source.callable is not self.source.function:
             own += (tuple(signature(self.source.function).parameters),)  # one code may have them in another order
