@@ -1,8 +1,9 @@
-"""What tests build alike: studies of the baseline, verifiers, sources, sums, refusals, tables of three cranks."""
+"""What tests build alike: studies, sources, units, kernels and files; what reports and refusals say, by its key."""
 
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 import tomllib
 from collections.abc import Callable, Iterable
@@ -132,6 +133,18 @@ def written(path: Path, content: str | bytes, encoding: str = "utf-8") -> Path:
     return path
 
 
+def page_of(folder: Path) -> str:
+    """Return the page of the report in a folder."""
+    return (folder / "report.html").read_text(encoding="utf-8")
+
+
+def summary_of(folder: Path) -> dict[str, Any]:
+    """Return what the report in a folder says for programs."""
+    found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert isinstance(found, dict)
+    return found
+
+
 def refusal(read: Callable[[Path], object], path: Path) -> str:
     """Return the one sentence in which a file is refused."""
     with pytest.raises(TolallocError) as caught:
@@ -186,6 +199,7 @@ def headed(sections: Iterable[Section], heading: str, **gaps: object) -> Section
 
 
 FEW = ("housing.pitch", "housing.runout", "disc1.pitch", "disc2.pitch", "pin.diameter")
+"""Sources of the baseline that a small study varies."""
 FIRST_STAGE = ("sun.", "planet", "mesh")
 STANDING = ("housing.", "each_pin.", "carrier.assembly", "carrier.tilt", "sun.assembly")
 """What stands still in the housing; a source that begins like none of these turns with the sun, a disc or the carrier.

@@ -84,6 +84,18 @@ def refused(result: subprocess.CompletedProcess[str], *words: str) -> None:
         assert word in sentence, sentence
 
 
+WRITTEN = {"report.html", "results.xlsx", "summary.json", "manifest.json"}
+"""Files of every report."""
+
+
+def require_offline(page: str) -> None:
+    """Assert that a page draws its figures itself and asks no host for anything."""
+    assert page.count("class Chart") == 1
+    assert page.count('class="figure"') + page.count('class="moving"') == page.count("<figure>") > 0
+    for outside in ('src="http', "src='http", 'href="http', "cdn."):
+        assert outside not in page
+
+
 def answer_of(*arguments: object) -> dict[str, Any]:
     """Return what a command that is not refused answers to a program."""
     result = tolalloc(*arguments, "--json")

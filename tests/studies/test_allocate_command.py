@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 from openpyxl import load_workbook
 
-from tests.builders import FEW, few_sources, numbers_of, refusal, says, telling, wording
+from tests.builders import FEW, few_sources, numbers_of, page_of, refusal, says, summary_of, telling, wording
 from tests.studies.command import ROOT, command, process, refused, tolalloc
 from tolalloc.allocation.cost.process_costs import load_process_costs
 from tolalloc.cli.run import allocate
@@ -109,7 +109,7 @@ def test_the_report_is_complete(allocated):
         "drawing.xlsx",
         "frames.dxf",
     }
-    page = (folder / "report.html").read_text(encoding="utf-8")
+    page = page_of(folder)
     for key in ("today", "risks", "dimensions", "requirements", "optimality", "good_unit", "robustness", "work"):
         assert wording(f"allocation.heading_{key}") in page
     assert wording("allocation.heading_trade", word="Modification") in page
@@ -144,7 +144,7 @@ def test_the_answer_reads_well(allocated):
 @pytest.mark.slow
 def test_the_answer_for_programs_is_finite(allocated):
     folder, _ = allocated
-    answer = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["allocation"]
+    answer = summary_of(folder)["allocation"]
     assert answer["seed"] == 0
     assert answer["met"] is True
     assert answer["blocking requirement"] is None
@@ -175,7 +175,7 @@ def test_the_cost_is_one_number_in_summary_drawing_and_table(tmp_path, change):
     folder = tmp_path / "report"
     result = tolalloc("run", script, "--only", "allocation", "--out", folder)
     assert result.returncode == 0, result.stderr
-    answer = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["allocation"]
+    answer = summary_of(folder)["allocation"]
     cost, header = answer["cost [cost units]"], "cost [cost units]"
     assert pd.read_excel(folder / "drawing.xlsx", sheet_name="drawing")[header].sum() == pytest.approx(cost, rel=1e-9)
     assert pd.read_csv(folder / "tables" / "drawing.csv")[header].sum() == pytest.approx(cost, rel=1e-9)
@@ -261,7 +261,7 @@ def test_a_limit_out_of_reach_has_an_answer_with_what_blocks_and_by_how_much(tmp
     said = telling(answer["warnings"], "allocation.not_verified")
     assert f"{with_unit(f'{beyond:.3g}', blocking)} beyond" in said
     assert all(math.isfinite(number) for number in numbers_of(answer))
-    page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    page = page_of(tmp_path / "report")
     assert not says(page, "allocation.price")
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.studies.command import answer_of, refused, tolalloc
+from tests.builders import page_of, summary_of, written
+from tests.studies.command import WRITTEN, answer_of, refused, tolalloc
 
 THREE_PARTS = """
 name = "pump"
@@ -42,15 +42,12 @@ tolerance_arcsec = [30, 30, 30]
 
 def errors_file(path: Path, names: tuple[str, ...], errors: np.ndarray) -> Path:
     rows = [f"{name},{x:.2f},{y:.2f},{z:.2f}" for name, (x, y, z) in zip(names, errors, strict=True)]
-    path.write_text("\n".join(["part,x [arcsec],y [arcsec],z [arcsec]", *rows]), encoding="utf-8")
-    return path
+    return written(path, "\n".join(["part,x [arcsec],y [arcsec],z [arcsec]", *rows]))
 
 
 @pytest.fixture
 def pump(tmp_path) -> Path:
-    path = tmp_path / "pump.chain.toml"
-    path.write_text(THREE_PARTS, encoding="utf-8")
-    return path
+    return written(tmp_path / "pump.chain.toml", THREE_PARTS)
 
 
 @pytest.fixture
@@ -75,8 +72,8 @@ def test_measured_parts_are_adjusted_and_reported(unit, tmp_path):
     assert load[0] < load[-1] < load[1]  # perfect parts, adjusted, unadjusted
     folder = tmp_path / "report"
     names = {path.name for path in folder.iterdir()}
-    assert names == {"report.html", "results.xlsx", "summary.json", "manifest.json", "figures", "tables"}
-    assert json.loads((folder / "summary.json").read_text(encoding="utf-8")) == answer
+    assert names == WRITTEN | {"figures", "tables"}
+    assert summary_of(folder) == answer
     assert {path.stem for path in (folder / "figures").iterdir()} >= {"tilt", "precision", "pressure", "line_load"}
 
 
@@ -125,7 +122,7 @@ def test_impossible_limits_keep_nobody_from_the_turns(unit, tmp_path):
         answer = answer_of("assemble", chain, *arguments, "--out", folder)
         assert answer["tolerances"] is None and answer["steps"]
         (warning,) = (own for own in answer["warnings"] if "angular tolerances" in own)
-        assert warning.split(":")[0] in (folder / "report.html").read_text(encoding="utf-8")
+        assert warning.split(":")[0] in page_of(folder)
         shown = tolalloc("assemble", chain, *arguments)
         assert shown.returncode == 0, shown.stderr
         assert warning in shown.stdout

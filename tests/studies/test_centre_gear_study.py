@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
+from tests.builders import page_of
 from tests.studies.command import refused, tolalloc
 from tolalloc.assembly.places import places_of
 from tolalloc.bench.sources import has_half_turn
@@ -64,7 +65,7 @@ def test_a_study_is_ranked_allocated_and_drawn(folder, tmp_path):
     assert run.answers["allocation"].result.met
     ranked = run.answers["ranking"].result.sobol.sources
     assert {"pinion.eccentricity", "centre.eccentricity", "sun.eccentricity"} <= set(ranked)
-    page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    page = page_of(tmp_path / "run")
     assert "outer toothing of the centre gear" in page
     again = ta.drawing(tmp_path / "run" / "allocation.csv")
     assert {own.name for own in again.sources} >= {"pinion.eccentricity", "centre.eccentricity"}

@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import norm
 
 import tolalloc as ta
-from tests.builders import says
+from tests.builders import says, summary_of
 from tests.studies.command import answer_of, refused, tolalloc
 from tolalloc.reports.finished_run import Member, read_run
 from tolalloc.sensitivity.effort import QUICK_RANKING
@@ -140,7 +140,7 @@ def test_rankings_with_a_lower_limit_alone_are_compared(tmp_path):
     runs = []
     for name, index in (("one", 0.3), ("two", 0.4)):
         runs.append(run_folder(tmp_path / name, index=index, asked="ranking", **{"lower limit [N·m/arcmin]": 150.0}))
-        said = json.loads((runs[-1] / "summary.json").read_text(encoding="utf-8"))
+        said = summary_of(runs[-1])
         del said["ranking"]["limit [arcsec]"], said["ranking"]["met"]
         (runs[-1] / "summary.json").write_text(json.dumps(said), encoding="utf-8")
     result = tolalloc("compare", *runs)

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from tests.builders import reducer_file
-from tests.studies.command import answer_of, refused, tolalloc
+from tests.studies.command import WRITTEN, answer_of, refused, tolalloc
 
 
 def test_contact_of_the_rv40e():
@@ -33,7 +33,7 @@ def test_contact_writes_report_and_profile(tmp_path):
     names = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
     figures = {f"figures/{name}.png" for name in ("profile", "clearance", "forces", "pins_in_contact")}
     tables = {f"tables/{name}.csv" for name in ("profile", "loaded contact", "pins")}
-    assert names == {"report.html", "results.xlsx", "summary.json", "manifest.json"} | figures | tables
+    assert names == WRITTEN | figures | tables
     drawing = ezdxf.readfile(file)
     (outline,) = drawing.modelspace().query("LWPOLYLINE")
     assert outline.closed

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.builders import prepared, says, seeded_units
-from tests.studies.command import ROOT, answer_of, refused, tolalloc
+from tests.builders import page_of, prepared, says, seeded_units
+from tests.studies.command import ROOT, WRITTEN, answer_of, refused, tolalloc
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
 from tolalloc.reading.units import ARCSECOND
@@ -72,14 +72,14 @@ def test_a_bad_housing_is_named(bench, tmp_path):
     assert 8 < first["reading [µm]"] < 14  # a wave of amplitude 5 µm and little else, over a turn
     assert answer["curves failed [-]"] == 0
     names = {path.name for path in (tmp_path / "report").iterdir()}
-    assert names == {"report.html", "results.xlsx", "summary.json", "manifest.json", "figures", "tables"}
+    assert names == WRITTEN | {"figures", "tables"}
     assert {path.stem for path in (tmp_path / "report" / "figures").iterdir()} == {
         "dominant",
         "readings",
         "curve",
         "left",
     }
-    page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    page = page_of(tmp_path / "report")
     assert "0.5″" in page and "unit7" in page
 
 
@@ -104,7 +104,7 @@ def test_a_unit_with_prices_is_told_what_to_do_and_what_to_measure_next(bench, t
     assert answer["decisions"][0]["decision"] == "change housing.*"
     assert {row["source"] for row in answer["readings"]} == {"pin.diameter", "disc1.pitch", "disc2.pitch"}
     assert all(row["expected cost after [cost units]"] >= 0 for row in answer["readings"])
-    page = " ".join((tmp_path / "report" / "report.html").read_text(encoding="utf-8").split())
+    page = " ".join(page_of(tmp_path / "report").split())
     assert says(page, "diagnosis.stop") and says(page, "diagnosis.decide", unit="EUR")
     assert says(page, "diagnosis.next_heading")
 

@@ -17,6 +17,7 @@ from pathlib import Path
 import pytest
 
 import tolalloc as ta
+from tests.builders import written
 from tests.studies.command import ROOT, command, tolalloc
 from tests.studies.live_page import STUDY
 from tolalloc.cli.live.desk import Desk, Job
@@ -30,9 +31,7 @@ from tolalloc.study.script import load_study
 
 @pytest.fixture
 def script(tmp_path) -> Path:
-    path = tmp_path / "fit.py"
-    path.write_text(STUDY, encoding="utf-8")
-    return path
+    return written(tmp_path / "fit.py", STUDY)
 
 
 def desk_of(script: Path) -> Desk:

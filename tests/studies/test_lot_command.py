@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import tolalloc as ta
-from tests.builders import headed, says
+from tests.builders import headed, page_of, says, summary_of
 from tests.studies.command import answer_of, refused, tolalloc
 from tolalloc.bench import lot_orders
 
@@ -42,7 +42,7 @@ def test_a_lot_is_told_reported_and_read_back_as_a_drawing(tmp_path):
     assert done.returncode == 0, done.stderr
     assert "Moved: the mean of hub, " in done.stdout
     assert "The tolerance table of the lot is" in done.stderr
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    summary = summary_of(folder)
     assert summary["moved"] == ["hub"]
     limits = next(row for row in summary["control limits"] if row["source"] == "hub")
     # Zone −4…8: middle 2, σ 2; A of five parts is 1.342 and B6 1.964.
@@ -71,7 +71,7 @@ def test_a_row_of_gauges_is_taken_off_the_spread_and_said(tmp_path):
     assert hub["standard deviation [µm]"] == pytest.approx((square - 0.25) ** 0.5)
     assert hub["variance by the gauge [%]"] == pytest.approx(25 / square)
     assert bore["variance by the gauge [%]"] == ""
-    page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    page = page_of(tmp_path / "report")
     assert "the gauge makes most of hub" in page and "all others do not err: hub" in page
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
 
-from tests.builders import baseline_errors
+from tests.builders import baseline_errors, summary_of
 from tests.studies.command import answer_of, refused, tolalloc
 from tolalloc.assembly.stock import drawn_parts
 from tolalloc.drawings.seeds import SeedTree
@@ -44,7 +42,7 @@ def test_two_units_share_their_parts_and_are_reported(tmp_path):
         "mount", str(parts_file(tmp_path, 2)), "--reducer", "rv20e_liu2020", "--starts", "1", "--out", folder
     )
     assert said.returncode == 0, said.stderr
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    summary = summary_of(folder)
     parts = [row["part"] for row in summary["fittings"]]
     assert len(set(parts)) == len(parts) == 12
     assert summary["mean peak-to-peak as mounted [arcsec]"] < summary["mean of random mountings [arcsec]"]

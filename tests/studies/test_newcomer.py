@@ -6,12 +6,12 @@ The golden case ``three`` asks both questions of a folder of three cranks.
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
 from openpyxl import load_workbook
 
+from tests.builders import page_of, summary_of
 from tests.studies.command import tolalloc
 from tolalloc.drawings.drawing import load_drawing
 
@@ -59,9 +59,9 @@ def test_a_newcomer_comes_from_nothing_to_an_answer(tmp_path):
     (place / "study.py").write_text(study.replace("0.9973", "0.9"), encoding="utf-8")
     run = tolalloc("run", place / "study.py", "--out", tmp_path / "run")
     assert run.returncode == 0, run.stderr
-    summary = json.loads((tmp_path / "run" / "summary.json").read_text(encoding="utf-8"))
+    summary = summary_of(tmp_path / "run")
     assert summary["allocation"]["cost [cost units]"] > 0
-    assert "housing.pitch" in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    assert "housing.pitch" in page_of(tmp_path / "run")
     before = {own.name: own for own in load_drawing(place / "zones.xlsx").sources}
     after = {own.name: own for own in load_drawing(tmp_path / "run" / "allocation.csv").sources}
     assert before["disc1.pitch"].zone == pytest.approx(11e-6)

@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 import tolalloc as ta
+from tests.builders import page_of
 from tests.studies.command import refused, tolalloc
 from tests.studies.paper import MISSING, can_print, lost
 from tolalloc.exceptions import InputError
@@ -191,7 +192,7 @@ def test_a_word_on_two_lines_is_noticed(tmp_path, width):
 def test_the_title_block_says_what_the_study_states_and_nothing_else(tmp_path):
     stated = {"drawing number": "RVX-80-101", "author": "J. <Weiß>"}
     write_document(replace(report("Ranking"), title_block=stated), tmp_path / "report")
-    page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    page = page_of(tmp_path / "report")
     assert "<td><small>drawing number</small>RVX-80-101</td>" in page
     assert "<td><small>author</small>J. &lt;Weiß&gt;</td>" in page
     assert "<td><small>revision</small></td>" in page

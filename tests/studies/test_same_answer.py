@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 import tolalloc as ta
+from tests.builders import shop_file, written
 from tests.golden.record import steady
 from tests.studies.command import answer_of, tolalloc
 from tolalloc.exceptions import InputError, TolallocError
@@ -36,10 +37,7 @@ def _plain(summary: dict[str, Any]) -> Any:
 
 @pytest.fixture
 def shop(tmp_path):
-    path = tmp_path / "shop.csv"
-    rows = [f"ground,{zone},µm,{0.5 + 40 / zone}\n" for zone in (5, 8, 12, 20, 40)]
-    path.write_text("process,tolerance [unit],unit,cost [cost units]\n" + "".join(rows), encoding="utf-8")
-    return path
+    return shop_file(tmp_path / "shop.csv")
 
 
 def test_costs(shop):
@@ -232,9 +230,7 @@ study = ta.Study(
 
 @pytest.fixture
 def script(tmp_path):
-    path = tmp_path / "own.py"
-    path.write_text(OWN, encoding="utf-8")
-    return path
+    return written(tmp_path / "own.py", OWN)
 
 
 def test_check(script):

@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from tests.builders import written
 from tests.studies.command import answer_of, refused, tolalloc
 
 STUDY = """
@@ -27,9 +28,7 @@ study = ta.Study(
 
 
 def script(folder, name, half=0.03, function="gap"):
-    path = folder / f"{name}_study.py"
-    path.write_text(STUDY.format(name=name, half=half, function=function), encoding="utf-8")
-    return path
+    return written(folder / f"{name}_study.py", STUDY.format(name=name, half=half, function=function))
 
 
 @pytest.mark.slow

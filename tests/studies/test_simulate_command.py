@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.builders import says
+from tests.builders import says, summary_of
 from tests.studies.command import answer_of, process, refused, tolalloc
 from tolalloc.exceptions import TolallocError
 from tolalloc.reducers.simulation import SimulationRequest, prepare_simulation
@@ -26,7 +26,7 @@ def test_a_run_is_reported_with_its_series(tmp_path):
     said = tolalloc("simulate", "--reducer", "rv40e_xi2015", *SHORT, "--torque", "-572", "--out", folder)
     assert said.returncode == 0, said.stderr
     assert says(" ".join(said.stdout.split()), "simulation.turns", ratio=81.0, output_speed=5250 / 81)
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    summary = summary_of(folder)
     assert summary["crank turns of the steady part [-]"] == 1
     series = pd.read_csv(folder / "series.csv")
     assert len(series) == 6001

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tests.builders import headed, says, telling, wording
+from tests.builders import few_sources, headed, says, telling, wording
 from tolalloc import LOST_MOTION
 from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.cost.unit_price import YieldLadder
@@ -16,7 +16,6 @@ from tolalloc.allocation.front.uncertain_region import UncertainRange, Uncertain
 from tolalloc.allocation.result import AllocationResult, limit_price, solver_noise
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
 from tolalloc.allocation.space.effort import QUICK_ALLOCATION
-from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
 from tolalloc.reports.document import Section
 from tolalloc.reports.header import Header
 from tolalloc.reports.tellers import allocation_figures as figures
@@ -26,7 +25,6 @@ from tolalloc.study.answer import Answer
 pytestmark = pytest.mark.slow  # one allocation of all limits, in a minute or two, is what all read
 
 TARGET = 0.95
-KEPT = {"housing.pitch", "housing.runout", "disc1.pitch", "disc2.pitch", "pin.diameter"}
 SEARCH = QUICK_ALLOCATION.search
 FRONT = replace(SEARCH.front, population=8, generations=2, population_on_kernel=4, designs=10, rounds=1, points=3)
 SMALL = replace(
@@ -47,13 +45,10 @@ SMALL = replace(
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    table = tmp_path_factory.mktemp("said") / "few.csv"
-    sources = [source for source in load_tolerance_table("rv20e_table4") if source.name in KEPT]
-    table_frame(sources).to_csv(table, index=False)
     shown = ta.AtYield(target=TARGET)
     study = ta.Study(
         ta.reducer("rv20e_liu2020", flank_clearance=(1.0, 5.0), radial_clearance=(5.0, 20.0), neglected=("*",)),
-        ta.drawing(table),
+        ta.drawing(few_sources(tmp_path_factory.mktemp("said"))),
         limits={
             ta.PEAK_TO_PEAK: ta.Limit(upper=50.0, show=shown),
             LOST_MOTION: ta.Limit(upper=0.5, show=ta.AtCpk(target=1.33)),

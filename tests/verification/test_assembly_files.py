@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.builders import written
 from tolalloc.assembly.files import DATA, load_errors, load_plan
 from tolalloc.assembly.plan import AssemblyPlan
 from tolalloc.assembly.steps import AssemblyStep, check_steps
@@ -490,9 +491,7 @@ KC4,-3600,1e1,60
 
 
 def errors_of(folder: Path, plan: AssemblyPlan, text: str, encoding: str = "utf-8") -> np.ndarray:
-    path = folder / "errors.csv"
-    path.write_text(text, encoding=encoding)
-    return load_errors(path, plan)
+    return load_errors(written(folder / "errors.csv", text, encoding), plan)
 
 
 def test_measured_errors_are_read_in_the_order_of_the_chain(tmp_path, bx40e):

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.builders import headed, says, telling, wording
+from tests.builders import headed, says, telling, wording, written
 from tolalloc.assembly.adjustment import AssemblyRequest, AssemblyResult, assemble
 from tolalloc.assembly.files import load_plan
 from tolalloc.assembly.gains import assembled, tuned_gains
@@ -99,9 +99,7 @@ def summary(results: AssemblyResult) -> dict:
 
 @pytest.fixture(scope="module")
 def plan(tmp_path_factory):
-    path = tmp_path_factory.mktemp("chain") / "pump.chain.toml"
-    path.write_text(CHAIN, encoding="utf-8")
-    return load_plan(path)
+    return load_plan(written(tmp_path_factory.mktemp("chain") / "pump.chain.toml", CHAIN))
 
 
 @pytest.fixture(scope="module")
@@ -250,7 +248,7 @@ def test_the_gain_of_a_tuned_filter_is_said_with_the_reach_of_its_proof(expected
 def test_the_share_of_random_assemblies_within_all_limits_is_said(expected):
     share = expected.tolerances.verification.share
     best = expected.tolerances.verified.gains.state_weight
-    which = f"the tolerances for the best state weight, Q = {best:.4g}"
+    which = wording("assembly.of_best", precision=best)
     assert expected.tolerances.verified is expected.tolerances.by_state_weight.best
     assert says(said(expected), "assembly.verified", assemblies=2000, which=which, share=share.estimate)
 

@@ -13,7 +13,7 @@ from scipy import optimize, stats
 from scipy.optimize import linear_sum_assignment
 
 import tolalloc as ta
-from tests.builders import baseline_errors, says, source, units_at_random, wording
+from tests.builders import baseline_errors, page_of, says, source, units_at_random, wording
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.capability.linear_function import LinearFunction, LinearLaw
 from tolalloc.drawings.compensators import Compensator, all_choices, assembly_cost, in_force
@@ -466,7 +466,7 @@ def test_every_file_that_leaves_says_which_classes_the_zones_hold_with(sorted_ga
     assert said in (folder / "frames.dxf").read_text(encoding="utf-8")
     sheets = openpyxl.load_workbook(folder / "drawing.xlsx")
     assert any(said in str(cell.value) for sheet in sheets for row in sheet.iter_rows() for cell in row)
-    page = (folder / "report.html").read_text(encoding="utf-8")
+    page = page_of(folder)
     assert wording("allocation.heading_assembly") in page
     assert says(page, "allocation.assembly_cost", cost=result.assembled.best.cost, cost_unit="cost units")
     again = ta.drawing(folder / "allocation.csv")

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 import tolalloc as ta
-from tests.builders import study_of_lengths, written
+from tests.builders import page_of, study_of_lengths, summary_of, written
 from tests.verification.test_own_words import ROWS
 from tolalloc.cli.main import app
 from tolalloc.drawings.tolerance_table import table_text
@@ -51,7 +51,7 @@ def test_every_file_for_people_says_it_and_none_says_cost_units(folder):
         texts += [frame.to_csv() for frame in pd.read_excel(book, sheet_name=None, header=None, dtype=str).values()]
     assert len(texts) > 20
     assert not [text for text in texts if "cost unit" in text]
-    page = (folder / "report.html").read_text(encoding="utf-8")
+    page = page_of(folder)
     assert " EUR" in page
     assert "cost [EUR]" in page
 
@@ -59,7 +59,7 @@ def test_every_file_for_people_says_it_and_none_says_cost_units(folder):
 @pytest.mark.slow
 def test_programs_find_the_names_that_every_run_has(folder):
     found = read_run(folder)
-    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    summary = summary_of(folder)
     assert summary["allocation"]["cost [cost units]"] == pytest.approx(found.zones["cost [cost units]"].sum(), rel=1e-9)
     assert found.currency == "EUR"
 

@@ -12,7 +12,7 @@ import pytest
 from openpyxl import Workbook, load_workbook
 from openpyxl.chart import BarChart
 
-from tests.builders import refusal
+from tests.builders import refusal, written
 from tolalloc.allocation.cost.points import load_shop_points
 from tolalloc.allocation.cost.process_costs import load_process_costs
 from tolalloc.bench.readings import load_readings
@@ -29,14 +29,9 @@ HEADER, LINE = ",".join(HEADERS), ",".join(map(str, ROW))
 UNIT = 'name = "u"\nsource = "s"\n'
 
 
-def written(folder, name, content):
-    (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-    return folder / name
-
-
 def table(folder, *, header="", cell="", row=LINE):
     added = (f",{header}", f",{cell}") if header else ("", "")
-    return written(folder, "t.csv", f"{HEADER}{added[0]}\n{row}{added[1]}\n")
+    return written(folder / "t.csv", f"{HEADER}{added[0]}\n{row}{added[1]}\n")
 
 
 def workbook(folder, change=lambda book: None, header=None, cell=None):
@@ -125,8 +120,8 @@ def test_a_workbook_that_unpacks_to_much_more_is_refused_unread(filling, tmp_pat
 
 
 def test_tables_of_too_many_columns_cells_or_bytes_are_refused(tmp_path):
-    assert "4001 columns" in refusal(load_tolerance_table, written(tmp_path, "t.csv", "a," * 4000 + "a\n"))
-    assert "allowed are 32 MB" in refusal(load_units, written(tmp_path, "t.csv", b"x" * (32 * 2**20 + 1)))
+    assert "4001 columns" in refusal(load_tolerance_table, written(tmp_path / "t.csv", "a," * 4000 + "a\n"))
+    assert "allowed are 32 MB" in refusal(load_units, written(tmp_path / "t.csv", b"x" * (32 * 2**20 + 1)))
     with pytest.raises(InputError, match=r"row 7: .* allowed are 4000 columns and 2000000 cells"):
         require_believable(Path("t.csv"), 7, 2, 2_000_001)
 
@@ -164,7 +159,7 @@ def test_a_name_that_is_no_text_is_refused(name):
     ],
 )
 def test_toml_that_python_cannot_hold_is_refused(text, words, tmp_path):
-    assert words in refusal(load_unit, written(tmp_path, "u.unit.toml", UNIT + text))
+    assert words in refusal(load_unit, written(tmp_path / "u.unit.toml", UNIT + text))
 
 
 def test_long_cells_and_values_are_not_quoted_in_full(tmp_path):
@@ -173,7 +168,7 @@ def test_long_cells_and_values_are_not_quoted_in_full(tmp_path):
     )
     for row in (LINE.replace("0.1", "7x " * 30_000, 1), LINE.replace("a", "y" * 100_000 + ",x", 1)):
         assert len(refusal(load_tolerance_table, table(tmp_path, row=row))) < 700
-    toml = written(tmp_path, "u.unit.toml", f'{UNIT}{"k" * 90_000} = 1\n[lengths]\na = "{"x " * 90_000}"\n')
+    toml = written(tmp_path / "u.unit.toml", f'{UNIT}{"k" * 90_000} = 1\n[lengths]\na = "{"x " * 90_000}"\n')
     with pytest.raises(TolallocError) as caught:
         load_unit(toml)
     assert all(len(sentence) < 700 for sentence in str(caught.value).split("\n"))
@@ -185,9 +180,9 @@ def test_long_cells_and_values_are_not_quoted_in_full(tmp_path):
 def test_numbers_have_plain_digits(number, tmp_path):
     assert "cost is" in refusal(load_tolerance_table, table(tmp_path, row=LINE[:-1] + number))
     assert "each is" in refusal(load_tolerance_table, table(tmp_path, header="each", cell=number))
-    readings = written(tmp_path, "r.csv", f"angle [deg],transmission error [arcsec]\n{number},1\n2,2\n3,4\n")
+    readings = written(tmp_path / "r.csv", f"angle [deg],transmission error [arcsec]\n{number},1\n2,2\n3,4\n")
     assert "row 2" in refusal(lambda path: load_readings(path, "angle", "transmission error"), readings)
-    assert "row 2" in refusal(load_units, written(tmp_path, "u.csv", f"unit,disc1.tilt.x [µrad]\nu,{number}\n"))
+    assert "row 2" in refusal(load_units, written(tmp_path / "u.csv", f"unit,disc1.tilt.x [µrad]\nu,{number}\n"))
 
 
 @pytest.mark.parametrize(
@@ -199,7 +194,7 @@ def test_numbers_have_plain_digits(number, tmp_path):
 )
 def test_a_spectrum_has_believable_orders_and_amplitudes(spectrum, tmp_path):
     path = written(
-        tmp_path, "t.csv", f"id,feature,plus,minus,unit,min,max,cost,spectrum\na,pitch,10,0,µm,1,20,1,{spectrum}\n"
+        tmp_path / "t.csv", f"id,feature,plus,minus,unit,min,max,cost,spectrum\na,pitch,10,0,µm,1,20,1,{spectrum}\n"
     )
     assert "spectrum" in refusal(load_tolerance_table, path)
 
@@ -220,7 +215,7 @@ def test_batches_and_prices_are_counted(tmp_path):
     path = table(tmp_path, header="distribution,batches", cell="mixture," + " ".join(["1:0:1"] * 21))
     assert "20 batches or less" in refusal(load_tolerance_table, path)
     prices = "".join(f"g,{1 + at},µm,{9 + at}\n" for at in range(201))
-    path = written(tmp_path, "s.csv", f"process,tolerance,unit,cost\n{prices}")
+    path = written(tmp_path / "s.csv", f"process,tolerance,unit,cost\n{prices}")
     assert "number of prices of process g is 201; allowed is 200 or less" in refusal(load_shop_points, path)
     path.write_text("process,tolerance,unit,cost\ng,1e-12,µm,2\ng,2,µm,1\n")
     assert "tolerance is 1e-12" in refusal(load_shop_points, path)
@@ -240,12 +235,12 @@ def test_batches_and_prices_are_counted(tmp_path):
     ],
 )
 def test_a_unit_that_no_column_has_is_refused(read, text, words, tmp_path):
-    assert words in refusal(read, written(tmp_path, "t.csv", text))
+    assert words in refusal(read, written(tmp_path / "t.csv", text))
 
 
 def test_a_stiffness_is_known_better_than_by_twice_its_value(tmp_path):
     text = 'source = "s"\n[stiffness.carrier_bearing]\nvalue = 1e8\nstandard_uncertainty = 1e12\n'
-    path = written(tmp_path, "k.stiffness.toml", text)
+    path = written(tmp_path / "k.stiffness.toml", text)
     assert "allowed is twice the value" in refusal(load_identified_stiffness, path)
 
 
@@ -257,7 +252,7 @@ def faults(read, path):
 
 def test_all_faults_of_a_table_are_said_row_by_row(tmp_path):
     rows = [LINE, "b,x,-0.1,cm,0.02,0.5,y", LINE.replace("a", "c", 1), LINE, "d,0.1,-0.1,mm,0.3,0.5,3"]
-    said = faults(load_tolerance_table, written(tmp_path, "t.csv", "\n".join((HEADER, *rows, ""))))
+    said = faults(load_tolerance_table, written(tmp_path / "t.csv", "\n".join((HEADER, *rows, ""))))
     assert [sentence.removeprefix(str(tmp_path / "t.csv")) for sentence in said] == [
         ", row 3 (b): plus is 'x'; allowed is a number with a decimal point.",
         ", row 3 (b): cost is 'y'; allowed is a number with a decimal point.",
@@ -268,7 +263,7 @@ def test_all_faults_of_a_table_are_said_row_by_row(tmp_path):
 
 
 def test_twenty_faults_are_said_and_the_others_counted(tmp_path):
-    said = faults(load_tolerance_table, written(tmp_path, "t.csv", f"{HEADER}\n" + "a,x,0,mm,1,2,3\n" * 50))
+    said = faults(load_tolerance_table, written(tmp_path / "t.csv", f"{HEADER}\n" + "a,x,0,mm,1,2,3\n" * 50))
     assert said[:2] == [
         f"{tmp_path / 't.csv'}, row {row} (a): plus is 'x'; allowed is a number with a decimal point." for row in (2, 3)
     ]
@@ -277,16 +272,16 @@ def test_twenty_faults_are_said_and_the_others_counted(tmp_path):
 
 
 def test_all_faults_of_other_files_are_said(tmp_path):
-    toml = written(tmp_path, "u.unit.toml", 'name = 1\nsorce = "s"\n[lengths]\na = 1e9\nb = "x"\n')
+    toml = written(tmp_path / "u.unit.toml", 'name = 1\nsorce = "s"\n[lengths]\na = 1e9\nb = "x"\n')
     said = faults(load_unit, toml)
     assert len(said) == 4
     assert "field 'sorce' is not known; the nearest known is source" in said[0]
     assert not any("source is missing" in sentence for sentence in said)
-    readings = written(tmp_path, "r.csv", "angle [deg],transmission error [arcsec]\nx,1\n2,2\ny,4\n")
+    readings = written(tmp_path / "r.csv", "angle [deg],transmission error [arcsec]\nx,1\n2,2\ny,4\n")
     assert len(faults(lambda path: load_readings(path, "angle", "transmission error"), readings)) == 2
-    units = written(tmp_path, "u.csv", "unit,disc1.tilt.x [µrad],disc1.tilt.y [µrad]\nu,x,y\nv,1,z\n")
+    units = written(tmp_path / "u.csv", "unit,disc1.tilt.x [µrad],disc1.tilt.y [µrad]\nu,x,y\nv,1,z\n")
     assert len(faults(load_units, units)) == 3
-    prices = written(tmp_path, "s.csv", "process,tolerance,unit,cost\ng,0,µm,1\ng,1,cm,1\ng,2,µm,1\n")
+    prices = written(tmp_path / "s.csv", "process,tolerance,unit,cost\ng,0,µm,1\ng,1,cm,1\ng,2,µm,1\n")
     assert len(faults(load_shop_points, prices)) == 2
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
+from tests.builders import page_of
 from tolalloc.reports.document import Document, Section, joined
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.writer import write_document
@@ -46,13 +47,13 @@ def test_a_page_of_several_questions_has_a_heading_each_and_a_list(tmp_path):
     write_document(
         joined("Both", "", [("ranking", report("Ranking", 1.0)), ("allocation", report("Allocation", 2.0))]), tmp_path
     )
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    page = page_of(tmp_path)
     assert page.count('<h1 class="part">') == 2
     assert page.count('<a href="#section-') == page.count('<section id="section-') == 8
 
 
 def test_a_short_page_of_one_question_has_neither(tmp_path):
     write_document(joined("Ranking", "", [("ranking", report("Ranking", 1.0))]), tmp_path)
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    page = page_of(tmp_path)
     assert '<h1 class="part">' not in page
     assert '<a href="#section-' not in page

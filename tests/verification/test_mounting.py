@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.builders import baseline_errors, seeded_units
+from tests.builders import baseline_errors, kernel_of, seeded_units, written
 from tolalloc.assembly.mounting import best_mounting, random_mounting, units_from
 from tolalloc.assembly.places import (
     PartTurn,
@@ -49,9 +49,7 @@ def errors() -> ErrorModel:
 
 @pytest.fixture(scope="module")
 def kernel(rv20e: EquivalentModel, errors: ErrorModel) -> KernelResponse:
-    still = {name: 0.0 for name in rv20e.columns if name not in errors.columns}
-    fixed = still | rv20e.reducer.modification.deviations
-    return KernelResponse(model=rv20e, torque=TORQUE, columns=errors.columns, fixed=fixed)
+    return kernel_of(rv20e, errors, TORQUE)
 
 
 def place(reducer: Reducer, name: str) -> Place:
@@ -364,15 +362,9 @@ ONE_UNIT = (
 )
 
 
-def written(folder: Path, text: str) -> Path:
-    path = folder / "parts.csv"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
 def test_a_parts_file_is_read_in_its_units(tmp_path: Path) -> None:
     reducer = load_reducer("rv20e_liu2020")
-    parts = load_parts(written(tmp_path, HEADER + ONE_UNIT), reducer)
+    parts = load_parts(written(tmp_path / "parts.csv", HEADER + ONE_UNIT), reducer)
     assert [(part.name, part.kind) for part in parts] == [
         ("C 1", "carrier"),
         ("K 1", "crank"),
@@ -407,7 +399,7 @@ def test_a_wrong_parts_file_is_refused_in_one_sentence(
     tmp_path: Path, text: str, error: type[TolallocError], sentence: str
 ) -> None:
     with pytest.raises(error, match=sentence) as raised:
-        load_parts(written(tmp_path, text), load_reducer("rv20e_liu2020"))
+        load_parts(written(tmp_path / "parts.csv", text), load_reducer("rv20e_liu2020"))
     assert str(raised.value).count("\n") == 0
     assert str(tmp_path) in str(raised.value)
 
@@ -417,9 +409,13 @@ def test_parts_of_three_cranks_name_the_place_that_a_disc_is_made_for(tmp_path: 
     text = HEADER + ONE_UNIT + "K 3, crank, mesh.deviation, 1, µm\n"
     sentence = "row 5: kind is 'disc'; allowed is disc1 or disc2: made for one place of this reducer, a disc fits no"
     with pytest.raises(InputError, match=sentence):
-        load_parts(written(tmp_path, text), reducer)
+        load_parts(written(tmp_path / "parts.csv", text), reducer)
     text = text.replace("D 1, disc", "D 1, disc1").replace("D 2, disc", "D 2, disc2")
-    assert [part.kind for part in load_parts(written(tmp_path, text), reducer)][-3:] == ["disc1", "disc2", "crank"]
+    assert [part.kind for part in load_parts(written(tmp_path / "parts.csv", text), reducer)][-3:] == [
+        "disc1",
+        "disc2",
+        "crank",
+    ]
 
 
 def test_the_example_file_holds_two_units() -> None:

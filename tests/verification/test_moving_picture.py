@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.builders import prepared
+from tests.builders import page_of, prepared
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.reading.units import MILLIMETRE
 from tolalloc.reducers.equivalent.springs import Positions
@@ -62,7 +62,7 @@ def test_a_report_holds_the_module_and_stays_small(picture, tmp_path):
         title="A reducer", subtitle="", answer=(), warnings=(), sections=(section,), assumptions=(), summary={}
     )
     write_document(document, tmp_path / "report")
-    page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    page = page_of(tmp_path / "report")
     assert len(page.encode()) < LARGEST
     assert page.count("<script") == page.count("</script>") == 3  # the record, the charts' module, the mechanism's
     assert "new Mechanism(" in page

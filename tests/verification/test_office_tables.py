@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 import tolalloc as ta
+from tests.builders import written
 from tolalloc.drawings.sources import meant
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_text
 from tolalloc.exceptions import InputError, UnknownNameError
@@ -23,14 +24,8 @@ ROWS = (
 PLAIN = "\n".join((HEADS, *ROWS, ""))
 
 
-def written(folder, text, encoding="utf-8", name="zones.csv"):
-    path = folder / name
-    path.write_bytes(text.encode(encoding))
-    return path
-
-
 def plain(folder):
-    return load_tolerance_table(written(folder, PLAIN, name="plain.csv"))
+    return load_tolerance_table(written(folder / "plain.csv", PLAIN))
 
 
 @pytest.mark.parametrize(
@@ -50,12 +45,12 @@ def plain(folder):
     ids=["capitals", "true minus", "true minus and commas", "words", "other words", "German answers", "titles"],
 )
 def test_an_office_s_spelling_gives_the_same_sources(tmp_path, text):
-    assert load_tolerance_table(written(tmp_path, text)) == plain(tmp_path)
+    assert load_tolerance_table(written(tmp_path / "zones.csv", text)) == plain(tmp_path)
 
 
 @pytest.mark.parametrize(("encoding", "said"), [("cp1252", "Windows-1252"), ("utf-16", "UTF-16"), ("utf-8-sig", "")])
 def test_a_table_is_read_as_a_spreadsheet_saves_it_and_that_is_said(tmp_path, encoding, said):
-    path = written(tmp_path, PLAIN.replace("mm;", "µm;").replace("lid;lid", "lid;Gehäuse"), encoding)
+    path = written(tmp_path / "zones.csv", PLAIN.replace("mm;", "µm;").replace("lid;lid", "lid;Gehäuse"), encoding)
     drawing = ta.drawing(path)
     assert drawing.sources[2].part == "Gehäuse" and drawing.sources[0].zone == pytest.approx(0.03e-6)
     assert [note for note in drawing.notes if "read as" in note] == (
@@ -68,7 +63,7 @@ def test_a_table_is_read_as_a_spreadsheet_saves_it_and_that_is_said(tmp_path, en
 def test_one_cell_is_both_deviations(tmp_path, sign, with_minus):
     heads = HEADS if with_minus else HEADS.replace("minus [unit];", "")
     row = f"lid;lid;4;{sign}0.05;{';' if with_minus else ''}mm;normal;no;;0.01;0.2;0.5"
-    (lid,) = load_tolerance_table(written(tmp_path, f"{heads}\n{row}\n"))
+    (lid,) = load_tolerance_table(written(tmp_path / "zones.csv", f"{heads}\n{row}\n"))
     assert lid == plain(tmp_path)[2]
 
 
@@ -78,7 +73,7 @@ def test_one_cell_is_both_deviations(tmp_path, sign, with_minus):
 )
 def test_a_fit_is_both_deviations_of_a_size(tmp_path, fit, size, unit, plus, minus):
     row = f"pin;pin;{size};{fit};{unit};normal;no;;{'0.002;0.1' if unit == 'mm' else '2;100'};1"
-    (pin,) = load_tolerance_table(written(tmp_path, f"{HEADS.replace('minus [unit];', '')}\n{row}\n"))
+    (pin,) = load_tolerance_table(written(tmp_path / "zones.csv", f"{HEADS.replace('minus [unit];', '')}\n{row}\n"))
     assert pin.zone == pytest.approx((plus - minus) * 1e-6)
     assert pin.middle == pytest.approx((plus + minus) / 2 * 1e-6, abs=1e-12)
 
@@ -95,13 +90,13 @@ def test_a_fit_is_both_deviations_of_a_size(tmp_path, fit, size, unit, plus, min
 )
 def test_a_fit_without_a_size_is_refused(tmp_path, row, words):
     with pytest.raises(InputError, match=words):
-        load_tolerance_table(written(tmp_path, f"{HEADS}\n{row}\n"))
+        load_tolerance_table(written(tmp_path / "zones.csv", f"{HEADS}\n{row}\n"))
 
 
 def own_columns(folder):
     heads = HEADS.replace("id;", "id;Zeichn.-Nr.;") + ";Bemerkung;Prüfmittel [Nr]"
     rows = [row.replace(";", f";Z-{at};", 1) + f";Zeile {at};{at}7" for at, row in enumerate(ROWS)]
-    return written(folder, "\n".join((heads, *rows, "")))
+    return written(folder / "zones.csv", "\n".join((heads, *rows, "")))
 
 
 def test_own_columns_are_kept_said_and_written_again(tmp_path):
@@ -114,7 +109,7 @@ def test_own_columns_are_kept_said_and_written_again(tmp_path):
     )
     (note,) = [own for own in drawing.notes if "kept" in own]
     assert note == "zones.csv: kept as they are, and written again: Zeichn.-Nr., Bemerkung, Prüfmittel"
-    again = written(tmp_path, table_text(drawing.sources), name="again.csv")
+    again = written(tmp_path / "again.csv", table_text(drawing.sources))
     assert [own.own_cells for own in load_tolerance_table(again)] == [own.own_cells for own in drawing.sources]
     assert list(pd.read_csv(again)["Bemerkung"]) == ["Zeile 0", "Zeile 1", "Zeile 2"]
 
@@ -140,10 +135,10 @@ def test_a_map_of_heads_reads_an_office_s_table_as_it_is(tmp_path):
         .replace("minus [", "unteres Abmaß [")
     )
     columns = {"Merkmal": "id", "Teil": "part", "oberes Abmaß": "plus", "unteres Abmaß": "minus"}
-    drawing = ta.drawing(written(tmp_path, text), columns=columns)
+    drawing = ta.drawing(written(tmp_path / "zones.csv", text), columns=columns)
     assert drawing.sources == plain(tmp_path)
     with pytest.raises(UnknownNameError, match="'pluss' is not known; the nearest known"):
-        ta.drawing(written(tmp_path, text), columns={**columns, "oberes Abmaß": "pluss"})
+        ta.drawing(written(tmp_path / "zones.csv", text), columns={**columns, "oberes Abmaß": "pluss"})
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".xlsx"])
@@ -179,7 +174,7 @@ UNIT_HEADS = "id;nominal;plus;minus;unit;min;max;cost"
     ],
 )
 def test_inches_and_per_cent_are_read_and_written_as_they_stand(tmp_path, row, zone, middle, nominal):
-    drawing = ta.drawing(written(tmp_path, f"{UNIT_HEADS}\n{row}\n"))
+    drawing = ta.drawing(written(tmp_path / "zones.csv", f"{UNIT_HEADS}\n{row}\n"))
     (pin,) = drawing.sources
     assert [1e3 * pin.zone, 1e3 * pin.middle, 1e3 * pin.nominal] == pytest.approx([zone, middle, nominal], abs=1e-9)
     again = drawing.to_csv(tmp_path / "again.csv")
@@ -217,7 +212,7 @@ def test_inches_and_per_cent_are_read_and_written_as_they_stand(tmp_path, row, z
 )
 def test_units_that_contradict_each_other_are_refused(tmp_path, heads, row, words):
     with pytest.raises(InputError, match=words):
-        ta.drawing(written(tmp_path, f"{UNIT_HEADS.replace('nominal;', heads)}\n{row}\n"))
+        ta.drawing(written(tmp_path / "zones.csv", f"{UNIT_HEADS.replace('nominal;', heads)}\n{row}\n"))
 
 
 @pytest.mark.parametrize(
@@ -238,18 +233,18 @@ def test_units_that_contradict_each_other_are_refused(tmp_path, heads, row, word
     ],
 )
 def test_a_sentence_says_a_zone_in_the_unit_of_its_row(tmp_path, row, words):
-    (pin,) = load_tolerance_table(written(tmp_path, f"{UNIT_HEADS}\n{row}\n"))
+    (pin,) = load_tolerance_table(written(tmp_path / "zones.csv", f"{UNIT_HEADS}\n{row}\n"))
     assert pin.mapping.startswith(words)
 
 
 def test_a_wide_zone_without_a_nominal_size_is_doubted(tmp_path):
-    drawing = ta.drawing(written(tmp_path, f"{UNIT_HEADS}\npin;;3;-3;mm;1;9;1\n"))
+    drawing = ta.drawing(written(tmp_path / "zones.csv", f"{UNIT_HEADS}\npin;;3;-3;mm;1;9;1\n"))
     assert any("the zone of 6 mm is wide, and no nominal size" in note for note in drawing.notes)
 
 
 def test_an_own_function_gets_inches_where_its_rows_are_in_inches(tmp_path):
     rows = ("bore;1.253;0.001;-0.001;in;0.0002;0.005;1", "shaft;31.75;0.02;-0.02;mm;0.005;0.1;1", "n;4;5;-5;%;1;15;1")
-    drawing = ta.drawing(written(tmp_path, "\n".join((UNIT_HEADS, *rows, ""))))
+    drawing = ta.drawing(written(tmp_path / "zones.csv", "\n".join((UNIT_HEADS, *rows, ""))))
     seen = ta.model(lambda *inputs: inputs, ("bore", "shaft", "n"), ("a [in]", "b [mm]", "c [mm]"))
     bound = seen.bound(drawing.errors, "test")
     deviations = np.array([[25.4e-6, -0.01e-3, 0.05 * 4e-3]])
@@ -261,7 +256,7 @@ def test_an_own_function_gets_inches_where_its_rows_are_in_inches(tmp_path):
 
 def mm_of(folder):
     rows = ("bore;31.8262;0.0254;-0.0254;mm;0.01;0.1;1", "shaft;31.75;0.02;-0.02;mm;0.005;0.1;1", "n;4;5;-5;%;1;15;1")
-    return written(folder, "\n".join((UNIT_HEADS, *rows, "")), name="mm.csv")
+    return written(folder / "mm.csv", "\n".join((UNIT_HEADS, *rows, "")))
 
 
 TOML = """[columns]
@@ -293,7 +288,7 @@ def frame_of(text, path):
 def test_a_file_beside_the_table_says_what_its_heads_mean(tmp_path, name):
     path = tmp_path / name
     path.with_suffix(".toml").write_text(TOML, encoding="utf-8")
-    path = frame_of(office_text(), path) if name.endswith("xlsx") else written(tmp_path, office_text(), name=name)
+    path = frame_of(office_text(), path) if name.endswith("xlsx") else written(tmp_path / name, office_text())
     drawing = ta.drawing(path)
     assert [own.drawing for own in drawing.sources] == ["1", "2", "3"]
     assert [(own.name, own.part, own.zone) for own in drawing.sources] == [
@@ -309,7 +304,7 @@ def test_a_file_beside_the_table_says_what_its_heads_mean(tmp_path, name):
 
 def test_what_is_given_in_python_comes_before_the_file(tmp_path):
     (tmp_path / "zones.toml").write_text(TOML.replace('"drawing"', '"label"'), encoding="utf-8")
-    path = written(tmp_path, office_text())
+    path = written(tmp_path / "zones.csv", office_text())
     assert ta.drawing(path).sources[0].label == "1"
     assert ta.drawing(path, columns={"Zeichn.-Nr.": "note"}).sources[0].note == "1"
 
@@ -329,7 +324,7 @@ def test_what_is_given_in_python_comes_before_the_file(tmp_path):
 )
 def test_a_file_of_heads_that_is_wrong_is_refused_in_one_sentence(tmp_path, text, words):
     (tmp_path / "zones.toml").write_text(text, encoding="utf-8")
-    path = written(tmp_path, office_text())
+    path = written(tmp_path / "zones.csv", office_text())
     if words is None:
         assert len(ta.drawing(path).sources) == 3
         return
@@ -341,12 +336,12 @@ def test_a_file_of_heads_that_is_wrong_is_refused_in_one_sentence(tmp_path, text
 def test_two_heads_for_one_column_are_refused(tmp_path):
     (tmp_path / "zones.toml").write_text(TOML.replace('"drawing"', '"part"'), encoding="utf-8")
     with pytest.raises(InputError, match="the column 'part' is there twice"):
-        ta.drawing(written(tmp_path, office_text()))
+        ta.drawing(written(tmp_path / "zones.csv", office_text()))
 
 
 def test_a_file_of_another_kind_beside_the_table_says_nothing_of_its_heads(tmp_path):
     (tmp_path / "zones.toml").write_text('#:schema x\n[reducer]\nname = "mine"\n', encoding="utf-8")
-    assert ta.drawing(written(tmp_path, PLAIN)).sources == plain(tmp_path)
+    assert ta.drawing(written(tmp_path / "zones.csv", PLAIN)).sources == plain(tmp_path)
 
 
 @pytest.mark.slow
@@ -355,7 +350,11 @@ def test_inches_heads_and_own_columns_come_back_from_an_allocation(tmp_path):
     (tmp_path / "zones.toml").write_text(TOML, encoding="utf-8")
     study = ta.Study(
         ta.model(lambda shaft, hub, lid: hub - shaft + 0.1 * lid, ("shaft", "hub", "lid"), ("gap [in]",)),
-        ta.drawing(written(tmp_path, text.replace("Zeichn.-Nr.", "Zeichn.-Nr.;Bemerkung").replace(";1\n", ";1;neu\n"))),
+        ta.drawing(
+            written(
+                tmp_path / "zones.csv", text.replace("Zeichn.-Nr.", "Zeichn.-Nr.;Bemerkung").replace(";1\n", ";1;neu\n")
+            )
+        ),
         limits={"gap [in]": ta.Limit(lower=0.4)},
         questions=[ta.Allocation(front=False, what_if=False)],
         name="inches",
@@ -385,7 +384,7 @@ def test_beta_trapezoid_and_rayleigh_are_ranked_and_allocated(tmp_path):
     )
     study = ta.Study(
         ta.model(lambda a, b, c: a - b - c, ("a", "b", "c"), ("gap [mm]",)),
-        ta.drawing(written(tmp_path, "\n".join((head, *rows, "")))),
+        ta.drawing(written(tmp_path / "zones.csv", "\n".join((head, *rows, "")))),
         limits={"gap [mm]": ta.Limit(lower=0.05, upper=0.12)},
         name="three kinds",
     )

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 import tolalloc as ta
-from tests.builders import ZONE_OF_A_LENGTH, study_of_lengths
+from tests.builders import ZONE_OF_A_LENGTH, page_of, study_of_lengths
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_text
 
 ROWS = (
@@ -45,7 +45,7 @@ def test_they_are_in_the_written_drawing_and_read_back(answers, tmp_path):
     allocation.save(tmp_path / "found")
     written = load_tolerance_table(tmp_path / "found" / "allocation.csv")
     assert [(source.drawing, source.label) for source in written] == [("4711-B", "Hülse Ø55"), ("4711-B", ""), ("", "")]
-    page = (tmp_path / "found" / "report.html").read_text(encoding="utf-8")
+    page = page_of(tmp_path / "found")
     assert page.count("Hülse Ø55") >= 2
     book = pd.read_excel(tmp_path / "found" / "drawing.xlsx", sheet_name=None, header=None, dtype=str)
     assert any(np.any(sheet.to_numpy() == "Hülse Ø55") for sheet in book.values())

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.builders import page_of
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.figure import Figure, HeatMap, Series, chart
 from tolalloc.reports.plots import drawn
@@ -47,7 +48,7 @@ def test_a_long_table_is_folded_unless_it_is_the_drawing(tmp_path, unfolded):
         seed=1,
     )
     write_document(document, tmp_path / "report")
-    page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    page = page_of(tmp_path / "report")
     assert ("<details><summary>drawing, 40 rows" in page) is not unfolded
     assert "source 39" in page
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tests.builders import seeded_units, with_ovality
+from tests.builders import seeded_units, with_ovality, written
 from tolalloc.cli.start import new
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import limited_measure
@@ -20,9 +20,7 @@ HEADER += "systematic [order:amplitude@°]"
 
 
 def table(folder: Path, systematic: str, row: str = "ring.runout,runout,8,0,µm,2,20,1,1:7.2 2:2.7") -> Path:
-    path = folder / "zones.csv"
-    path.write_text(f"{HEADER}\n{row},{systematic}\n", encoding="utf-8")
-    return path
+    return written(folder / "zones.csv", f"{HEADER}\n{row},{systematic}\n")
 
 
 def test_mean_of_the_columns_is_the_systematic_wave(tmp_path):

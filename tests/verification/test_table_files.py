@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 from openpyxl import Workbook, load_workbook
 
+from tests.builders import written
 from tolalloc.drawings.drawing import load_drawing
 from tolalloc.drawings.fields import COLUMNS, HEADERS
 from tolalloc.drawings.table_file import read_table_file, read_text_table
@@ -25,11 +26,6 @@ USUAL = {"plus": 0.1, "minus": -0.1, "unit": "mm", "min": 0.02, "max": 0.5, "cos
 FRAME = pd.DataFrame([USUAL | row for row in ROWS])
 HEADER = "id,plus,minus,unit,min,max,cost"
 ROW = "a,0.1,-0.1,mm,0.02,0.5,3"
-
-
-def written(folder, text, encoding="utf-8"):
-    (folder / "t.csv").write_text(text, encoding=encoding)
-    return folder / "t.csv"
 
 
 def refused(path, sentence, read=load_tolerance_table):
@@ -102,8 +98,10 @@ def test_titles_above_the_header_are_left_out(sources, tmp_path):
     assert load_tolerance_table(shop_sheet(tmp_path / "t.xlsx")) == sources
     for separator, title in ((";", "Reducer 7, rev. B;;"), (",", "Reducer 7; rev. B,,"), ("\t", "Reducer 7, rev. B")):
         text = FRAME.to_csv(index=False, sep=separator)
-        assert load_tolerance_table(written(tmp_path, f"{title}\n\n{text}")) == sources
-    refused(written(tmp_path, f"Reducer 7\n\n{HEADER}\na,x,-0.1,mm,0.02,0.5,3\n"), r"row 4 \(a\): plus is 'x'")
+        assert load_tolerance_table(written(tmp_path / "t.csv", f"{title}\n\n{text}")) == sources
+    refused(
+        written(tmp_path / "t.csv", f"Reducer 7\n\n{HEADER}\na,x,-0.1,mm,0.02,0.5,3\n"), r"row 4 \(a\): plus is 'x'"
+    )
 
 
 def test_a_workbook_may_hold_numbers_as_text_with_decimal_commas(sources, tmp_path):
@@ -148,17 +146,17 @@ def test_comments_blank_rows_and_empty_cells_behind_the_last_column_are_left_out
     FRAME.to_csv(tmp_path / "t.csv", index=False, sep=";", quoting=csv.QUOTE_NONNUMERIC)
     header, *rows = (tmp_path / "t.csv").read_text(encoding="utf-8").split("\n")
     text = "\n".join(["# it isn't \"closed", f"{header};;", *rows[:2], "", ";;;", "#;", *rows[2:]])
-    assert load_tolerance_table(written(tmp_path, text)) == sources
+    assert load_tolerance_table(written(tmp_path / "t.csv", text)) == sources
     # Excel leaves out the separators behind the last cell of some rows.
     plain, short = (
-        load_tolerance_table(written(tmp_path, f"{HEADER},grade,note\n{row}\n")) for row in (f"{ROW},,", ROW)
+        load_tolerance_table(written(tmp_path / "t.csv", f"{HEADER},grade,note\n{row}\n")) for row in (f"{ROW},,", ROW)
     )
     assert plain == short
 
 
 def test_all_tables_are_read_alike(tmp_path):
     for separator in ";\t":
-        path = written(tmp_path, "# c\nname;x [mm];\n\na;1,5;\nb;-2,5e-3\nc;,5;\n".replace(";", separator))
+        path = written(tmp_path / "t.csv", "# c\nname;x [mm];\n\na;1,5;\nb;-2,5e-3\nc;,5;\n".replace(";", separator))
         assert [cells for _, cells in read_table_file(path)][1:] == [("a", "1.5"), ("b", "-2.5e-3"), ("c", ".5")]
         table = read_text_table(path)
         assert table.headers == ("name", "x [mm]")
@@ -197,15 +195,19 @@ def test_only_files_that_end_within_a_row_are_asked_about_truncation(tmp_path):
     cases = (f"{HEADER}\n{ROW},9\n", f"{HEADER}\na,0.1\n", f'{HEADER}\n"{ROW}\n', "", f"{HEADER},\n{ROW},x\n")
     for text in cases:
         with pytest.raises(InputError) as caught:
-            load_tolerance_table(written(tmp_path, text))
+            load_tolerance_table(written(tmp_path / "t.csv", text))
         assert "truncated" not in str(caught.value)
-    refused(written(tmp_path, f"{HEADER}\n{ROW}"[:-2]), r"row 2: 6 of 7 cells are there; is the file truncated\?")
+    refused(
+        written(tmp_path / "t.csv", f"{HEADER}\n{ROW}"[:-2]), r"row 2: 6 of 7 cells are there; is the file truncated\?"
+    )
 
 
 def test_an_empty_header_is_refused_by_its_number(tmp_path):
     text = f"{HEADER}\n{ROW}\n"
-    refused(written(tmp_path, text.replace(",min,", ",,")), "the header of column 5 is empty; allowed is the name")
-    refused(written(tmp_path, text.replace("id,", " ,")), "the header of column 1 is empty")
+    refused(
+        written(tmp_path / "t.csv", text.replace(",min,", ",,")), "the header of column 5 is empty; allowed is the name"
+    )
+    refused(written(tmp_path / "t.csv", text.replace("id,", " ,")), "the header of column 1 is empty")
     FRAME.assign(other="x").rename(columns={"other": ""}).to_excel(tmp_path / "t.xlsx", index=False)
     number = len(FRAME.columns) + 1
     refused(tmp_path / "t.xlsx", f"row 2: column {number} has 'x' under an empty header; allowed is a name")
@@ -261,10 +263,10 @@ def test_the_header_of_a_zone_states_the_unit_of_all_rows_or_is_refused(column, 
 def test_the_unit_of_a_row_is_one_of_those_known(tmp_path):
     text = f"{HEADER}\n{ROW}\n"
     refused(
-        written(tmp_path, text.replace("mm", "cm")),
+        written(tmp_path / "t.csv", text.replace("mm", "cm")),
         r"row 2 \(a\): unit is 'cm'; allowed is µm, um, mm, in, inch or %\.$",
     )
     micro = text.replace("mm", "um"), text.replace("mm", "\u03bcm")
-    one, other = (load_tolerance_table(written(tmp_path, text)) for text in micro)
+    one, other = (load_tolerance_table(written(tmp_path / "t.csv", text)) for text in micro)
     assert one == other
     assert one[0].zone == pytest.approx(0.2e-6)

@@ -7,7 +7,7 @@ import json
 import pytest
 
 import tolalloc as ta
-from tests.builders import says
+from tests.builders import page_of, says
 from tolalloc.allocation.drawing_question import DrawingQuestion
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.study.questions import Allocation
@@ -77,7 +77,7 @@ def test_what_was_answered_before_a_fault_is_kept(tmp_path, monkeypatch, kind):
     monkeypatch.setattr(Allocation, "answer", fails)
     with pytest.raises(kind, match=r"gap: no drawing\. What was answered before, ranking, stands in .*run\."):
         study().run(tmp_path / "run")
-    page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    page = page_of(tmp_path / "run")
     assert "gap: no drawing." in page
     assert json.loads((tmp_path / "run" / "manifest.json").read_text(encoding="utf-8"))["questions"] == ["ranking"]
 
