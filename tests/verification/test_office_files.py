@@ -348,7 +348,6 @@ FILES = [
         "comment row",
         book(cells(A5="# alt", B5=1, C5=1, D5=0, E5="mm", F5=1, G5=2, H5=1)),
         suffix=".xlsx",
-        refused="begin with #",
     ),
     OfficeFile(
         "sum as a formula",

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from zipfile import ZipFile
+
 import numpy as np
 import pandas as pd
 import pytest
+from openpyxl import Workbook
 
 import tolalloc as ta
 from tests.builders import written
@@ -318,16 +321,13 @@ def test_what_is_given_in_python_comes_before_the_file(tmp_path):
         (TOML.replace('"plus"', "5"), "zones.toml: columns.oberes Abmaß is 5"),
         (TOML + '"broken', "zones.toml: not complete TOML"),
         (TOML + 'Merkmal = "part"\n', "zones.toml: not complete TOML"),
-        (TOML.replace('"Zeichn.-Nr." = "drawing"', 'Kommentar = "plus"\nMerkmal2 = "id"'), None),
+        (TOML + 'Merkmale = "id"\n', "zones.csv, columns: head 'Merkmale' is not known; the nearest known is Merkmal"),
         (TOML + "[rows]\n", "zones.toml: .*'rows' is not known"),
     ],
 )
 def test_a_file_of_heads_that_is_wrong_is_refused_in_one_sentence(tmp_path, text, words):
     (tmp_path / "zones.toml").write_text(text, encoding="utf-8")
     path = written(tmp_path / "zones.csv", office_text())
-    if words is None:
-        assert len(ta.drawing(path).sources) == 3
-        return
     with pytest.raises((InputError, UnknownNameError), match=words) as caught:
         ta.drawing(path)
     assert "\n" not in str(caught.value)
@@ -399,3 +399,84 @@ def test_beta_trapezoid_and_rayleigh_are_ranked_and_allocated(tmp_path):
     assert ranking[["a", "b", "c"]].to_numpy() == pytest.approx(variances / variances.sum(), abs=2e-3)
     found = study.allocate(effort="quick").result
     assert found.met and found.bound <= found.cost < 3.0
+
+
+GERMAN = ("Merkmal", "Teil", "Art", "Nennmaß [mm]", "oberes Abmaß", "unteres Abmaß", "Einheit", "kleinste Toleranz",
+    "größte Toleranz", "Kosten [EUR]", "Prüfmittel", "Spektrum")  # fmt: skip
+FRENCH = ("caractéristique", "pièce", "genre", "cote nominale [mm]", "écart supérieur", "écart inférieur", "unité",
+    "tolérance minimale", "tolérance maximale", "coût [EUR]", "moyen", "spectre")  # fmt: skip
+CHINESE = (
+    "特性",
+    "零件",
+    "类型",
+    "公称尺寸 [mm]",
+    "上偏差",
+    "下偏差",
+    "单位",
+    "最小公差",
+    "最大公差",
+    "成本 [EUR]",
+    "量具",
+    "频谱",
+)
+ENGLISH = ("Characteristic", "Component", "Type", "Nominal size [mm]", "Upper deviation", "Lower deviation", "Unit",
+    "Smallest tolerance", "Largest tolerance", "Price [EUR]", "Gauge", "Spectrum")  # fmt: skip
+FEATURES = {
+    GERMAN: ("Maß", "Position", "Teilung", "Rundlauf"),
+    FRENCH: ("cote", "localisation", "pas", "battement"),
+    CHINESE: ("尺寸", "位置", "齿距", "圆跳动"),
+    ENGLISH: ("Dimension", "Location", "Pitch", "Run-out"),
+}
+
+
+@pytest.mark.parametrize("heads", FEATURES, ids=["German", "French", "Chinese", "English"])
+@pytest.mark.parametrize("is_workbook", [False, True], ids=["CSV", "XLSX"])
+def test_heads_that_nobody_mapped_are_listed_and_what_is_said_of_them_can_be_pasted(heads, is_workbook, tmp_path):
+    rows = [
+        ("Tolerances of the RV-80X", *[""] * 11),
+        heads,
+        *(
+            (f"place {at}", "part", word, 8, 0.01, 0, "mm", 0.002, 0.02, 5, "", "1:9.2" if at > 1 else "")
+            for at, word in enumerate(FEATURES[heads])
+        ),
+        ("# sum", *[""] * 8, 20, "", ""),
+    ]
+    path = tmp_path / ("zones.xlsx" if is_workbook else "zones.csv")
+    if is_workbook:
+        book = Workbook()
+        for row in rows:
+            book.active.append(row)
+        book.active.merge_cells("A1:D1")
+        book.save(path)
+    else:
+        path.write_text("".join(",".join(map(str, row)) + "\n" for row in rows), encoding="utf-8")
+    with pytest.raises(InputError, match="no row has a head 'id'; row 2 has") as caught:
+        ta.drawing(path)
+    said = str(caught.value)
+    assert "\n" not in said
+    assert all(repr(head) in said for head in heads)
+    (tmp_path / "zones.toml").write_text(said.partition("beside it: ")[2], encoding="utf-8")
+    sources = ta.drawing(path).sources
+    assert [source.feature for source in sources] == ["size", "position", "pitch", "runout"]
+    assert [source.zone for source in sources] == pytest.approx([1e-5] * 4)
+
+
+def test_a_head_may_be_said_with_its_unit(tmp_path):
+    (tmp_path / "zones.toml").write_text(TOML.replace('"oberes Abmaß"', '"oberes Abmaß [µm]"'), encoding="utf-8")
+    assert len(ta.drawing(written(tmp_path / "zones.csv", office_text())).sources) == 3
+
+
+def test_a_fit_stands_in_a_row_whose_feature_is_called_as_an_office_does(tmp_path):
+    row = "pin.diameter,Maß,8,h5,,µm,1,9,10"
+    text = f"id,feature,nominal [mm],plus,minus,unit,min,max,cost\n{row}\n"
+    (pin,) = ta.drawing(written(tmp_path / "zones.csv", text)).sources
+    assert (pin.middle, pin.zone) == pytest.approx((-3e-6, 6e-6))
+
+
+def test_a_strict_workbook_is_refused_with_what_to_save_it_as(tmp_path):
+    path = tmp_path / "zones.xlsx"
+    with ZipFile(path, "w") as archive:
+        archive.writestr("xl/workbook.xml", '<workbook xmlns="http://purl.oclc.org/ooxml/spreadsheetml/main"/>')
+        archive.writestr("[Content_Types].xml", "<Types/>")
+    with pytest.raises(InputError, match=r"Strict Open XML.*save it"):
+        ta.drawing(path)

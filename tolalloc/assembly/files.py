@@ -15,7 +15,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from tolalloc.assembly.chain import DatumFlowChain, Part
 from tolalloc.assembly.plan import LARGEST_STATE_WEIGHT, AngularRequirements, AssemblyPlan
 from tolalloc.assembly.steps import AssemblyStep, Choice, Efforts, Positive, check_steps, steps_in_order
-from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
+from tolalloc.drawings.heads import split_header
+from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.files import Record, read_toml, shipped_or_path, validated
 from tolalloc.reading.units import ARCSECOND, DEGREE, MILLIMETRE

@@ -23,8 +23,9 @@ from tolalloc.bench.readings import (
 )
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.heads import split_header
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.table_file import read_text_table, split_header
+from tolalloc.drawings.table_file import read_text_table
 from tolalloc.exceptions import Faults, InputError, SolveError
 from tolalloc.reading.units import ARCSECOND, DEGREE
 from tolalloc.reducers.model import ReducerModel

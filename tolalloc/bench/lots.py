@@ -28,10 +28,11 @@ from tolalloc.capability.indices import ControlLimits, control_limits, holm
 from tolalloc.drawings.distributions import Distribution, ndtri
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.fields import UNITS
+from tolalloc.drawings.heads import split_header
 from tolalloc.drawings.measured_parts import LARGEST_DEVIATION
 from tolalloc.drawings.seeds import require_seed
 from tolalloc.drawings.sources import Source, known_as
-from tolalloc.drawings.table_file import TextTable, read_table_file, read_text_table, split_header
+from tolalloc.drawings.table_file import TextTable, read_table_file, read_text_table
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.units import MICROMETRE

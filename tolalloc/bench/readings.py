@@ -12,7 +12,8 @@ from jaxtyping import Float, Int
 from scipy.interpolate import BSpline, make_lsq_spline
 from scipy.linalg import solveh_banded
 
-from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
+from tolalloc.drawings.heads import split_header
+from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table
 from tolalloc.exceptions import Faults, InputError
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MICRORADIAN
 

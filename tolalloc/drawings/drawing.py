@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 from tolalloc.drawings.correlation import Correlation, load_correlations
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.fields import COLUMNS, ToleranceRow
+from tolalloc.drawings.heads import split_header
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.table_file import (
     DATA,
     read_table_file,
     require_columns,
     setting_line,
-    split_header,
     stated_currency,
     stated_settings,
 )

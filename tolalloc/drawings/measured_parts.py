@@ -25,7 +25,8 @@ from tolalloc.drawings.distributions import (
     smoothed_magnitude,
     smoothing_width,
 )
-from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
+from tolalloc.drawings.heads import split_header
+from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.file_content import is_file, read_bytes

@@ -9,10 +9,10 @@ import csv
 import re
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass
 from datetime import date, time, timedelta
 from enum import StrEnum
-from functools import cached_property
 from io import BytesIO, StringIO
 from pathlib import Path
 from types import MappingProxyType
@@ -20,6 +20,7 @@ from typing import Any, Literal, TypeVar, get_args, get_origin
 from unicodedata import normalize
 from zipfile import ZipFile
 
+from tolalloc.drawings.heads import MOST_TITLES, Heads, split_header
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.file_content import read_bytes, read_text, require_believable, require_table
 from tolalloc.reading.files import Record, validated
@@ -77,11 +78,15 @@ def sheet_texts(path: Path, sheet: str, heads: Heads) -> list[tuple[str, ...]]:
         _require_small(path, content)
         # Values do not say which cells were formulas, and formulas do not say their values.
         values, formulas = (_loaded(path, content, data_only, sheet) for data_only in (True, False))
-        texts = _texts(path, values, formulas)
+        texts = [_blank_if_comment(row) for row in _texts(path, values, formulas)]
+        heads.require_in(path, texts)
         _require_single(path, values, 1 + heads.row_in(texts))
     except InputError:
         raise
     except Exception as error:  # whatever the libraries raise on a damaged file: of zlib, XML, types, indices
+        if b"purl.oclc.org/ooxml" in _part(content, "xl/workbook.xml"):
+            allowed = "an Excel workbook (*.xlsx): save it as that one"
+            raise InputError(f"{path}: it is a Strict Open XML workbook; allowed is {allowed}.") from None
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"{path}: not a complete workbook (XLSX); is the file truncated? ({reason}).") from None
     return texts
@@ -121,6 +126,13 @@ def _require_small(path: Path, content: bytes) -> None:
     )
 
 
+def _part(content: bytes, name: str) -> bytes:
+    """Return a part of a workbook, nothing where there is none or it is damaged."""
+    with suppress(Exception), ZipFile(BytesIO(content)) as archive:
+        return archive.read(name)
+    return b""
+
+
 def _loaded(path: Path, content: bytes, data_only: bool, sheet: str) -> Any:
     """Return the named one of the sheets that have cells, the first unless named."""
     from openpyxl import load_workbook
@@ -154,6 +166,11 @@ def _texts(path: Path, values: Any, formulas: Any) -> list[tuple[str, ...]]:
             strict=True,
         )
     ]
+
+
+def _blank_if_comment(row: tuple[str, ...]) -> tuple[str, ...]:
+    """Return a row without anything where its first text begins with #, as a line of a CSV file."""
+    return () if next((cell for cell in row if cell), "").startswith("#") else row
 
 
 def _require_single(path: Path, values: Any, first: int) -> None:
@@ -213,73 +230,11 @@ _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 """Number that is a thousand times as large where the sign separates thousands."""
 
 
-_TEXTS = ("id", "part", "feature", "unit", "distribution", "group", "process", "grade", "sources", "source", "measured")
-"""Columns whose cells are no numbers, whatever they look like."""
-_WORDS = ("drawing", "label", "note")
-"""Columns that are carried through, dates too."""
-_BRACKET = re.compile(r"(.*?)\s*\(([^()]*)\)")
-"""Head with its unit in round brackets."""
 _APOSTROPHE = re.compile(r"^'(?=[=+\-@])")
 """What `tolalloc.reading.files.no_formula` writes before a text."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Heads:
-    """How a table's heads are read."""
-
-    # Names of columns: the header is the first row that has them all, and rows above it are titles
-    needed: tuple[str, ...] = ()
-    # Names of columns in the spelling that is meant; a head in other capitals is one of them
-    known: tuple[str, ...] = ()
-    # Head as an office writes it, without its unit → the name of the column that it is
-    called: Mapping[str, str] = field(default_factory=dict)
-
-    def meant(self, head: str) -> str:
-        """Return a head as a column is named, with the unit that it states.
-
-        >>> heads = Heads(known=("id", "Cp"), called={"Merkmal": "id"})
-        >>> heads.meant("MERKMAL"), heads.meant("CP [-]"), heads.meant("Bemerkung")
-        ('id', 'Cp [-]', 'Bemerkung')
-        """
-        name, unit = split_header(head)
-        spelt = self._names
-        bracket = _BRACKET.fullmatch(name)
-        if bracket and not unit and _spelt(bracket[1]) in spelt and is_unit(bracket[2]):
-            name, unit = bracket[1], usual_signs(bracket[2].strip())
-        found = spelt.get(_spelt(name), name)
-        return f"{found} [{unit}]" if unit else found
-
-    @cached_property
-    def _names(self) -> dict[str, str]:
-        """Head without its capitals → name of the column."""
-        return {_spelt(own): own for own in self.known} | {_spelt(own): name for own, name in self.called.items()}
-
-    def row_in(self, rows: Sequence[Sequence[str]]) -> int:
-        """Return the position of the row that names all needed columns and most others, 0 where none does."""
-        named = {at: self.named(cells) for at, cells in enumerate(rows[:_MOST_TITLES])} if self.needed else {}
-        found = {at: len(own & {*self.known}) for at, own in named.items() if own.issuperset(self.needed)}
-        return max(found, key=lambda at: found[at], default=0)
-
-    def kind(self, head: str) -> str:
-        """Return what stands under a head of a table: number, text (of ours), or words that nothing is read from."""
-        name = split_header(self.meant(head))[0]
-        if name in _WORDS or (self.known and name not in self.known):
-            return "words"
-        return "text" if name in _TEXTS else "number"
-
-    def named(self, cells: Sequence[str]) -> set[str]:
-        """Return the names that a row would give to columns."""
-        return {split_header(self.meant(cell))[0] for cell in cells}
-
-
-def _spelt(head: str) -> str:
-    """Return a head without its capitals and line breaks."""
-    return " ".join(head.split()).lower()
-
-
 _ANY = Heads()
-_MOST_TITLES = 200
-"""Rows among which the heads of a table are looked for [-]."""
 
 
 def read_table_file(path: Path, heads: Heads = _ANY, sheet: str = "") -> tuple[NumberedRow, ...]:
@@ -351,7 +306,8 @@ def _records(path: Path, heads: Heads = _ANY) -> list[NumberedRow]:
     """Return the records of a CSV file; what separates them is seen from the header, # starts a comment."""
     text = read_text(path, "a table in CSV")
     lines = _without_comments(StringIO(text))
-    at = heads.row_in([re.split(r"[;,\t|]", line.strip()) for line in lines[:_MOST_TITLES]])
+    roughly = [[own.strip(' "') for own in re.split(r"[;,\t|]", line.strip())] for line in lines[:MOST_TITLES]]
+    at = heads.row_in(roughly)
     header = lines[at] if at else next((line for line in lines if line.strip()), "")
     separator = next((mark for mark in ";\t|" if mark in header), ",")
     rows, so_far = list[tuple[str, ...]](), 0
@@ -368,6 +324,7 @@ def _records(path: Path, heads: Heads = _ANY) -> list[NumberedRow]:
         raise InputError(
             f"{path}, row {len(rows) + 1}: a quotation mark is not closed, or not doubled within a cell ({error})."
         ) from None
+    heads.require_in(path, rows)
     hint = "numbers have a decimal point, and " if separator == "," else ""
     kept = _under_headers(path, _without_titles(rows, heads), f"{hint}cells are separated by {separator!r}")
     if kept and len(kept[-1][1]) < len(kept[0][1]) and not text.endswith("\n"):
@@ -528,14 +485,6 @@ def read_text_table(path: Path) -> TextTable:
     )
 
 
-def split_header(header: str) -> tuple[str, str]:
-    """Return name and unit of a header such as ``disc1.tilt.x [µrad]``; the unit is empty where none is stated."""
-    match = re.fullmatch(r"(.*?)\s*\[(.*)\]", header)
-    if match is None:
-        return header, ""
-    return match[1], usual_signs(match[2].strip())
-
-
 Row = TypeVar("Row", bound=Record)
 
 
@@ -657,8 +606,26 @@ def plain_number(text: str) -> float:
     return float(text)
 
 
-_ALSO = {"gauss": "normal", "gaussian": "normal", "rectangular": "uniform", "rectangle": "uniform"}
+_ALSO = {"gauss": "normal", "gaussian": "normal", "rectangular": "uniform", "rectangle": "uniform"} | {
+    word: name
+    for name, words in {
+        "size": ("maß", "mass", "durchmesser", "dimension", "diameter", "cote", "diamètre", "尺寸", "直径"),
+        "position": ("lage", "location", "localisation", "位置", "位置度"),
+        "pitch": ("teilung", "division", "pas", "节距", "齿距"),
+        "runout": ("rundlauf", "run-out", "battement", "faux-rond", "跳动", "圆跳动"),
+    }.items()
+    for word in words
+}
 """Word of an office → the word of the field."""
+
+
+def usual_word(text: str) -> str:
+    """Return a word as the fields have it.
+
+    >>> usual_word("Maß"), usual_word("Rundlauf"), usual_word("size")
+    ('size', 'runout', 'size')
+    """
+    return _ALSO.get(text.strip().lower(), text)
 
 
 def _typed(annotation: object, header: str, value: str, place: str) -> object:
@@ -683,7 +650,7 @@ def _typed(annotation: object, header: str, value: str, place: str) -> object:
         words = tuple(annotation)
     if words:
         spelt = {word.lower(): word for word in words}
-        value = spelt.get(_ALSO.get(value.lower(), value.lower()), value)
+        value = spelt.get(usual_word(value).lower(), value)
         if value not in words:
             more = "; a truncated one is written as its distribution with sorted = yes" if value == "truncated" else ""
             raise InputError.at(place, header, value, "one of " + ", ".join(words) + more)

@@ -27,19 +27,19 @@ from tolalloc.drawings.fields import (
     shapes_text,
     usual_unit,
 )
+from tolalloc.drawings.heads import Heads, split_header
 from tolalloc.drawings.ladder import RADII, fit_deviations, is_fit
 from tolalloc.drawings.measured_parts import MeasuredParts
 from tolalloc.drawings.sources import INCHES, LENGTHS, PERCENT, Source, known_as
 from tolalloc.drawings.table_file import (
     DATA,
-    Heads,
     plain_number,
     read_rows,
     read_table_file,
     require_columns,
     require_units,
-    split_header,
     typed_cells,
+    usual_word,
 )
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
@@ -432,7 +432,7 @@ def _both_ways(row: dict[str, str], place: str) -> dict[str, str]:
     if sign := _BOTH.match(plus):
         size = plus[sign.end() :].replace(",", ".")
         return {**row, "plus": size, "minus": f"-{size}"}
-    nominal, feature = row.get("nominal", ""), row.get("feature", "") or Feature.SIZE
+    nominal, feature = row.get("nominal", ""), usual_word(row.get("feature", "")) or Feature.SIZE
     if feature != Feature.SIZE or row["id"].rsplit(".", 1)[-1] in RADII or not nominal:
         allowed = "plus and minus, since a fit is that of a diameter or width with its nominal size"
         raise InputError.at(place, "plus", plus, allowed)

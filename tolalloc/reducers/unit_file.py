@@ -18,8 +18,9 @@ import numpy as np
 from jaxtyping import Float
 from pydantic import Field, StrictBool
 
+from tolalloc.drawings.heads import split_header
 from tolalloc.drawings.sources import Source, is_angular, neglected_columns
-from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table, split_header
+from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.files import Record, no_formula, read_toml, shipped_or_path, validated, write_new
 from tolalloc.reading.units import MICROMETRE, MICRORADIAN

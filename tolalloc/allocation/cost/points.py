@@ -16,7 +16,8 @@ from pydantic import Field
 
 from tolalloc.allocation.cost.model import ClosedForm, Combined, Exponential, Expression, Reciprocal, ReciprocalPower
 from tolalloc.drawings.fields import LARGEST_ZONE, SMALLEST_COST, SMALLEST_ZONE, UNITS
-from tolalloc.drawings.table_file import read_rows, read_text_table, split_header, stated_currency
+from tolalloc.drawings.heads import split_header
+from tolalloc.drawings.table_file import read_rows, read_text_table, stated_currency
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.files import Record

@@ -23,8 +23,9 @@ from tolalloc.allocation.cost.model import (
 from tolalloc.allocation.cost.points import Points, ShopPoints, Spline, Tabulated, best_fit, load_shop_points, points_of
 from tolalloc.drawings.drawing import Costs
 from tolalloc.drawings.fields import LARGEST_ZONE, SMALLEST_ZONE
+from tolalloc.drawings.heads import split_header
 from tolalloc.drawings.sources import Source, known_as, meant
-from tolalloc.drawings.table_file import DATA, read_rows, read_text_table, split_header, stated_currency
+from tolalloc.drawings.table_file import DATA, read_rows, read_text_table, stated_currency
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.file_content import is_file
 from tolalloc.reading.files import Record, shipped_or_path

@@ -11,7 +11,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Complex, Float
 
-from tolalloc.drawings.table_file import read_text_table, split_header
+from tolalloc.drawings.heads import split_header
+from tolalloc.drawings.table_file import read_text_table
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.clearance import removed

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawings.table_file import plain_number, read_text_table, split_header
+from tolalloc.drawings.heads import split_header
+from tolalloc.drawings.table_file import plain_number, read_text_table
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
 

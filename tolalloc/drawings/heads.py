@@ -1,0 +1,161 @@
+"""What the heads of a table mean, as an office writes them, and which row has them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.reading.units import is_unit, usual_signs
+
+_SOME = 3
+"""Names of columns in a row from which on it is one of heads, whichever are missing [-]."""
+MOST_TITLES = 200
+"""Rows among which the heads of a table are looked for [-]."""
+
+
+_TEXTS = ("id", "part", "feature", "unit", "distribution", "group", "process", "grade", "sources", "source", "measured")
+"""Columns whose cells are no numbers, whatever they look like."""
+_WORDS = ("drawing", "label", "note")
+"""Columns that are carried through, dates too."""
+_BRACKET = re.compile(r"(.*?)\s*\(([^()]*)\)")
+"""Head with its unit in round brackets."""
+_NUMBER = re.compile(r"[+-]?[\d.,]+(?:[eE][+-]?\d+)?")
+"""What is no head."""
+
+
+def split_header(header: str) -> tuple[str, str]:
+    """Return name and unit of a header such as ``disc1.tilt.x [µrad]``; the unit is empty where none is stated."""
+    match = re.fullmatch(r"(.*?)\s*\[(.*)\]", header)
+    if match is None:
+        return header, ""
+    return match[1], usual_signs(match[2].strip())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Heads:
+    """How a table's heads are read."""
+
+    # Names of columns: the header is the first row that has them all, and rows above it are titles
+    needed: tuple[str, ...] = ()
+    # Names of columns in the spelling that is meant; a head in other capitals is one of them
+    known: tuple[str, ...] = ()
+    # Head as an office writes it, without its unit → the name of the column that it is
+    called: Mapping[str, str] = field(default_factory=dict)
+
+    def meant(self, head: str) -> str:
+        """Return a head as a column is named, with the unit that it states.
+
+        >>> heads = Heads(known=("id", "Cp"), called={"Merkmal": "id"})
+        >>> heads.meant("MERKMAL"), heads.meant("CP [-]"), heads.meant("Bemerkung")
+        ('id', 'Cp [-]', 'Bemerkung')
+        """
+        name, unit = split_header(head)
+        spelt = self._names
+        bracket = _BRACKET.fullmatch(name)
+        if bracket and not unit and _spelt(bracket[1]) in spelt and is_unit(bracket[2]):
+            name, unit = bracket[1], usual_signs(bracket[2].strip())
+        found = spelt.get(_spelt(name), name)
+        return f"{found} [{unit}]" if unit else found
+
+    @cached_property
+    def _names(self) -> dict[str, str]:
+        """Head without its capitals and its unit → name of the column."""
+        return {_spelt(own): own for own in self.known} | {
+            _spelt(_without_unit(own)): name for own, name in self.called.items()
+        }
+
+    def row_in(self, rows: Sequence[Sequence[str]]) -> int:
+        """Return the position of the row that names all needed columns and most others, 0 where none does."""
+        named = {at: self.named(cells) for at, cells in enumerate(rows[:MOST_TITLES])} if self.needed else {}
+        found = {at: len(own & {*self.known}) for at, own in named.items() if own.issuperset(self.needed)}
+        return max(found, key=lambda at: found[at], default=0)
+
+    def require_in(self, path: Path, rows: Sequence[Sequence[str]]) -> None:
+        """Raise unless a row has a head for each column that is needed, and a column each head that is said to be one.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            The row that looks most like one of heads, with what to write of them; or the head that is not there.
+        """
+        at = max(range(len(rows[:MOST_TITLES])), key=lambda at: sum(map(_is_word, rows[at])), default=0)
+        seen = [cell for cell in (rows[at] if rows else ()) if cell]
+        # Of a table that has most of its heads it is said which one is missing.
+        if seen and len(self.named(seen) & {*self.known}) < _SOME and not any(map(self._names_all, rows[:MOST_TITLES])):
+            raise InputError(
+                f"{path}: no row has a head {' and '.join(map(repr, self.needed))}; row {at + 1} has "
+                f"{', '.join(map(repr, seen))}. Say what these are, each with a name of a column or left out, in "
+                f"{path.with_suffix('.toml').name} beside it: columns = {_guessed(seen, self.known)}"
+            )
+        header = rows[self.row_in(rows)] if rows else ()
+        there = [_without_unit(cell) for cell in header if cell]
+        for own in self.called:
+            if _spelt(_without_unit(own)) not in map(_spelt, there):
+                raise UnknownNameError.among(f"{path}, columns", "head", _without_unit(own), there)
+
+    def _names_all(self, cells: Sequence[str]) -> bool:
+        return self.named(cells).issuperset(self.needed)
+
+    def kind(self, head: str) -> str:
+        """Return what stands under a head of a table: number, text (of ours), or words that nothing is read from."""
+        name = split_header(self.meant(head))[0]
+        if name in _WORDS or (self.known and name not in self.known):
+            return "words"
+        return "text" if name in _TEXTS else "number"
+
+    def named(self, cells: Sequence[str]) -> set[str]:
+        """Return the names that a row would give to columns."""
+        return {split_header(self.meant(cell))[0] for cell in cells}
+
+
+def _spelt(head: str) -> str:
+    """Return a head without its capitals and line breaks."""
+    return " ".join(head.split()).lower()
+
+
+def _without_unit(head: str) -> str:
+    """Return a head without the unit that it states in brackets of either kind."""
+    name, _ = split_header(head)
+    bracket = _BRACKET.fullmatch(name)
+    return bracket[1] if bracket and is_unit(bracket[2]) else name
+
+
+def _is_word(cell: str) -> bool:
+    """Return whether a cell may be a head: text that is no number."""
+    return bool(cell) and not _NUMBER.fullmatch(cell)
+
+
+def _guessed(heads: Iterable[str], known: Sequence[str]) -> str:
+    """Return an inline table of TOML that says what heads mean, as far as offices' words are known."""
+    meant = {own: name for name, words in OFFICE_WORDS.items() for own in words}
+    names = {_without_unit(head): meant.get(_spelt(_without_unit(head)), "?") for head in heads}
+    guessed = {head: name for head, name in names.items() if name in known} or dict.fromkeys(names, "?")
+    return "{ " + ", ".join(f'"{head}" = "{name}"' for head, name in guessed.items()) + " }"
+
+
+OFFICE_WORDS = {
+    "id": ("merkmal", "maßbezeichnung", "characteristic", "dimension", "caractéristique", "特性", "尺寸名称"),
+    "part": ("teil", "bauteil", "component", "pièce", "零件"),
+    "feature": ("art", "merkmalsart", "type", "genre", "类型"),
+    "nominal": ("nennmaß", "nennmass", "nominal size", "cote nominale", "公称尺寸"),
+    "plus": ("oberes abmaß", "oberes abmass", "upper deviation", "écart supérieur", "上偏差"),
+    "minus": ("unteres abmaß", "unteres abmass", "lower deviation", "écart inférieur", "下偏差"),
+    "unit": ("einheit", "unité", "单位"),
+    "distribution": ("verteilung", "loi", "分布"),
+    "process": ("verfahren", "fertigungsverfahren", "procédé", "工艺"),
+    "Cp": ("cpk", "fähigkeit", "capability", "capabilité", "过程能力"),
+    "min": ("kleinste toleranz", "smallest tolerance", "tolérance minimale", "最小公差"),
+    "max": ("größte toleranz", "grösste toleranz", "largest tolerance", "tolérance maximale", "最大公差"),
+    "cost": ("kosten", "preis", "price", "coût", "prix", "成本"),
+    "group": ("gruppe", "groupe", "分组"),
+    "locked": ("gesperrt", "fest", "fixed", "verrouillé", "锁定"),
+    "drawing": ("zeichn.-nr.", "zeichnungsnummer", "drawing no.", "n° de plan", "图号"),
+    "note": ("bemerkung", "anmerkung", "remark", "remarque", "备注"),
+    "spectrum": ("spektrum", "spectre", "频谱"),
+    "source": ("quelle", "fehlerquelle", "来源"),
+}
+"""Name of a column → what offices call it, in German, English, French and Chinese: guesses that a user is shown."""
