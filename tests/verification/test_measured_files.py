@@ -9,8 +9,9 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from tests.builders import refusal
-from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
+from tests.builders import refusal, written
+from tolalloc.drawings.measured_parts import read_characteristics
+from tolalloc.drawings.tolerance_table import doubts, load_tolerance_table, table_frame
 from tolalloc.exceptions import UnknownNameError
 
 PARTS = np.round(np.random.default_rng(3).normal(0.4, 0.6, 24), 3)  # deviations from the nominal size [µm]
@@ -179,3 +180,47 @@ def test_bad_summaries_are_refused_in_one_sentence(content, sentence, tmp_path):
     said = refusal(load_tolerance_table, table(tmp_path, "s.csv"))
     assert re.search(sentence, said), said
     assert "\n" not in said
+
+
+def doubted(folder, values, nominal=10.0):
+    """Return what is doubted of a size of 10 ± 0.02 mm whose parts deviate by these [µm]."""
+    written(folder / "parts.csv", "deviation [µm]\n" + "".join(f"{value!r}\n" for value in values))
+    row = f"a,{nominal},0.02,-0.02,mm,0.005,0.1,1,empirical,parts.csv"
+    path = written(folder / "zones.csv", f"id,nominal [mm],plus,minus,unit,min,max,cost,distribution,measured\n{row}\n")
+    return doubts(load_tolerance_table(path), "zones.csv")
+
+
+GOOD = (np.random.default_rng(3).standard_normal(25) * 5).tolist()
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ([10_000 + value for value in GOOD], "250 zones from the middle on average"),
+        ([value - 10_000 for value in GOOD], "250 zones from the middle on average"),
+        ([value - 5_000 for value in GOOD], "125 zones from the middle on average"),
+        ([*GOOD[1:], 2_000.0], r"1 of its 25 measured parts lie far from all others, one at \+2,000 µm"),
+        ([*GOOD[1:], 2_000.0, -500.0], r"2 of its 26 measured parts .* one at \+2,000 µm"),
+        ([*GOOD[1:], 90.0], r"1 of its 25 measured parts .* one at \+90 µm"),
+    ],
+)
+def test_measured_parts_that_are_hardly_meant_are_doubted(values, said, tmp_path):
+    (sentence,) = doubted(tmp_path, values)
+    assert re.search(said, sentence)
+
+
+@pytest.mark.parametrize("shift", [0.0, 15.0, 60.0])
+def test_parts_of_one_process_are_not_doubted_wherever_it_lies(shift, tmp_path):
+    assert doubted(tmp_path, [value + shift for value in GOOD]) == ()
+    heavy = np.random.default_rng(5).standard_t(4, 200) * 5 + shift
+    assert doubted(tmp_path, heavy.tolist()) == ()
+
+
+def test_a_second_part_in_an_aqdef_file_is_refused_with_its_line(tmp_path):
+    parts = [*head(), *coded(PARTS)]
+    aqdef(tmp_path, [*parts, *parts])
+    assert f"line {len(parts) + 3}: a second part begins (K2001" in refusal(load_tolerance_table, table(tmp_path))
+    aqdef(tmp_path, [*parts, "K1001 4712", *head(2), *coded(PARTS, 2)])
+    assert "a second part begins (K1001 4712)" in refusal(load_tolerance_table, table(tmp_path))
+    aqdef(tmp_path, [*parts, *head(2), *coded(PARTS, 2)])  # two characteristics of one part
+    assert len(read_characteristics(tmp_path / "parts.dfq")) == 2

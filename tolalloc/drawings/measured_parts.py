@@ -75,6 +75,14 @@ class MeasuredFit:
         return self.fits[0]
 
 
+_FAR = 10.0
+"""Standard deviations, or halves of a zone, from which on measured parts are doubted [-]."""
+_QUARTILES = 1.349
+"""Distance of the quartiles of a normal distribution [σ]."""
+_FINEST = 1e-3
+"""Spread below which no gauge tells parts apart [half zone]; assumption."""
+
+
 @dataclass(frozen=True)
 class StatedProcess:
     """Mean and standard deviation of measured parts whose single values nobody kept."""
@@ -153,6 +161,23 @@ class MeasuredParts:
         """Distribution of the parts themselves, smoothed [half zone]."""
         own = self.relative
         return smoothed_magnitude(own) if self.are_radii else smoothed(own, smoothing_width(own))
+
+    @property
+    def doubt(self) -> str:
+        """What is hardly meant of them: parts far outside, or far from all others; nothing where all may be meant."""
+        off = abs(self.fit.mean - self.middle) if not self.are_radii else self.fit.mean
+        if off > _FAR * self.zone / 2.0:
+            return (
+                f"its measured parts lie {off / self.zone:,.3g} zones from the middle on average, as sizes do that are "
+                "read as deviations, or deviations that are read as sizes"
+            )
+        own = self.relative
+        spread = float(np.subtract(*np.quantile(own, [0.75, 0.25]))) / _QUARTILES if own.size else 0.0
+        far = np.abs(own - np.median(own)) > _FAR * max(spread, _FINEST) if own.size else own
+        if not far.any():
+            return ""
+        worst = (float(own[far][np.abs(own[far]).argmax()]) * self.zone / 2.0 + self.middle) / MICROMETRE
+        return f"{int(far.sum())} of its {self.parts} measured parts lie far from all others, one at {worst:+,.4g} µm"
 
     @property
     def sentence(self) -> str:
@@ -364,6 +389,8 @@ _AQDEF = re.compile(r"(.+\.(?:dfq|dfd|dfx))(?::(.*))?", re.IGNORECASE)
 _KEY = re.compile(r"(K\d{4})(?:/(\d{1,6}))?(?:\s+(.*))?")
 """Line of such a file that begins with a field: its key, the characteristic that it is about, and its content."""
 _BETWEEN_CHARACTERISTICS, _BETWEEN_FIELDS = "\x0f", "\x14"
+_BEGIN = ("K1001", "K2001")
+"""Fields with which the description of a part, and of a characteristic, begins; behind values it is that of another."""
 _VALID = "0"
 """Content of K0002 of a value that counts; 129, 255, 256 and 290 mark one that does not."""
 _ATTRIBUTIVE = "1"
@@ -405,8 +432,14 @@ def read_characteristics(path: Path) -> dict[int, _Characteristic]:
         found = next((own for own in beside if is_file(own)), beside[0])
         lines += _aqdef_text(found).splitlines()
     common, found_by = dict[str, str](), dict[int, _Characteristic]()
-    for line in lines:
+    for number, line in enumerate(lines, start=1):
         if key := _KEY.fullmatch(line.rstrip()):
+            described = list(found_by.values()) if key[1] == "K1001" else [found_by.get(int(key[2] or 1))]
+            if key[1] in _BEGIN and any(own and own.values for own in described):
+                raise InputError(
+                    f"{path}, line {number}: a second part begins ({line.strip()}), and its characteristics have the "
+                    "numbers of the first one's; allowed is a file a part."
+                )
             _read_field(key[1], int(key[2] or 1), (key[3] or "").strip(), found_by, common)
         elif line.strip() and not line.startswith("K"):
             for at, written in enumerate(line.split(_BETWEEN_CHARACTERISTICS), start=1):

@@ -190,7 +190,8 @@ def _reasons(source: Source, middle_cost: float) -> list[str]:
     if source.zone == 0.0:
         off = abs(source.middle) > 0
         return [f"its zone is 0 and {_length(source.middle)} off the nominal size"] if off else []
-    return [*_of_size(source), *_of_zone(source), *_of_process(source, middle_cost)]
+    of_parts = [source.measured.doubt] if source.measured and source.measured.doubt else []
+    return [*_of_size(source), *_of_zone(source), *_of_process(source, middle_cost), *of_parts]
 
 
 def _of_size(source: Source) -> list[str]:
