@@ -84,6 +84,10 @@ _AT_ONCE = 2**16
 """Samples that a function is given at once, so that its arguments stay small [-]."""
 _ASKED = 16
 """Samples that tell whether a function takes whole columns [-]."""
+_REFUTING = 513
+"""Units that may refute stated slopes, every second one in the middle [-]."""
+_ROUNDED = 1e-9
+"""Part of an output by which rounding may move it [-]."""
 _STEP_OF_SIMULATION = 0.02
 """The same for a simulation, whose solver leaves noise [-]."""
 
@@ -102,7 +106,7 @@ class FunctionModel:
     # Takes what the function takes and returns, for every output, the derivative by every input [unit of the output per
     # mm or in]; central differences unless given
     jacobian: Callable[..., Any] | None = None
-    # Output → input or setting → its least and largest derivative wherever the function is asked, which nobody checks
+    # Output → input or setting → its least and largest derivative wherever the function is asked; some units check it
     # [unit of the output per mm or in, per rad, per unit of the setting]
     slopes: Mapping[str, Mapping[str, tuple[float, float]]] = field(default_factory=dict)
     step: float = _STEP  # Step of these differences to either side, over the zone [-]
@@ -329,10 +333,35 @@ class BoundFunction(Model):
             ]
         )
 
+    rests_on = "the stated slopes"
+    """What its bounds rest on, beside the function."""
+
     def unbounded(self, output: str) -> str:
-        """Return why nothing is certain of an output: its user states no slopes."""
-        said = f"model {self.name} states no slopes of {output}"
-        return "" if output in self.source.slopes else said
+        """Return why nothing is certain of an output: its user states no slopes, or some that its units refute."""
+        if output not in self.source.slopes:
+            return f"model {self.name} states no slopes of {output}"
+        count, widths = len(self.varied), self.steps / self.source.step
+        x = np.random.default_rng(0).uniform(-1.0, 1.0, (_REFUTING, count)) * widths
+        x[::2] = 0.0  # from the middle to each, and from each to the next middle
+        values = self.reading((output,))(x).values[:, 0]
+        changes, (low, high) = np.diff(x, axis=0), (own[:count] for own in self._slopes_of(output))
+        least, most = (side(changes * low, changes * high).sum(axis=1) for side in (np.minimum, np.maximum))
+        change, slack = np.diff(values), _ROUNDED * np.nanmax(np.abs(values), initial=0.0)
+        wrong = np.flatnonzero((change < least - slack) | (change > most + slack))
+        if not wrong.size:
+            return ""
+        at = wrong[0]
+        return (
+            f"model {self.name} states slopes of {output} that its units refute: between two of them they allow a "
+            f"change from {least[at]:.4g} to {most[at]:.4g}, and it is {change[at]:.4g}"
+        )
+
+    def _slopes_of(self, output: str) -> tuple[Float[np.ndarray, " slope"], Float[np.ndarray, " slope"]]:
+        """Return the least and the largest stated derivative by every column [unit per m], then by every setting."""
+        slopes, factors = self.source.slopes[output], dict(zip(self.source.inputs, self._per_input, strict=True))
+        names = (*self.varied, *(setting.name for setting in self.settings))
+        low, high = np.array([np.array(slopes[name]) * factors.get(name, 1.0) for name in names]).T
+        return low, high
 
     def unit_bounds(
         self,
@@ -341,10 +370,7 @@ class BoundFunction(Model):
         designs: Float[np.ndarray, "design variable"],  # noqa: ARG002
     ) -> SlopeBounds:
         """Return what the stated slopes say of an output of random units."""
-        slopes, own = self.source.slopes[output], self.reading((output,))
-        factors = dict(zip(self.source.inputs, self._per_input, strict=True))
-        names = (*self.varied, *(setting.name for setting in self.settings))
-        low, high = np.array([np.array(slopes[name]) * factors.get(name, 1.0) for name in names]).T
+        own, (low, high) = self.reading((output,)), self._slopes_of(output)
 
         def respond(
             x: Float[np.ndarray, "unit column"], settings: Float[np.ndarray, " setting"]

@@ -60,6 +60,9 @@ class UnitBounds(Protocol):
 class BoundedModel(Protocol):
     """A model that knows something certain of its outputs over boxes of zones and settings."""
 
+    rests_on: str
+    """What that takes for true beside the model, in words; nothing of most."""
+
     def unbounded(self, output: str) -> str:
         """Return why nothing is certain of an output, empty where `unit_bounds` has its bounds."""
         ...

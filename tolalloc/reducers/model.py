@@ -401,6 +401,9 @@ class ReducerModel(Model):
         """That of the peak-to-peak, from the angles of its search [arcsec]."""
         return dict.fromkeys(self._everywhere((PEAK_TO_PEAK,)), SEEN)
 
+    rests_on = ""
+    """Its bounds take nothing for true beside the model."""
+
     def unbounded(self, output: str) -> str:
         """Return why nothing is certain of an output: bounds are known of the peak-to-peak without play and tilt."""
         if output != PEAK_TO_PEAK:

@@ -48,6 +48,7 @@ class ProvenBound:
     allowed: tuple[int, ...]  # Units that may fail every requirement that is counted [-]
     counted: tuple[str, ...]  # Outputs whose limits are counted
     boxes: int  # Boxes that were looked at [-]
+    rests_on: str = ""  # What it takes for true beside the model, in words
 
     @property
     def says_more(self) -> bool:
@@ -372,6 +373,7 @@ class BoundSearch:
             allowed=tuple(allowed),
             counted=tuple(each.output for each in own),
             boxes=looked,
+            rests_on=bounded.rests_on,
         )
 
     def _worst(

@@ -334,6 +334,7 @@ def _proven(result: AllocationResult) -> tuple[str, ...]:
         "allowed": " or ".join(dict.fromkeys(str(own) for own in found.allowed)),
         "boxes": found.boxes,
         "counted": ", ".join(short(own) for own in found.counted),
+        "rests": f", as far as {found.rests_on} hold" if found.rests_on else "",
     }
     if not found.says_more:
         return (_say("proven_nothing", bound=found.cost, boxes=found.boxes, counted=gaps["counted"]),)
