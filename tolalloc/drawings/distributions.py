@@ -87,22 +87,6 @@ class Shapes:
         return f"{what} from {self.smallest:g} to {self.largest:g}"
 
 
-def _as_stated(shapes: tuple[float, ...]) -> tuple[float, ...]:
-    return shapes
-
-
-def _are_equal(shapes: tuple[float, ...]) -> bool:
-    return len(set(shapes)) == 1
-
-
-def _always(shapes: tuple[float, ...]) -> bool:  # noqa: ARG001
-    return True
-
-
-def _never(shapes: tuple[float, ...]) -> bool:  # noqa: ARG001
-    return False
-
-
 @dataclass(frozen=True, kw_only=True)
 class Form:
     """What is known of a distribution, in one place: a new one is a member of `Distribution` and its form."""
@@ -111,10 +95,10 @@ class Form:
     support: tuple[float, float] | None = None  # Where the standard one of scipy begins and ends, if it is bounded [-]
     shapes: Shapes | None = None  # The shapes that a row states, if any
     # Returns, of these shapes, those that scipy takes
-    to_scipy: Callable[[tuple[float, ...]], tuple[float, ...]] = _as_stated
+    to_scipy: Callable[[tuple[float, ...]], tuple[float, ...]] = tuple
     is_one_sided: bool = False  # Whether a size starts at the lower limit of its zone
     # Returns whether its density is symmetric and the logarithm of that concave
-    is_symmetric: Callable[[tuple[float, ...]], bool] = _never
+    is_symmetric: Callable[[tuple[float, ...]], bool] = lambda _: False
 
     def of(self, shapes: tuple[float, ...], start: float) -> Marginal:
         """Return the distribution of these shapes; a bounded one from a start to 1."""
@@ -127,19 +111,23 @@ class Form:
 
 
 FORMS = {
-    Distribution.NORMAL: Form(is_symmetric=_always),
-    Distribution.UNIFORM: Form(scipy="uniform", support=(0.0, 1.0), is_symmetric=_always),
-    Distribution.TRIANGULAR: Form(scipy="triang", support=(0.0, 1.0), to_scipy=lambda _: (0.5,), is_symmetric=_always),
+    Distribution.NORMAL: Form(is_symmetric=lambda _: True),
+    Distribution.UNIFORM: Form(scipy="uniform", support=(0.0, 1.0), is_symmetric=lambda _: True),
+    Distribution.TRIANGULAR: Form(
+        scipy="triang", support=(0.0, 1.0), to_scipy=lambda _: (0.5,), is_symmetric=lambda _: True
+    ),
     # Without a plateau a trapezoid is triangular, without sides uniform.
     Distribution.TRAPEZOID: Form(
         scipy="trapezoid",
         support=(0.0, 1.0),
         shapes=Shapes(1, 0.01, 0.99),
         to_scipy=lambda shapes: tuple((1.0 + sign * own) / 2.0 for own in shapes for sign in (-1, 1)),
-        is_symmetric=_always,
+        is_symmetric=lambda _: True,
     ),
     # With a shape below 1 a beta density has no end at a limit.
-    Distribution.BETA: Form(scipy="beta", support=(0.0, 1.0), shapes=Shapes(2, 1.0, 50.0), is_symmetric=_are_equal),
+    Distribution.BETA: Form(
+        scipy="beta", support=(0.0, 1.0), shapes=Shapes(2, 1.0, 50.0), is_symmetric=lambda shapes: len({*shapes}) == 1
+    ),
     Distribution.LOGNORMAL: Form(scipy="lognorm", shapes=Shapes(1, 0.02, 1.5), is_one_sided=True),
     Distribution.WEIBULL: Form(scipy="weibull_min", shapes=Shapes(1, 0.3, 20.0), is_one_sided=True),
     Distribution.RAYLEIGH: Form(is_one_sided=True),

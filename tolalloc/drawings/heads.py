@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 
 from tolalloc.exceptions import InputError, UnknownNameError
@@ -129,33 +130,16 @@ def _is_word(cell: str) -> bool:
     return bool(cell) and not _NUMBER.fullmatch(cell)
 
 
+@cache
+def office_words(kind: str) -> dict[str, str]:
+    """Return what offices' words mean, in small letters: heads of ``columns``, or words in ``cells``."""
+    text = (Path(__file__).parent / "data" / "office_words.toml").read_text(encoding="utf-8")
+    return {word: name for name, words in tomllib.loads(text)[kind].items() for word in words}
+
+
 def _guessed(heads: Iterable[str], known: Sequence[str]) -> str:
     """Return an inline table of TOML that says what heads mean, as far as offices' words are known."""
-    meant = {own: name for name, words in OFFICE_WORDS.items() for own in words}
+    meant = office_words("columns")
     names = {_without_unit(head): meant.get(_spelt(_without_unit(head)), "?") for head in heads}
     guessed = {head: name for head, name in names.items() if name in known} or dict.fromkeys(names, "?")
     return "{ " + ", ".join(f'"{head}" = "{name}"' for head, name in guessed.items()) + " }"
-
-
-OFFICE_WORDS = {
-    "id": ("merkmal", "maßbezeichnung", "characteristic", "dimension", "caractéristique", "特性", "尺寸名称"),
-    "part": ("teil", "bauteil", "component", "pièce", "零件"),
-    "feature": ("art", "merkmalsart", "type", "genre", "类型"),
-    "nominal": ("nennmaß", "nennmass", "nominal size", "cote nominale", "公称尺寸"),
-    "plus": ("oberes abmaß", "oberes abmass", "upper deviation", "écart supérieur", "上偏差"),
-    "minus": ("unteres abmaß", "unteres abmass", "lower deviation", "écart inférieur", "下偏差"),
-    "unit": ("einheit", "unité", "单位"),
-    "distribution": ("verteilung", "loi", "分布"),
-    "process": ("verfahren", "fertigungsverfahren", "procédé", "工艺"),
-    "Cp": ("cpk", "fähigkeit", "capability", "capabilité", "过程能力"),
-    "min": ("kleinste toleranz", "smallest tolerance", "tolérance minimale", "最小公差"),
-    "max": ("größte toleranz", "grösste toleranz", "largest tolerance", "tolérance maximale", "最大公差"),
-    "cost": ("kosten", "preis", "price", "coût", "prix", "成本"),
-    "group": ("gruppe", "groupe", "分组"),
-    "locked": ("gesperrt", "fest", "fixed", "verrouillé", "锁定"),
-    "drawing": ("zeichn.-nr.", "zeichnungsnummer", "drawing no.", "n° de plan", "图号"),
-    "note": ("bemerkung", "anmerkung", "remark", "remarque", "备注"),
-    "spectrum": ("spektrum", "spectre", "频谱"),
-    "source": ("quelle", "fehlerquelle", "来源"),
-}
-"""Name of a column → what offices call it, in German, English, French and Chinese: guesses that a user is shown."""

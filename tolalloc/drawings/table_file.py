@@ -20,7 +20,7 @@ from typing import Any, Literal, TypeVar, get_args, get_origin
 from unicodedata import normalize
 from zipfile import ZipFile
 
-from tolalloc.drawings.heads import MOST_TITLES, Heads, split_header
+from tolalloc.drawings.heads import MOST_TITLES, Heads, office_words, split_header
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.file_content import read_bytes, read_text, require_believable, require_table
 from tolalloc.reading.files import Record, validated
@@ -606,26 +606,13 @@ def plain_number(text: str) -> float:
     return float(text)
 
 
-_ALSO = {"gauss": "normal", "gaussian": "normal", "rectangular": "uniform", "rectangle": "uniform"} | {
-    word: name
-    for name, words in {
-        "size": ("maß", "mass", "durchmesser", "dimension", "diameter", "cote", "diamètre", "尺寸", "直径"),
-        "position": ("lage", "location", "localisation", "位置", "位置度"),
-        "pitch": ("teilung", "division", "pas", "节距", "齿距"),
-        "runout": ("rundlauf", "run-out", "battement", "faux-rond", "跳动", "圆跳动"),
-    }.items()
-    for word in words
-}
-"""Word of an office → the word of the field."""
-
-
 def usual_word(text: str) -> str:
     """Return a word as the fields have it.
 
     >>> usual_word("Maß"), usual_word("Rundlauf"), usual_word("size")
     ('size', 'runout', 'size')
     """
-    return _ALSO.get(text.strip().lower(), text)
+    return office_words("cells").get(text.strip().lower(), text)
 
 
 def _typed(annotation: object, header: str, value: str, place: str) -> object:

@@ -174,19 +174,17 @@ class UserFunction:
         InputError
             Other names than those of the outputs, with or without their units.
         """
-        labels = _labels(found)
-        if not labels or not self.names:
+        said = _named_values(found)
+        if not said or not self.names:
             return found
-        said = {name: at for at, name in enumerate(labels)}
         bare = [name.rpartition(" [")[0] for name in self.names]
-        places = [said.get(name, said.get(own, -1)) for name, own in zip(self.names, bare, strict=True)]
-        if -1 in places or len(labels) != len(self.names):
+        keys = [name if name in said else own for name, own in zip(self.names, bare, strict=True)]
+        if {*keys} != said.keys():
             raise InputError(
-                f"{self.place}: the function returned {', '.join(map(repr, labels))}; allowed are its outputs by "
+                f"{self.place}: the function returned {', '.join(map(repr, said))}; allowed are its outputs by "
                 f"name, {', '.join(map(repr, bare))}, or without names in this order."
             )
-        values = _values_of(found)
-        return [values[at] for at in places]
+        return [said[key] for key in keys]
 
     def _numbers(self, found: Any) -> Float[np.ndarray, "..."]:
         """Return what the function returned as numbers of its own, NaN where that is no answer.
@@ -228,24 +226,15 @@ class UserFunction:
             ) from None
 
 
-def _labels(found: Any) -> list[str]:
-    """Return the names of the values that a function returned: keys, columns, fields; nothing where there are none."""
+def _named_values(found: Any) -> dict[str, Any]:
+    """Return the values that a function returned by name: of keys, columns or fields; nothing without names."""
     if isinstance(found, Mapping):
-        own = list(found)
+        own = dict(found)
     elif hasattr(found, "iloc"):  # a table or a series of pandas
-        own = list(getattr(found, "columns", found.index))
+        own = dict(zip(getattr(found, "columns", found.index), found.to_numpy().T, strict=True))
     else:
-        own = list(getattr(getattr(found, "dtype", None), "names", None) or ())
-    return own if all(isinstance(name, str) for name in own) else []
-
-
-def _values_of(found: Any) -> list[Any]:
-    """Return the values that a function returned by name, in its own order."""
-    if isinstance(found, Mapping):
-        return list(found.values())
-    if hasattr(found, "iloc"):
-        return list(found.to_numpy().T)
-    return [found[name] for name in found.dtype.names]
+        own = {name: found[name] for name in getattr(getattr(found, "dtype", None), "names", None) or ()}
+    return own if all(isinstance(name, str) for name in own) else {}
 
 
 def by_name(function: Callable[..., Any], names: Sequence[str], place: str) -> Callable[..., Any]:
