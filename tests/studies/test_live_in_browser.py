@@ -173,6 +173,7 @@ def test_a_group_moves_by_the_ratio_of_its_members_and_says_how_far_from_the_dra
     assert row.find_element("css selector", ".delta").text == "as drawn"
     row.find_element("tag name", "summary").click()
     group, *members = row.find_elements("css selector", "input[inputmode=decimal]")
+    until(members[1].is_displayed)  # on a busy machine the row opens after the click is answered
     drawn = float(group.get_attribute("value"))
     members[1].send_keys(Keys.CONTROL + "a" + Keys.NULL, str(1.5 * drawn), Keys.TAB)
     row.find_element("css selector", "input[type=range]").send_keys(Keys.ARROW_LEFT * 30)
