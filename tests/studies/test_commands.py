@@ -360,7 +360,7 @@ def test_a_folder_that_cannot_be_made_is_refused_before_the_work(tmp_path):
     ("fields", "words"),
     [
         ({"limits": "{ta.PEAK_TO_PEAK: ta.Limit(upper=float('nan'))}"}, ["upper is nan", "a finite number"]),
-        ({"limits": "{ta.PEAK_TO_PEAK: ta.Limit()}"}, ["lower limit, an upper limit or both"]),
+        ({"limits": "{ta.PEAK_TO_PEAK: ta.Limit()}"}, ["lower side, an upper side or both"]),
         ({"limits": "{ta.PEAK_TO_PEAK: ta.Limit(lower=60.0, upper=50.0)}"}, ["limit: upper is 50", "above the lower"]),
         ({"limits": "{ta.PEAK_TO_PEAK: ta.Limit(upper=60.0, show=ta.AtYield(target=99.73))}"}, ["99.73", "0.5"]),
         ({"limits": "{ta.PEAK_TO_PEAK: 60.0}"}, [f"limits['{PEAK}']", "60.0", "ta.Limit"]),
