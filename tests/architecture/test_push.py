@@ -25,6 +25,12 @@ def test_steps_count_imports():
     assert steps_to("tolalloc.exceptions", frozenset({"tolalloc.cli.main"})) is None
 
 
+def test_a_command_leads_to_what_tells_of_its_answer_though_no_import_names_it():
+    assert (
+        steps_to("tests.studies.test_allocate_command", frozenset({"tolalloc.reports.tellers.allocation_drawing"})) == 3
+    )
+
+
 def test_a_public_name_leads_to_its_module():
     assert public_uses(ast.parse("import tolalloc as ta\nta.Study(ta.reducer('x'))")) == {
         "tolalloc.study.study",
