@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 
 import numba
 import numpy as np
@@ -30,6 +31,10 @@ def compiled(width, depth):
     return width - depth
 
 
+def only_by_place(width, depth, /):
+    return width - depth
+
+
 def only_by_name(*, width, depth):
     return width - depth
 
@@ -42,12 +47,17 @@ def only_by_name(*, width, depth):
         lambda width, shift=0.0, depth=3.0: width - depth + shift,
         lambda depth, width, *more: width - depth,
         compiled,
+        only_by_place,
     ],
-    ids=["other order", "same order", "default between", "more", "compiled"],
+    ids=["other order", "same order", "default between", "more", "compiled", "by place"],
 )
 @pytest.mark.parametrize("inputs", [{"depth": 5.0, "width": 10.0}, {"width": 10.0, "depth": 5.0}])
 def test_a_parameter_takes_the_input_of_its_name(function, inputs):
     assert at_nominal(function, inputs) == pytest.approx([5.0])
+
+
+def test_what_takes_its_values_by_name_goes_to_another_process():
+    assert pickle.loads(pickle.dumps(by_name(only_by_place, NAMES, "model m")))(5.0, 10.0) == 5.0
 
 
 def test_parameters_of_other_names_take_the_inputs_in_their_order():

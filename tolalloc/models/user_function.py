@@ -237,6 +237,12 @@ def _named_values(found: Any) -> dict[str, Any]:
     return own if all(isinstance(name, str) for name in own) else {}
 
 
+def _of_names(function: Callable[..., Any], names: tuple[str, ...], first: tuple[str, ...], *values: Any) -> Any:
+    """Return what a function says of values by name: in its own order where its first parameters are these names."""
+    given = dict(zip(names, values, strict=True))
+    return function(*map(given.__getitem__, first)) if {*first} == {*names} else function(**given)
+
+
 def by_name(function: Callable[..., Any], names: Sequence[str], place: str) -> Callable[..., Any]:
     """Return a function that takes values in the order of some names, and gives each to its parameter of that name.
 
@@ -258,7 +264,7 @@ def by_name(function: Callable[..., Any], names: Sequence[str], place: str) -> C
         return function
     needed = {own.name for own in known if own.default is own.empty and own.name in parameters}
     if {*spelled} <= {*parameters} and needed <= {*spelled} and len({*spelled}) == len(spelled):
-        return lambda *values: function(**dict(zip(spelled, values, strict=True)))
+        return partial(_of_names, function, tuple(spelled), tuple(parameters[: len(spelled)]))
     for at, (name, own) in enumerate(zip(names, spelled, strict=True)):
         if own in parameters and parameters.index(own) != at:
             raise InputError(
