@@ -271,8 +271,8 @@ LONGER = (
 )
 """Cases of the full gate."""
 
-PUSHED = ("catalogue", "own", "reducer_questions", "bench", "rv20e_allocation", "rv20e_diagnosis")
-"""Cases that every push runs, one at the least for each question that can be asked, and the main study."""
+PUSHED = ("catalogue", "own", "reducer_questions", "bench", "rv20e_allocation")
+"""Cases that every push runs, with one short diagnosis one at the least for each question, and the main study."""
 
 SHIPPED = "shipped_{}"
 """Name of the case of a shipped study, which is run quick."""

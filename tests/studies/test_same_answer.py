@@ -105,6 +105,7 @@ def test_identify_from_the_catalogue(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.push
 def test_diagnose(mine):
     lines = (mine / "unit7.csv").read_text(encoding="utf-8").splitlines()
     first = next(at for at, line in enumerate(lines) if line[:1].isdigit())
