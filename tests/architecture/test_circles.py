@@ -53,8 +53,9 @@ def walk(inside: set[str], edges: dict[str, set[str]]) -> list[str]:
 @pytest.fixture(scope="module")
 def edges() -> dict[str, set[str]]:
     files = {module_of(path): path for path in sorted(PACKAGE.rglob("*.py"))}
-    trees = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in files.items()}
-    return {name: imported(tree, set(files)) - {name} for name, tree in trees.items()}
+    return {
+        name: imported(ast.parse(path.read_text(encoding="utf-8")), set(files)) - {name} for name, path in files.items()
+    }
 
 
 def test_a_circle_is_found_as_a_closed_walk():

@@ -57,7 +57,7 @@ def imports(tree: ast.Module) -> set[str]:
         elif isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
             nodes += node.orelse
         else:
-            nodes += ast.iter_child_nodes(node)
+            nodes += (child for child in ast.iter_child_nodes(node) if not isinstance(child, ast.expr))
     return found
 
 

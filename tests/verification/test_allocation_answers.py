@@ -229,6 +229,7 @@ def region(scales, end=(1.0, 1.0, 1.0)):
     return UncertainRegion(name="x", ranges=(), ratios=np.array([end]), least_favourable=variant(scales))
 
 
+@pytest.mark.slow
 def test_a_zone_is_the_same_only_if_no_change_moves_it_by_more_than_a_tenth(allocation):
     free = PriceRange(low=0.5, high=np.inf)
     known = Robustness(

@@ -430,6 +430,7 @@ def sorted_gap(tmp_path_factory) -> tuple[AllocationResult, object]:
     return run.answers["allocation"].result, folder
 
 
+@pytest.mark.slow
 def test_the_cheapest_of_all_class_counts_is_drawn_and_keeps_its_yield(sorted_gap):
     result, _ = sorted_gap
     alone, two = result.assembled.choices
@@ -559,6 +560,7 @@ def test_the_shop_is_told_in_one_line_without_commas_what_to_do(compensator, sai
     assert any(column.startswith(head) or head in column for column in bins_table(result).frame("€").columns)
 
 
+@pytest.mark.slow
 def test_a_ranking_of_one_block_draws_its_index_within_what_is_possible(tmp_path):
     sorting = ta.Sorting("shaft", "hole", classes=4)
     study = gap_study(compensators=sorting, questions=[ta.Ranking()])

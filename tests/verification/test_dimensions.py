@@ -177,6 +177,7 @@ def test_a_dimension_says_what_a_micrometre_and_the_zones_of_all_its_places_do(r
     assert table["rank per µm [-]"][["signs", "pair"]].tolist() == [1, 2]
 
 
+@pytest.mark.slow
 def test_nothing_is_added_up_of_places_that_depend_on_each_other(ranked):
     tied = ranked.tables["dimensions"].set_index("dimension").loc["tied"]
     assert tied[["Sens [mm/µm]", "rms change by its zone [mm]", "rank per µm [-]"]].isna().all()

@@ -73,6 +73,7 @@ def folder(told, tmp_path_factory):
     return found
 
 
+@pytest.mark.slow
 def test_the_rows_add_up_to_the_cost_of_the_drawing(told, answer, folder):
     assert answer.met
     assert any("ground" in own.process for own in answer.drawn_sources)

@@ -236,6 +236,7 @@ def studied(tmp_path_factory):
     return ta.Study(model, ta.drawing(folder / "t.csv"), limits={"gap [mm]": ta.Limit(upper=0.02)})
 
 
+@pytest.mark.slow
 def test_allocation_says_what_few_parts_do_and_what_a_hundred_would(studied):
     answer = studied.allocate(effort="quick")
     said = " ".join(answer.sentences)

@@ -90,6 +90,7 @@ def gauged(column: GaugedColumn, share: float, rng: np.random.Generator) -> Gaug
     return replace(column, values=column.values + noise, error=GaugeError(deviation=spread))
 
 
+@pytest.mark.slow
 def test_lots_read_by_a_gauge_that_errs_have_no_more_alarms_and_a_shift_is_found():
     drawing = drawing_of(*({"id": f"s{at}", **ROW} for at in range(3)), *({"id": f"p{at}", **ROUND} for at in range(3)))
     lots, rng, alarms, named = Lots(12, LEVEL, 1), np.random.default_rng(21), 0, 0

@@ -39,6 +39,7 @@ def study(front=False) -> ta.Study:
     )
 
 
+@pytest.mark.slow
 def test_zones_do_not_grow_into_units_without_an_answer():
     found = study().allocate().result
     assert found.met
