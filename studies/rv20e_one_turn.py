@@ -127,8 +127,8 @@ def directions(model: EquivalentModel, unit: np.ndarray) -> Figure:
 def sources(model: EquivalentModel, unit: np.ndarray) -> Figure:
     """Draw what the sources add to the three strongest orders."""
     found = attribute(model, unit, TORQUE)
-    main = found.order[np.argsort(-found.amplitude)[:3]]
-    order = np.argsort(-np.abs(found.share[:, main - 1]).max(axis=1))[:14]
+    main = np.argsort(-found.amplitude)[:3]
+    order = np.argsort(-np.abs(found.share[:, main]).max(axis=1))[:14]
     return Figure(
         name="sources_of_orders",
         title="What each source adds to an order's amplitude; negative cancels",
@@ -136,10 +136,10 @@ def sources(model: EquivalentModel, unit: np.ndarray) -> Figure:
         y_label="",
         series=tuple(
             Series(
-                label=f"order {at}: {found.amplitude[at - 1] / ARCSECOND:.1f}″",
+                label=f"order {found.order[at]:g}: {found.amplitude[at] / ARCSECOND:.1f}″",
                 kind="bars",
                 x=[found.sources[source] for source in order],
-                y=list(found.share[order, at - 1] / ARCSECOND),
+                y=list(found.share[order, at] / ARCSECOND),
             )
             for at in main
         ),

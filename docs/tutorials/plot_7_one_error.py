@@ -19,7 +19,7 @@ import numpy as np
 import tolalloc as ta
 from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.equivalent.interfaces import pin_contact
-from tolalloc.reducers.equivalent.outputs import order_spectrum
+from tolalloc.reducers.equivalent.outputs import turn_orders
 from tolalloc.reducers.equivalent.springs import Positions
 from tolalloc.study.prepared import Prepared
 
@@ -94,15 +94,15 @@ for label, curve in curves.items():
 # The orders
 # ----------
 # The waves of the curve per output turn. A pitch deviation of the housing makes multiples of zc = 39; modified teeth
-# leave a little at eight times that.
+# leave a little at zp·zc = 1,560, for which 936 angles are too few: it would fold back onto 312.
 
 figure, (upper, lower) = plt.subplots(2, 1, figsize=(7, 6), constrained_layout=True)
 for label, curve in curves.items():
-    orders = order_spectrum(curve.transmission_error)
-    main = ", ".join(f"{order}: {amplitude / ARCSECOND:.2f}″" for order, amplitude, _ in orders.main(3))
+    orders = turn_orders(kernel.model, curve.errors, kernel.torque)
+    main = ", ".join(f"{order:g}: {amplitude / ARCSECOND:.2f}″" for order, amplitude, _ in orders.main(3))
     print(f"{label}: {main}")
     upper.plot(curve.carrier_angle / DEGREE, curve.transmission_error[0] / ARCSECOND, label=label)
-    lower.plot(orders.amplitude[0, :350] / ARCSECOND, label=label)
+    lower.plot(orders.order, orders.amplitude[0] / ARCSECOND, label=label)
 upper.set(xlabel="carrier angle [°]", ylabel="transmission error [arcsec]", xlim=(0, 45))
 lower.set(xlabel="order of the output turn", ylabel="amplitude [arcsec]")
 upper.legend(loc="upper right")

@@ -7,15 +7,29 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pandas as pd
 import pytest
 
+import tolalloc as ta
 from tests.builders import page_of, reducer_file, says, summary_of
 from tests.studies.command import ROOT, answer_of, refused, require_offline, tolalloc
 from tests.studies.scripts import study_script
+from tolalloc.bench.lot_orders import load_lot_curves
+from tolalloc.bench.posterior import Noise
+from tolalloc.bench.readings import clean_curve, load_readings, require_torque
 from tolalloc.drawings.table_file import DATA
 from tolalloc.drawings.tolerance_table import load_tolerance_table
+from tolalloc.exceptions import InputError
+from tolalloc.reducers.duty import duty_of
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.perfect import exact_unit
+from tolalloc.reducers.load_case import LoadCase
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reports.header import Header
+from tolalloc.reports.tellers.transmission_error import TransmissionErrorTeller
 
 STUDY = ROOT / "studies" / "liu2020_allocation.py"
 PEAK = "peak-to-peak transmission error [arcsec]"
@@ -80,8 +94,74 @@ def test_te_of_table_4(tmp_path):
     assert len(pd.read_csv(folder / "tables" / "one turn.csv")) > 20
     assert answer["peak_to_peak_arcsec"] == pytest.approx(96.58, abs=0.05)
     assert [wave["order"] for wave in answer["main_orders"]][:6] == [1, 78, 80, 79, 39, 2]
-    assert answer["torsional_stiffness_nm_per_arcmin"]["perfect_reducer"] == pytest.approx(2519, abs=1)
+    assert answer["angles"]["of_the_orders"] == 6552
     assert answer["statuses"]["equilibrium found"] == 936
+
+
+def test_the_curve_that_te_writes_is_read_by_diagnose_and_lot_as_it_stands(tmp_path):
+    model = EquivalentModel(load_reducer("rv40e_xi2015"))
+    found, path = model.equilibria(exact_unit(model), -1.0), tmp_path / "curve.csv"
+    TransmissionErrorTeller(SimpleNamespace(equilibria=found, torque=-1.0), Header(name="", model="")).add_files(
+        tmp_path
+    )
+    curve = clean_curve(load_readings(path, "angle", "transmission error"))
+    assert curve.repairs == ()
+    np.testing.assert_allclose(curve.along, found.carrier_angle, atol=1e-12)
+    shape = found.transmission_error[0] - found.transmission_error[0].mean()
+    np.testing.assert_allclose(curve.values, shape, atol=1e-15)
+    columns = pd.read_csv(path).to_dict("list")
+    assert json.loads((tmp_path / "curve.json").read_text()) == columns
+    require_torque(path, -1.0)
+    with pytest.raises(InputError, match=r"the mean of 'torque \[N·m\]' is -1\.0; allowed is -572 within 5%"):
+        require_torque(path, -572.0)
+    (tmp_path / "lot").mkdir()
+    for unit in range(5):
+        shutil.copy(path, tmp_path / "lot" / f"unit{unit}.csv")
+    drawing = ta.drawing("rv40e_drawing")
+    curves = load_lot_curves(
+        tmp_path / "lot", ta.reducer("rv40e_xi2015").bound(drawing.errors, ""), drawing.errors, Noise()
+    )
+    assert len(curves.orders) == 10
+    assert np.abs(curves.waves).max() < 1e-6  # 1,560 waves alone, of which 936 angles make 312
+    asked = {"curve": path, "reducer": "rv40e_xi2015", "tolerances": "rv40e_drawing", "torque": -572.0}
+    with pytest.raises(InputError, match="torque"):
+        ta.diagnose(**asked)
+
+
+@pytest.mark.slow
+def test_te_calls_exact_parts_one_thing_and_its_orders_what_they_are(tmp_path):
+    answer = ta.te(reducer="cd29", attributed=True)
+    found = answer.summary
+    assert {"curve.csv", "curve.json"} <= {path.name for path in answer.save(tmp_path / "te").iterdir()}
+    orders = [wave["order"] for wave in found["main_orders"]]
+    assert orders[:5] == [240, 480, 870, 720, 960] == found["attribution"]["orders"][:5]
+    assert says(answer.sentences, "transmission_error.strongest", orders="240 (1.49″), 480 (0.351″), 870 (0.276″)")
+    for key in ("lost_motion_arcmin", "backlash_arcmin", "torsional_stiffness_nm_per_arcmin"):
+        assert found[key]["this_unit"] == pytest.approx(found[key]["exact_parts"], rel=1e-12)
+    by_order = np.array([source["share_arcsec"] for source in found["attribution"]["sources"]]).sum(axis=0)
+    np.testing.assert_allclose(by_order, found["attribution"]["amplitude_arcsec"], atol=1e-9)
+    drawn = answer.figures["orders"].series[0]
+    assert set(orders) <= set(drawn.x)
+    assert list(drawn.x) == sorted(drawn.x)
+
+
+@pytest.mark.slow
+def test_efficiency_and_no_load_torque_are_one_number_each():
+    """By hand: 167/(167 + contacts) and 167/(167 + contacts + seals and grease); the duty cycle says the latter."""
+    answer = ta.te(reducer="rv20e")
+    friction = answer.summary["friction"]
+    contacts = sum(own["rated_nm"] for own in friction["by_contact"])
+    beside = friction["seals_nm"] + friction["grease_nm"]
+    assert friction["efficiency_at_rated_torque_percent"] == pytest.approx(100 * 167 / (167 + contacts))
+    overall = friction["overall_efficiency_at_rated_torque_percent"]
+    assert overall == pytest.approx(100 * 167 / (167 + contacts + beside))
+    idle = sum(own["no_load_nm"] for own in friction["by_contact"]) + beside
+    assert friction["no_load_torque_nm"] == pytest.approx(idle)
+    duty = duty_of(load_reducer("rv20e"), [LoadCase("rated", torque=-167.0, speed=15.0, disc_temperature=0.0)])
+    assert overall == pytest.approx(100 * duty.loads[0].efficiency, abs=0.02)
+    told = " ".join(answer.sentences)
+    assert f"{overall:.1f} %" in told
+    assert not any("friction torque" in own for own in answer.tables["one turn"]["quantity"])
 
 
 @pytest.mark.slow
@@ -291,7 +371,7 @@ def test_every_preset_turns(reducer):
     answer = answer_of("te", "--reducer", reducer, "--attribute")
     assert answer["statuses"]["equilibrium found"] == 936
     assert 0 < answer["peak_to_peak_arcsec"] < 5  # no errors: the modification and the elastic twist alone
-    assert answer["backlash_arcmin"]["this_unit"] > 10 * answer["backlash_arcmin"]["perfect_reducer"]
+    assert answer["backlash_arcmin"]["this_unit"] == answer["backlash_arcmin"]["exact_parts"] > 0
     shares = sum(abs(source["share_arcsec"][0]) for source in answer["attribution"]["sources"])
     assert shares >= answer["attribution"]["amplitude_arcsec"][0] > 0
 

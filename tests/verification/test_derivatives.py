@@ -63,7 +63,7 @@ def test_rotation_derivatives_of_any_reducer_agree_with_differences(seed):
     case, generator = random_case(seed), np.random.default_rng(seed)
     model = EquivalentModel(case.reducer, AngleSearch(coarse=4, nodes_per_coarse=1), orders=case.orders)
     errors = np.array([[case.units[0][name] for name in model.columns]])
-    rotation, derivatives = model.rotation_derivatives(errors, case.torque)
+    rotation, derivatives = model.rotation_derivatives(errors, case.torque, np.pi / 2 * np.arange(4))
     assert rotation[0, 0] == pytest.approx(rotation_at_first_angle(case, errors, case.torque), rel=1e-9, abs=1e-12)
     assert derivatives.status[0] == Status.CONVERGED
     direction = generator.normal(size=errors.shape) * np.where([is_angle(name) for name in model.columns], 2e-10, 2e-11)

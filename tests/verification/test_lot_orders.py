@@ -36,6 +36,7 @@ def curves_at(torque: float | None) -> LotCurves:
     return LotCurves(
         model=model,
         errors=drawing.errors,
+        orders=tuple(model.spectra),
         waves=np.zeros((UNITS, len(model.spectra)), complex),
         noise=np.full(UNITS, NOISE),
         discrepancy=Noise(),
@@ -80,9 +81,14 @@ def standing_in() -> LotCurves:
         return Evaluation(values=np.hstack([2.0 * a + b, b]), status=np.zeros(len(x), np.uint8))
 
     spectra = {2: ("c2", "s2"), 5: ("c5", "s5")}
-    model = SimpleNamespace(spectra=spectra, reading=lambda outputs: response, kernel=SimpleNamespace(torque=-10.0))
+    model = SimpleNamespace(
+        spectra=spectra,
+        reading=lambda outputs: response,
+        kernel=SimpleNamespace(torque=-10.0),
+        reducer=SimpleNamespace(resolves=lambda order, angles: (order, angles) != (5, 96)),
+    )
     waves, noise = np.zeros((UNITS, 2), complex), np.full(UNITS, NOISE)
-    return LotCurves(model=model, errors=errors, waves=waves, noise=noise, discrepancy=Noise())
+    return LotCurves(model=model, errors=errors, orders=(2, 5), waves=waves, noise=noise, discrepancy=Noise())
 
 
 def test_with_sources_tells_the_sources_of_a_moved_order_alone():
@@ -127,6 +133,14 @@ def test_load_lot_curves_reads_waves_and_the_noise_of_their_readings(tmp_path):
     assert np.abs(curves.waves) == pytest.approx(np.array([[5.0, 0.0]] * 5), abs=1e-5)
     assert curves.waves[0, 0] == pytest.approx(3.0 - 4.0j, abs=1e-5)
     assert curves.noise == pytest.approx(0.5 * np.sqrt(2.0 / 90))
+
+
+def test_orders_that_the_readings_do_not_hold_are_not_told(tmp_path):
+    stand = standing_in()
+    curves = load_lot_curves(write_curves(tmp_path / "curves", readings=96), stand.model, stand.errors, Noise())
+    assert curves.orders == (2,)
+    assert curves.waves.shape == (5, 1)
+    assert curves.made(np.ones((1, 2))).shape == (1, 1)
 
 
 @pytest.mark.parametrize(

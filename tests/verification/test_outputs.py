@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import cos
 
 import numpy as np
 import pytest
 
-from tests.builders import unit_with
+from tests.builders import reducer_file, unit_with
 from tests.random_cases import random_case, seeds
 from tests.verification.dense_twin import dense_equilibrium
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.condensation import spring_groups
 from tolalloc.reducers.equivalent.hysteresis import BACKLASH, DRAWN, both_directions, hysteresis_loop
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import Solved, attribute, forces, load_share, order_spectrum, outputs_of
+from tolalloc.reducers.equivalent.outputs import (
+    Solved,
+    attribute,
+    fitted_waves,
+    forces,
+    load_share,
+    order_spectrum,
+    outputs_of,
+    turn_orders,
+)
+from tolalloc.reducers.equivalent.perfect import exact_unit
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
 from tolalloc.reducers.equivalent.springs import Coordinates
 from tolalloc.reducers.reducer.design import Clearances
@@ -123,3 +134,122 @@ def test_what_is_not_proportional_is_listed_by_itself(rv20e, table4):
     np.testing.assert_allclose(attribution.contribution.sum(axis=0), whole, rtol=0, atol=1e-6 * ARCSECOND)
     curvature = attribution.contribution[attribution.sources.index("curvature of the contact law")]
     assert 0 < np.abs(curvature).max() < 0.2 * np.abs(whole).max()
+
+
+def amplitudes(model: EquivalentModel, orders, angles: int) -> np.ndarray:
+    """Return amplitudes of an exact unit's orders by Fourier's sum over another number of angles [arcsec]."""
+    turn = 2 * np.pi * np.arange(angles) / angles
+    curve = model.equilibria(exact_unit(model), -1.0, turn).transmission_error[0] / ARCSECOND
+    return np.abs(np.exp(-1j * np.outer(orders, turn)) @ curve * 2 / angles)
+
+
+def named(model: EquivalentModel, errors: np.ndarray, angles: int | None = None) -> dict[float, float]:
+    """Return the main orders with their amplitudes [arcsec]."""
+    return {order: size / ARCSECOND for order, size, _ in turn_orders(model, errors, -1.0, angles).main(8)}
+
+
+def test_orders_of_a_single_stage_are_those_of_its_pins_and_output_pins():
+    """8 output pins meet 30 pins 240 times, 29 teeth 870 times: all else are sums of both, multiples of 30."""
+    model = EquivalentModel(load_reducer("cd29"))
+    found = named(model, exact_unit(model))
+    assert list(found)[:5] == [240, 480, 870, 720, 960]
+    assert list(found.values())[:2] == pytest.approx([1.485, 0.351], abs=5e-4)
+    assert [found[720], found[960]] == pytest.approx([0.127, 0.050], abs=5e-4)
+    assert not any(order % 30 for order in found)
+    np.testing.assert_allclose(amplitudes(model, list(found), 5003)[:5], list(found.values())[:5], rtol=0.03)
+
+
+@pytest.mark.parametrize("preset", ["rv20e", "rv40e_xi2015", pytest.param("rv80e", marks=pytest.mark.slow)])
+def test_exact_rv_reducers_make_no_order_below_that_of_pins_and_teeth(preset):
+    """At 936 angles 1,560 folds back onto 312 = 2·936 − 1,560, 4,680 at 6,552 angles onto 1,872."""
+    model = EquivalentModel(load_reducer(preset))
+    assert list(named(model, exact_unit(model))) == [1560]
+    coarse = turn_orders(model, exact_unit(model), -1.0, 936)
+    assert coarse.main(8) == []
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        (("count = 8", "count = 7"), (870, 420)),
+        (("count = 8", "count = 9"), (870, 540)),
+        (("disc_count = 2", "disc_count = 1"), (870, 240)),
+        (("disc_count = 2", "disc_count = 3"), (870, 720)),
+    ],
+)
+def test_every_order_of_exact_parts_is_made_of_what_their_contacts_make(tmp_path, line, expected):
+    design = load_reducer(reducer_file(tmp_path / "own.reducer.toml", "cd29", line))
+    assert design.contact_orders == expected
+    model = EquivalentModel(design)
+    found = named(model, exact_unit(model))
+    assert found
+    assert not any(order % np.gcd(*expected) for order in found)
+
+
+@pytest.mark.parametrize("angles", [936, pytest.param(None, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("column", "error", "order"),
+    [
+        ("pinion.eccentricity.x", 10e-6, 2085 / 19),
+        ("centre.eccentricity.y", 10e-6, 695 / 19),
+        ("sun.pitch.cos2", 5e-6, 2 * 676 / 19),
+    ],
+)
+def test_errors_of_gears_that_one_turn_cuts_are_one_wave_of_the_size_that_the_lever_says(column, error, order, angles):
+    """10 µm of the pinion turn the output by E/(r_b4·i), 5 µm of the sun's second pitch wave by A/(r_1·i)."""
+    design = load_reducer("rv27c")
+    model = EquivalentModel(design)
+    pitch_radius = design.sun_base_radius / cos(design.gears.pressure_angle)
+    radius = pitch_radius if column.startswith("sun") else design.centre_pair.base_radius
+    size = error / (radius * design.sun_ratio) / ARCSECOND
+    (first, amplitude), *others = named(
+        model, exact_unit(model) + error * (np.array(model.columns) == column), angles
+    ).items()
+    assert first == pytest.approx(order, abs=1e-12)
+    assert amplitude == pytest.approx(size, rel=1e-3)
+    assert size == pytest.approx(1.3335, abs=5e-4) or column.startswith("sun")
+    assert [other for other, _ in others] == ([] if angles else [2652])  # 52 pins, 51 teeth
+
+
+def test_what_a_source_adds_to_an_order_of_an_open_turn_is_all_of_it():
+    model = EquivalentModel(load_reducer("rv27c"))
+    errors = exact_unit(model) + 10e-6 * (np.array(model.columns) == "pinion.eccentricity.x")
+    orders = turn_orders(model, errors, -1.0, 936)
+    found = attribute(model, errors, -1.0, orders)
+    at = int(np.argmax(found.amplitude))
+    assert found.order[at] == pytest.approx(109.737, abs=5e-4)
+    assert found.share[found.sources.index("pinion.eccentricity"), at] == pytest.approx(found.amplitude[at], rel=1e-3)
+
+
+@pytest.mark.parametrize("orders", [(1.0, 2.0, 39.0), (35.579, 36.579, 109.737), (3.5, 4.0)])
+def test_fitted_waves_are_those_that_made_the_curve(orders, generator):
+    angle = np.sort(generator.uniform(0.0, 2 * np.pi, 700))
+    waves = generator.normal(size=(2, len(orders))) + 1j * generator.normal(size=(2, len(orders)))
+    curve = 7.0 + np.real(waves @ np.exp(1j * np.outer(orders, angle)))
+    np.testing.assert_allclose(fitted_waves(angle, curve, np.array(orders)), waves, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("preset", "order", "angles", "held"),
+    [
+        ("rv20e", 312, 936, False),  # 2·936 − 1,560
+        ("rv20e", 120, 720, False),  # 1,560 − 2·720
+        ("rv20e", 120, 936, True),
+        ("rv20e", 500, 936, False),  # beyond a half
+        ("rv27c", 156, 936, False),  # 3·936 − 2,652
+        ("cd29", 66, 936, False),  # 936 − 870
+        ("cd29", 24, 936, False),  # 4·240 − 936
+        ("cd29", 870, 3744, True),
+    ],
+)
+def test_angles_hold_orders_onto_which_no_contact_folds(preset, order, angles, held):
+    assert load_reducer(preset).resolves(order, angles) == held
+
+
+def test_pins_in_contact_are_counted_disc_by_disc(rv20e, table4):
+    solved = Solved.of(rv20e.equilibria(table4, -167.0))
+    found = {name: value(solved)[0] for name, (_, value) in outputs_of(rv20e.reducer).items()}
+    assert found["pins in contact on a disc, most"] <= rv20e.reducer.cycloid_stage.pin_count
+    both = solved.equilibria.pins_in_contact[0]
+    assert found["pins in contact on a disc, least"] <= both.min() / 2
+    assert both.max() / 2 <= found["pins in contact on a disc, most"] < both.max()

@@ -134,6 +134,34 @@ def test_waves_and_stand_ins(model):
     assert len(names) == 3
 
 
+def test_waves_of_an_open_turn_are_those_of_its_gears_and_none_that_the_contact_folds_onto():
+    """2,652 = 52·51 waves of exact parts fold onto 156 at 936 angles; 10 µm of the pinion are one wave of 1.3335″."""
+    model = ta.reducer("rv27c").bound(ta.drawing("rv27c_drawing").errors, "test")
+    assert {35.579, 36.579, 71.158, 109.737} == {order for order in model.spectra if order % 1}
+    assert 156 not in model.spectra
+    assert {1, 2, 51, 52, 153, 204, 208} <= {*model.spectra}
+    x = np.zeros((2, len(model.columns)))
+    x[1, model.columns.index("pinion.eccentricity.x")] = 10e-6
+    found = model.reading(tuple(name for pair in model.spectra.values() for name in pair))(x).values
+    added = np.linalg.norm((found[1] - found[0]).reshape(-1, 2), axis=1)
+    by_order = dict(zip(model.spectra, added, strict=True))
+    assert by_order.pop(109.737) == pytest.approx(1.3335, rel=2e-3)
+    assert max(by_order.values()) < 2e-3  # whole orders of a turn that is cut would have up to 0.06″ of it
+
+
+@pytest.mark.parametrize(
+    ("reducer", "column", "shown", "folded"),
+    [("cd29", "", {}, (24, 66)), ("rv27c", "pinion.eccentricity.x", {109.737: 1.3335}, (108, 109, 110, 111))],
+)
+def test_the_picture_of_orders_shows_none_that_others_fold_onto(reducer, column, shown, folded):
+    model = ta.reducer(reducer).bound(ta.drawing(f"{reducer}_drawing").errors, "test")
+    x = 10e-6 * (np.array(model.columns) == column)
+    _, figure = portrait_of(model).pictured({"unit": (np.array([own.value for own in model.settings]), x)})
+    found = dict(zip(figure.series[0].x, figure.series[0].y, strict=True))
+    assert {order: size for order, size in found.items() if size > 1e-3} == pytest.approx(shown, rel=1e-3)
+    assert not any(found[order] for order in folded)
+
+
 def test_crowning_is_part_of_what_tells_a_study_from_another(model):
     def content(crowning):
         reducer = replace(model.reducer, cycloid_stage=replace(model.reducer.cycloid_stage, crowning=crowning))

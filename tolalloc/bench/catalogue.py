@@ -59,7 +59,7 @@ class CatalogueResult:
 
     @cached_property
     def loops(self) -> tuple[HysteresisLoop, HysteresisLoop]:
-        """Hysteresis of the reducer without errors, before and after."""
+        """Hysteresis of exact parts, before and after."""
         return exact_loop(self.before), exact_loop(self.after)
 
     @property

@@ -20,7 +20,7 @@ from tolalloc.bench.posterior import (
     posterior,
     thinned,
 )
-from tolalloc.bench.readings import ANGLE, TRANSMISSION_ERROR, clean_curve, load_readings
+from tolalloc.bench.readings import ANGLE, TRANSMISSION_ERROR, clean_curve, load_readings, require_torque
 from tolalloc.bench.repair import Advice, Repair, advised
 from tolalloc.bench.sources import (
     InseparableColumns,
@@ -280,6 +280,7 @@ def diagnose_unit(request: DiagnosisRequest, record: RunRecord) -> DiagnosisResu
         Too many curves failed.
     """
     kernel, assumed = bind(request.reducer, request.errors, request.torque_nm, PLACE)
+    require_torque(request.curve, kernel.torque)
     cleaned = clean_curve(load_readings(request.curve, ANGLE, TRANSMISSION_ERROR), request.angle_offset_deg * DEGREE)
     kernel, errors = replace(kernel, observe=record.observe), request.errors
     curve = MeasuredCurve(

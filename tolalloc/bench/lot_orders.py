@@ -13,21 +13,19 @@ from jaxtyping import Complex, Float
 from tolalloc.bench.posterior import Noise
 from tolalloc.bench.readings import (
     ANGLE,
-    TORQUE,
     TRANSMISSION_ERROR,
     TURN,
     Cleaned,
     clean_curve,
     load_readings,
-    read_column,
+    require_torque,
 )
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.heads import split_header
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.table_file import read_text_table
 from tolalloc.exceptions import Faults, InputError, SolveError
 from tolalloc.reading.units import ARCSECOND, DEGREE
+from tolalloc.reducers.equivalent.outputs import fitted_waves
 from tolalloc.reducers.model import ReducerModel
 from tolalloc.running.progress import RunRecord
 
@@ -43,15 +41,13 @@ _ENDS = (0.05, 0.95)
 """Shares of lots below the ends of a predicted range [-]."""
 _PER_WAVE = 3
 """Fewest readings along a wave of the highest order [-]."""
-_OTHER_TORQUE = 0.05
-"""Difference of a curve's torque from the stated one that is believed to be the brake's [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LotOrder:
     """What the curves of a lot show of one order of the output turn."""
 
-    order: int  # Waves per output turn [-]
+    order: float  # Waves per output turn [-]
     amplitude: float  # Root mean square over the units [arcsec]
     predicted: tuple[float, float]  # Where it lies in 90 % of lots of the drawing [arcsec]
     probability: float  # Of a mean square as far out if the units are the drawing's [-]
@@ -67,6 +63,7 @@ class LotCurves:
 
     model: ReducerModel  # At the sources of the drawing and the torque of the curves
     errors: ErrorModel  # What the drawing says of the parts
+    orders: tuple[float, ...]  # Those of the model's spectra that all readings hold [-]
     waves: Complex[np.ndarray, "unit order"]  # Cosine less i times sine amplitudes [arcsec]
     noise: Float[np.ndarray, " unit"]  # Standard deviation of cosine and sine by the readings [arcsec]
     discrepancy: Noise  # What the model leaves out
@@ -76,14 +73,9 @@ class LotCurves:
         """Return the same with a model whose units a record counts."""
         return replace(self, model=replace(self.model, kernel=replace(self.model.kernel, observe=record.observe)))
 
-    @property
-    def orders(self) -> tuple[int, ...]:
-        """The orders that the reducer's model makes [-]."""
-        return tuple(self.model.spectra)
-
     def made(self, x: Float[np.ndarray, "sample column"]) -> Complex[np.ndarray, "sample order"]:
         """Return the waves of units of the model, NaN where one failed [arcsec]."""
-        found = self.model.reading(tuple(name for pair in self.model.spectra.values() for name in pair))(x)
+        found = self.model.reading(tuple(name for own in self.orders for name in self.model.spectra[own]))(x)
         cosine, sine = found.values.reshape(len(x), -1, 2).transpose(2, 0, 1)
         return np.where((found.status == 0)[:, np.newaxis], cosine - 1j * sine, np.nan)
 
@@ -97,7 +89,7 @@ class LotCurves:
 class PredictedOrder:
     """What lots of the drawing do in one order: their mean squares, ascending [arcsec²]."""
 
-    order: int  # [-]
+    order: float  # [-]
     exact: Float[np.ndarray, " lot"]  # As if the bench did not err and the model left nothing out
     read: Float[np.ndarray, " lot"]  # With noise and discrepancy as they are stated
 
@@ -133,40 +125,30 @@ def load_lot_curves(folder: Path, model: ReducerModel, errors: ErrorModel, noise
     least, most = CURVES
     if not least <= len(files) <= most:
         raise InputError.at(folder, "the number of curves", len(files), f"a folder of {least} to {most} CSV files")
-    faults, orders, repairs = Faults(), np.array([*model.spectra]), list[str]()
-    waves, deviations = list[np.ndarray](), list[float]()
+    faults, curves, repairs, deviations = Faults(), list[Cleaned](), list[str](), list[float]()
     for file in files:
         with faults.kept():
-            _require_torque(file, model.kernel.torque)
+            require_torque(file, model.kernel.torque)
             curve = clean_curve(load_readings(file, ANGLE, TRANSMISSION_ERROR))
-            _require_close(file, curve, int(orders.max()))
-            waves.append(_waves(curve, orders))
+            _require_close(file, curve, max(model.spectra))
+            curves.append(curve)
             deviations.append(noise.reading * curve.noise_factor * sqrt(2.0 / curve.along.size) / ARCSECOND)
             repairs += [f"{file.name}: {own}" for own in curve.repairs]
     faults.require_none()
+    orders = [own for own in model.spectra if all(model.reducer.resolves(own, one.along.size) for one in curves)]
+    waves = [fitted_waves(own.along, own.values[np.newaxis], np.array(orders))[0] for own in curves]
     return LotCurves(
         model=model,
         errors=errors,
-        waves=np.array(waves),
+        orders=tuple(orders),
+        waves=np.array(waves) / ARCSECOND,
         noise=np.array(deviations),
         discrepancy=noise,
         repairs=tuple(repairs),
     )
 
 
-def _require_torque(file: Path, torque: float) -> None:
-    """Raise if a column of the file says that another torque was on the carrier."""
-    table = read_text_table(file)
-    if not any(split_header(header)[0].lower() == TORQUE for header in table.headers):
-        return
-    header, _, values = read_column(table, TORQUE)
-    taken = values[np.isfinite(values)]
-    if taken.size and abs(taken.mean() - torque) > _OTHER_TORQUE * abs(torque):
-        allowed = f"{torque:g} within {_OTHER_TORQUE:.0%}, the torque of the prediction"
-        raise InputError.at(file, f"the mean of {header!r}", float(f"{taken.mean():.4g}"), allowed)
-
-
-def _require_close(file: Path, curve: Cleaned, highest: int) -> None:
+def _require_close(file: Path, curve: Cleaned, highest: float) -> None:
     """Raise unless the readings tell the highest order all round the turn."""
     readings, angle, fewest = curve.along.size, np.sort(np.mod(curve.along, TURN)), _PER_WAVE * highest
     if readings < fewest:
@@ -176,14 +158,6 @@ def _require_close(file: Path, curve: Cleaned, highest: int) -> None:
     if widest > 360.0 / highest:
         allowed = f"up to {360.0 / highest:.3g} deg, a wave of order {highest}, all round the turn"
         raise InputError.at(file, "the widest gap between its angles", f"{widest:.3g} deg", allowed)
-
-
-def _waves(curve: Cleaned, orders: np.ndarray) -> Complex[np.ndarray, " order"]:
-    """Return cosine less i times sine amplitudes by least squares, Fourier's where angles are equally spaced."""
-    turn = np.exp(1j * np.outer(curve.along, orders))
-    basis = np.hstack([np.ones((curve.along.size, 1)), turn.real, turn.imag])
-    found = np.linalg.lstsq(basis, curve.values, rcond=None)[0] / ARCSECOND
-    return np.asarray(found[1 : orders.size + 1] - 1j * found[orders.size + 1 :])
 
 
 def predicted_orders(curves: LotCurves, lots: int, seed: int) -> tuple[PredictedOrder, ...]:
@@ -222,7 +196,7 @@ def predicted_orders(curves: LotCurves, lots: int, seed: int) -> tuple[Predicted
     return tuple(found)
 
 
-def left_out_of(order: int, noise: Noise) -> float:
+def left_out_of(order: float, noise: Noise) -> float:
     """Return the standard deviation of cosine and sine of what the model leaves out of an order [arcsec].
 
     √(√(2/π)·a)·s·exp(−(k·a)²/4) at the standard deviation s and the correlation angle a: the variance of a wave is

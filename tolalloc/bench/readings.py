@@ -155,6 +155,18 @@ def load_readings(path: Path, along: str, values: str) -> RawReadings:
     )
 
 
+def require_torque(file: Path, torque: float) -> None:
+    """Raise if a column of the file says that another torque was on the carrier; 5 % are believed to be the brake's."""
+    table = read_text_table(file)
+    if not any(split_header(header)[0].lower() == TORQUE for header in table.headers):
+        return
+    header, _, values = read_column(table, TORQUE)
+    taken = values[np.isfinite(values)]
+    if taken.size and abs(taken.mean() - torque) > 0.05 * abs(torque):
+        allowed = f"{torque:g} within 5%, the torque of the prediction"
+        raise InputError.at(file, f"the mean of {header!r}", float(f"{taken.mean():.4g}"), allowed)
+
+
 def counted(number: int, what: str) -> str:
     """Return a number and a noun in singular or plural."""
     return f"{number} {what}" if number == 1 else f"{number} {what}s"

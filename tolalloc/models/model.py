@@ -223,7 +223,7 @@ class Model(ABC):
         return {}
 
     @property
-    def spectra(self) -> Mapping[int, tuple[str, str]]:
+    def spectra(self) -> Mapping[float, tuple[str, str]]:
         """Order → names of the outputs that hold its cosine and sine, for models with a periodic curve.
 
         `reading` knows them beside `outputs`.

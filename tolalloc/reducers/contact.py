@@ -1,4 +1,4 @@
-"""What the modified teeth do without errors: clearance, and how they carry a torque by every method."""
+"""What the modified teeth of exact parts do: clearance, and how they carry a torque by every method."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tolalloc.reducers.reducer.design import Reducer
 
 @dataclass(frozen=True, kw_only=True)
 class YieldingContact:
-    """The reducer without errors, its bearings yielding, over one pin pitch."""
+    """Exact parts, their bearings yielding, over one pin pitch."""
 
     pins_in_contact: tuple[int, int]  # Fewest and most on a disc [-]
     largest_force: float  # Of a pin [N]

@@ -35,7 +35,7 @@ _SETTLED, _STEPS = 1e-3, 200
 
 @dataclass(frozen=True, kw_only=True)
 class CaseLoads:
-    """What one load case does to the reducer without part errors, its modification in force."""
+    """What one load case does to exact parts."""
 
     case: LoadCase
     share: float  # Of the time, of all load cases 1 [-]
@@ -53,7 +53,7 @@ class CaseLoads:
 
     @property
     def efficiency(self) -> float:
-        """η = T/(T + T_f) of a reducer that drives its load [-]."""
+        """Overall η = T/(T + T_f), seals and grease included, of a reducer that drives its load [-]."""
         torque = abs(self.case.torque or 0.0)
         return torque / (torque + self.friction_torque)
 
@@ -131,7 +131,7 @@ def require_cycle(cases: Sequence[LoadCase], reducer: Reducer) -> None:
 
 
 def duty_of(reducer: Reducer, cases: Sequence[LoadCase], resistance: float | None = None) -> DutyResult:
-    """Return what a duty cycle does to a reducer without part errors.
+    """Return what a duty cycle does to exact parts.
 
     The discs are as warm above the ring as the mean loss makes them, one node with one resistance; a load case that
     states a temperature has its own.

@@ -447,11 +447,16 @@ class ReducerModel(Model):
         return replace(self, kernel=kernel).reading(outputs)
 
     @cached_property
-    def spectra(self) -> Mapping[int, tuple[str, str]]:
-        """Waves of the output turn: orders 1 and 2, and the multiples of teeth and pins."""
-        stage = self.reducer.cycloid_stage
+    def spectra(self) -> Mapping[float, tuple[str, str]]:
+        """Waves of the output turn that the curves' angles hold: 1, 2, multiples of teeth and pins, those of gears."""
+        stage, angles = self.reducer.cycloid_stage, self.kernel.model.search.coarse
         multiples = {number * own for number in range(1, _MULTIPLES + 1) for own in (stage.disc_teeth, stage.pin_count)}
-        return {order: wave_outputs(order) for order in sorted({1, 2, *multiples})}
+        # One turn does not part waves that lie closer than a quarter of one.
+        gears = {
+            round(own, 3) for own in self.reducer.open_orders if min(abs(own - whole) for whole in multiples) > 0.25
+        }
+        own = sorted({1, 2, *multiples, *gears})
+        return {order: wave_outputs(order) for order in own if self.reducer.resolves(order, angles)}
 
     def stand_ins(self) -> tuple[Any, ...]:
         """Return the contact at fewer angles and, for few columns, a regression of the curve."""
@@ -477,7 +482,7 @@ class ReducerModel(Model):
 
     @cached_property
     def rated_pin_force(self) -> float:
-        """Largest pin force of the perfect reducer with the modification in force under its rated torque [N]."""
+        """Largest pin force of exact parts with the modification in force under their rated torque [N]."""
         return rated_pin_force(self.reducer_in_force)
 
     def examined(self, x: Float[np.ndarray, "sample column"]) -> Mapping[str, float]:

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from functools import cached_property, lru_cache
-from math import lcm, pi
+from math import pi
 from typing import Any
 
 import numpy as np
@@ -351,7 +350,7 @@ def scene_of(
         turns=turns,
         start=start,
         coordinates=_coordinates(reducer),
-        output_turns=_output_turns(reducer),
+        output_turns=reducer.closing_turns,
         carrier_angle=turn.carrier_angle,
         forward=forward,
         backward=backward,
@@ -360,16 +359,6 @@ def scene_of(
         magnification=_magnification(reducer, forward, backward),
         assumptions=assumptions,
     )
-
-
-def _output_turns(reducer: Reducer) -> int:
-    """Return after how many turns of the output everything is where it was [-]."""
-    if reducer.first_stage is None:
-        return 1
-    gears, centre = reducer.first_stage, reducer.centre_gear
-    turns = Fraction(gears.planet_teeth * reducer.cycloid_stage.pin_count, gears.sun_teeth)
-    pinion = (1 + turns) * Fraction(centre.teeth, centre.pinion_teeth) if centre else turns
-    return lcm(turns.denominator, pinion.denominator)
 
 
 def _as_modified(reducer: Reducer, own: Mapping[str, float]) -> Reducer:

@@ -21,7 +21,7 @@ from tolalloc.reducers.equivalent.hysteresis import (
     own_load_loop,
 )
 from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel, Extremes, Status, count_statuses
-from tolalloc.reducers.equivalent.outputs import Attribution, Orders, Solved, attribute, order_spectrum
+from tolalloc.reducers.equivalent.outputs import Attribution, Orders, Solved, attribute, turn_orders
 from tolalloc.reducers.equivalent.perfect import Preload, exact_unit, preload, rated_pin_force
 from tolalloc.reducers.equivalent.springs import HARMONICS
 from tolalloc.reducers.reducer.design import Reducer, at_torque
@@ -38,19 +38,14 @@ class TransmissionErrorResult:
     equilibria: Equilibria  # At equally spaced angles of one output turn
     extremes: Extremes  # Largest and smallest transmission error, refined
     preload: Preload  # What presses in this unit without torque
-    rated_pin_force: float  # Largest force of a pin of the perfect reducer under its rated torque [N]
-    loop: HysteresisLoop  # Hysteresis loop of this unit, of the perfect reducer, and of exact parts as modified
+    rated_pin_force: float  # Largest force of a pin of exact parts under their rated torque [N]
+    loop: HysteresisLoop  # Hysteresis loop of this unit and of exact parts
     # This unit's loop with every bearing under its own load; none where no bearing is given by its dimensions
     own_loads: HysteresisLoop | None
     friction: FrictionLoop | None  # This unit's with friction; none where the reducer's file does not say enough for it
     reversed_by: Float[np.ndarray, " angle"]  # What reversing the rotation adds to the curve [rad]
     attribution: Attribution | None  # Which source makes how much; none unless asked for
-    equally_spaced: int  # Equally spaced angles of the search [-]
-
-    @cached_property
-    def orders(self) -> Orders:
-        """Orders of the transmission error."""
-        return order_spectrum(self.equilibria.transmission_error)
+    orders: Orders  # Those of the transmission error that the train makes
 
     @cached_property
     def solved(self) -> Solved:
@@ -103,7 +98,9 @@ def transmission_error(
     model = EquivalentModel(at_torque(reducer, torque), orders=unit.orders or HARMONICS)
     errors = unit.errors(model.columns, reducer.modification.deviations)
     equilibria, extremes = model.equilibria(errors, torque), model.exact_extremes(errors, torque)
-    worst = Status(max(extremes.status[0], equilibria.status.max()))
+    worst, orders = Status(max(extremes.status[0], equilibria.status.max())), turn_orders(model, errors, torque)
+    if worst is Status.CONVERGED and np.isnan(orders.amplitude).any():
+        worst = Status.NOT_CONVERGED
     if worst is not Status.CONVERGED:
         raise SolveError(f"unit {unit.name}: no transmission error can be given, at some angle: {worst.sentence}.")
     forward, backward = both_directions(model, errors, torque)
@@ -120,16 +117,14 @@ def transmission_error(
         own_loads=own_load_loop(model, errors, TURN_ANGLES, (LOST_MOTION, 1.0)) if reducer.parts else None,
         friction=None if reducer.friction_dimensions.unknown else friction_loop(model, errors, TURN_ANGLES),
         reversed_by=(backward - forward)[0],
-        attribution=attribute(model, errors, torque) if attributed else None,
-        equally_spaced=model.search.coarse,
+        attribution=attribute(model, errors, torque, orders) if attributed else None,
+        orders=orders,
     )
 
 
 def _loops(model: EquivalentModel, drawn: EquivalentModel, errors: Float[np.ndarray, "1 column"]) -> HysteresisLoop:
-    """Return the loops of a unit, of the perfect reducer, and of exact parts as they are drawn."""
-    perfect, exact = np.zeros_like(errors), exact_unit(model)
-    if model.reducer.form is None:
-        return hysteresis_loop(model, np.concatenate([errors, perfect, exact]), LOOP_ANGLES)
-    each = ((model, errors), (model.with_form(None), perfect), (drawn, exact))
-    own = [hysteresis_loop(one, row, LOOP_ANGLES) for one, row in each]
+    """Return the loops of a unit and of exact parts."""
+    if drawn is model:
+        return hysteresis_loop(model, np.concatenate([errors, exact_unit(model)]), LOOP_ANGLES)
+    own = [hysteresis_loop(one, row, LOOP_ANGLES) for one, row in ((model, errors), (drawn, exact_unit(model)))]
     return HysteresisLoop(torque=own[0].torque, twist=np.concatenate([loop.twist for loop in own]))

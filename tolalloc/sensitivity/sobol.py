@@ -219,7 +219,7 @@ def _overall_ranking(
 class OrderContribution:
     """Generalised Sobol indices of the wave of every order."""
 
-    orders: tuple[int, ...]  # Orders of the output turn [-]
+    orders: tuple[float, ...]  # Orders of the output turn [-]
     sources: tuple[str, ...]  # Names, in the order of all arrays
     # Share of the wave's variance that a source gives alone, and in which it takes part; NaN for a wave that does not
     # vary [-]
@@ -242,7 +242,7 @@ class OrderContribution:
         return np.stack([percentile_interval(own) for own in self.total_resamples])
 
 
-def order_contribution(analysis: SobolAnalysis, waves: Mapping[int, tuple[str | int, str | int]]) -> OrderContribution:
+def order_contribution(analysis: SobolAnalysis, waves: Mapping[float, Sequence[str | int]]) -> OrderContribution:
     """Return what each source adds to the wave of each order, from the samples of an analysis.
 
     Parameters

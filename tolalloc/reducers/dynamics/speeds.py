@@ -14,7 +14,7 @@ from tolalloc.reducers.dynamics.simulation import simulate
 from tolalloc.reducers.equivalent.condensation import bilateral_groups
 from tolalloc.reducers.equivalent.interfaces import pin_contact
 from tolalloc.reducers.equivalent.model import EquivalentModel, Status
-from tolalloc.reducers.equivalent.outputs import forces, order_spectrum
+from tolalloc.reducers.equivalent.outputs import fitted_waves, forces
 from tolalloc.reducers.equivalent.springs import Positions, vector_columns
 
 
@@ -239,18 +239,20 @@ def orders_against_speed(
         raise InputError.at("speeds", "speeds", speeds.tolist(), "positive numbers")
     if turns < 2:
         raise InputError.at("speeds", "turns", turns, "2 or more")
-    if not 1 <= min(orders, default=1) <= max(orders, default=1) < steps_per_turn / 2:
-        raise InputError.at("speeds", "orders", orders, f"1 to less than half of the {steps_per_turn} steps per turn")
+    if not all(own >= 1 and model.reducer.resolves(own, steps_per_turn) for own in orders):
+        allowed = f"1 to less than half of the {steps_per_turn} steps per turn, but none that the contact's fold onto"
+        raise InputError.at("speeds", "orders", orders, allowed)
     shape, order = (errors.shape[0], speeds.size), np.array(orders, np.int64)
     peak_to_peak, unsettled, status = np.empty(shape), np.empty(shape), np.empty(shape, np.uint8)
     amplitude = np.empty((*shape, order.size))
+    angle = 2 * pi * np.arange(steps_per_turn) / steps_per_turn
     for at, speed in enumerate(speeds):
         sun, duration = SpeedProfile.constant(float(speed) * model.reducer.ratio), turns * 2 * pi / float(speed)
         motion = motion_of(model.reducer, sun, SpeedProfile.constant(torque), duration, turns * steps_per_turn)
         found = simulate(model, errors, motion, inertia, damping, integrator)
         before, last = np.split(found.transmission_error[:, -2 * steps_per_turn :], 2, axis=1)
         difference = (last - before)[:, steps_per_turn // 2 :]
-        amplitude[:, at] = order_spectrum(last).amplitude[:, order - 1]
+        amplitude[:, at] = np.abs(fitted_waves(angle, last, order))
         peak_to_peak[:, at], unsettled[:, at] = np.ptp(last, axis=1), np.abs(difference).max(axis=1)
         status[:, at] = found.status.max(axis=1)
     return OrdersAgainstSpeed(

@@ -25,10 +25,10 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.reducers.cycloid.tooth_profile import normals, pin_angles
+from tolalloc.reducers.cycloid.tooth_profile import normals
 from tolalloc.reducers.equivalent.condensation import CondensedAngles, bilateral_groups
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import SINGLE, Forces, Solved, forces
+from tolalloc.reducers.equivalent.outputs import SINGLE, Forces, Solved, angles_of_pins, forces
 from tolalloc.reducers.equivalent.springs import Positions
 from tolalloc.reducers.reducer.bearings import CRANK_BEARINGS, FrictionDimensions, Part, RollingBearing, loss_factor
 from tolalloc.reducers.reducer.design import Reducer
@@ -93,23 +93,6 @@ class Play:
 
 
 MESH, PINS = "gear_mesh", "pins"
-
-
-def angles_of_pins(reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle disc pin"]:
-    """Return the angle of every pin from the crank direction of every disc [rad].
-
-    φ_k − β_j, theory page (2) and (13), own derivation.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> found = angles_of_pins(load_reducer("rv20e_liu2020"), np.zeros(1))
-    >>> np.degrees(found[0, :, 0]).round(6).tolist()  # disc 1's crank points at pin 1, disc 2's away from it [°]
-    [0.0, -180.0]
-    """
-    crank, apart = -reducer.cycloid_stage.disc_teeth * carrier_angle, 2.0 * np.pi / reducer.disc_count
-    discs = range(reducer.disc_count)
-    return np.stack([pin_angles(reducer.cycloid_stage, -(crank + apart * disc)) for disc in discs], axis=1)
 
 
 def sliding_ways(reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle disc pin"]:
@@ -210,7 +193,7 @@ class FrictionAtTorque:
 
     @property
     def efficiency(self) -> Float[np.ndarray, " sample"]:
-        """η = T/(T + T_f) of a reducer that drives its load [-]."""
+        """η = T/(T + T_f) of the contacts, of a reducer that drives its load [-]."""
         size = abs(self.torque)
         return np.asarray(size / (size + self.friction_torque))
 

@@ -348,7 +348,7 @@ class EquivalentModel:
         self,
         errors: Float[np.ndarray, "sample column"],
         torque: float | Float[np.ndarray, " sample"],
-        carrier_angle: Float[np.ndarray, " angle"] | None = None,
+        carrier_angle: Float[np.ndarray, " angle"],
     ) -> tuple[Float[np.ndarray, "sample angle"], Derivatives]:
         """Return the transmission error at the carrier angles and its exact derivatives, sample by sample in one row.
 
@@ -358,11 +358,7 @@ class EquivalentModel:
         """
         from tolalloc.reducers.equivalent.solvers.adjoint import solve_rotation_derivatives
 
-        if carrier_angle is None:
-            search, tables = self.search, self._tables
-            position = search.first + search.nodes_per_coarse * np.arange(float(search.coarse))
-        else:
-            tables, position = self._padded(carrier_angle), 1.0 + np.arange(float(carrier_angle.size))
+        tables, position = self._padded(carrier_angle), 1.0 + np.arange(float(carrier_angle.size))
         samples = errors.shape[0]
         derivative, torques = self._derivative(samples * position.size), np.broadcast_to(torque, samples)
         solve_rotation_derivatives(tables, *self._given(errors, np.ascontiguousarray(torques)), position, derivative)

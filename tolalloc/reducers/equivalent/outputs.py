@@ -9,15 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import gcd
 
 import numpy as np
-from jaxtyping import Complex, Float, Int, Integer
+from jaxtyping import Complex, Float, Integer
 
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.cycloid.line_contact import LineContact
 from tolalloc.reducers.cycloid.loaded_contact import crowned_contact, peak_pressure
 from tolalloc.reducers.cycloid.solvers import LAWS, LINEAR
+from tolalloc.reducers.cycloid.tooth_profile import pin_angles
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.interfaces import PinContact, pin_contact
 from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel
@@ -95,34 +97,31 @@ def forces(equilibria: Equilibria) -> Forces:
     return Forces(pins=pins, rows=rows, elements=elements, rows_of_stiffness=columns.rows_of_stiffness)
 
 
-_ROUNDING = 1e-9
-"""Amplitude over the largest one below which an order is none [-]."""
+_ROUNDING = 1e-4
+"""Amplitude over the largest one below which an order is not named [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Orders:
     """Waves of the transmission error per output turn."""
 
-    order: Int[np.ndarray, " order"]  # Waves per output turn [-]
+    order: Float[np.ndarray, " order"]  # Waves per output turn, whole ones where the turn closes [-]
     amplitude: Float[np.ndarray, "sample order"]  # Half the peak-to-peak of each wave, output side [rad]
     phase: Float[np.ndarray, "sample order"]  # Angle by which the wave, written as a cosine, leads [rad]
+    angles: int  # Angles that they are read from [-]
 
-    def main(self, count: int, sample: int = 0) -> list[tuple[int, float, float]]:
-        """Return the strongest orders of one sample with their amplitude and phase [rad], strongest first.
-
-        Those that are rounding beside the strongest are left out.
-        """
+    def main(self, count: int, sample: int = 0) -> list[tuple[float, float, float]]:
+        """Return the strongest orders of one sample that are some, with amplitude and phase [rad], strongest first."""
         own = self.amplitude[sample]
         strongest = [at for at in np.argsort(-own)[:count] if own[at] > _ROUNDING * own.max()]
-        return [
-            (int(self.order[at]), float(self.amplitude[sample, at]), float(self.phase[sample, at])) for at in strongest
-        ]
+        return [(float(self.order[at]), float(own[at]), float(self.phase[sample, at])) for at in strongest]
 
 
 def order_spectrum(transmission_error: Float[np.ndarray, "sample angle"]) -> Orders:
     """Return the orders 1, 2, … of curves on equally spaced angles of one output turn, the end point left out.
 
-    Amplitude = |`waves`| [rad], own derivation: Fourier's sum; orders below half the number of angles.
+    Amplitude = |2/N·Σ y·e^(−inθ)| [rad], own derivation: Fourier's sum; orders below half the number of angles,
+    onto which waves beyond fold back: `turn_orders` tells those of a unit that none folds onto.
 
     Examples
     --------
@@ -130,23 +129,80 @@ def order_spectrum(transmission_error: Float[np.ndarray, "sample angle"]) -> Ord
     >>> order_spectrum(3.0 * np.cos(2 * turn)[np.newaxis]).amplitude[0].round(9).tolist()
     [0.0, 3.0, 0.0]
     """
-    found = waves(transmission_error)
-    return Orders(order=np.arange(1, found.shape[1] + 1), amplitude=np.abs(found), phase=np.angle(found))
+    order = np.arange(1.0, (transmission_error.shape[1] + 1) // 2)
+    found = _waves(transmission_error, order)
+    return Orders(order=order, amplitude=np.abs(found), phase=np.angle(found), angles=transmission_error.shape[1])
 
 
-def waves(curve: Float[np.ndarray, "row angle"]) -> Complex[np.ndarray, "row order"]:
-    """Return the orders of curves as in `order_spectrum`: cosine amplitudes, minus i times sine amplitudes.
+def _waves(
+    curve: Float[np.ndarray, "row angle"], order: Float[np.ndarray, " order"], turns: int = 1
+) -> Complex[np.ndarray, "row order"]:
+    """Return orders of curves on equally spaced angles of turns that close, as `fitted_waves` would."""
+    angles = curve.shape[1]
+    return np.asarray(np.fft.fft(curve, axis=1)[:, np.rint(order * turns).astype(int) % angles] * (2 / angles))
 
-    2/N·Σ y·e^(−inθ), own derivation: Fourier's sum over N angles; order N/2 is left out.
+
+def fitted_waves(
+    angle: Float[np.ndarray, " angle"], curve: Float[np.ndarray, "row angle"], order: Float[np.ndarray, " order"]
+) -> Complex[np.ndarray, "row order"]:
+    """Return orders of curves, cosine less i times sine amplitudes, by least squares: at any angles, of open turns too.
+
+    min Σ(y − y₀ − Re Σ w·e^(inθ))², own derivation; every order that is strong must be among them.
 
     Examples
     --------
-    >>> turn = 2 * np.pi * np.arange(4) / 4
-    >>> waves((3.0 * np.cos(turn) + 4.0 * np.sin(turn))[np.newaxis]).round(9).tolist()
-    [[(3-4j)]]
+    >>> angle = np.linspace(0.0, 6.0, 20)
+    >>> fitted_waves(angle, 2.0 * np.cos(1.37 * angle)[np.newaxis], np.array([1.37])).round(9).tolist()
+    [[(2+0j)]]
     """
-    angles = curve.shape[1]
-    return np.asarray(np.fft.rfft(curve, axis=1)[:, 1 : (angles + 1) // 2] * (2 / angles))
+    turn = np.exp(1j * np.outer(angle, order))
+    basis = np.hstack([np.ones((angle.size, 1)), turn.real, turn.imag])
+    constant_and = np.linalg.lstsq(basis, curve.T, rcond=None)[0].T
+    return np.asarray(constant_and[:, 1 : order.size + 1] - 1j * constant_and[:, order.size + 1 :])
+
+
+_MULTIPLE, _OTHERS, _MOST = 936, 241, 20 * 936
+"""Angles of a spectrum are a multiple of the first, a prime more for the curve that confirms it, and at most [-]."""
+_CONFIRMED = 0.1
+"""Difference of a wave on either, over its amplitude, up to which it is believed [-]."""
+
+
+def turn_orders(
+    model: EquivalentModel, errors: Float[np.ndarray, "1 column"], torque: float, angles: int | None = None
+) -> Orders:
+    """Return the orders of one unit [m, angles rad] that the angles hold; the amplitudes of others are 0.
+
+    Waves beyond half of the angles fold back onto others, elsewhere for another number of angles: an order is told
+    where two numbers show the same wave. Both are spread over as many output turns as bring all parts back, so that
+    errors of sun, centre gear or pinion are one wave each where one turn cuts them. At least as many angles as given
+    [-], else more than four for each wave that pins and teeth make; orders up to a third of them.
+
+    Own derivation; amplitudes [rad], orders of the output turn, multiples of 1/turns.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.equivalent.perfect import exact_unit
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> model = EquivalentModel(load_reducer("cd29"))
+    >>> [(order, round(206264.8 * size, 2)) for order, size, _ in turn_orders(model, exact_unit(model), -1.0).main(2)]
+    [(240.0, 1.49), (480.0, 0.35)]
+    """
+    turns, contact = model.reducer.closing_turns, max(model.reducer.contact_orders)
+    first = _MULTIPLE * -(-min(angles or 4 * contact + 1, _MOST) // _MULTIPLE)
+    order = np.arange(1, first * turns // 3) / turns
+    found, other = (
+        _waves(np.hstack([model.equilibria(errors, torque, own).transmission_error for own in parts]), order, turns)
+        for parts in (_spread(count, turns) for count in (first, first + _OTHERS))
+    )
+    amplitude = np.where(np.abs(found - other) > _CONFIRMED * np.abs(found), 0.0, np.abs(found))
+    return Orders(order=order, amplitude=amplitude, phase=np.angle(found), angles=first)
+
+
+def _spread(count: int, turns: int) -> list[Float[np.ndarray, " angle"]]:
+    """Return equally spaced angles of turns, other ones in every turn, in parts whose tables are small [rad]."""
+    while gcd(count, turns) > 1:
+        count += 1
+    return np.array_split(2 * np.pi * turns * np.arange(count) / count, -(-count // _MULTIPLE))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,6 +216,11 @@ class Solved:
     def of(cls, equilibria: Equilibria) -> Solved:
         """Return the equilibria with their forces."""
         return cls(equilibria=equilibria, forces=forces(equilibria))
+
+    @property
+    def pins_in_contact(self) -> Integer[np.ndarray, "sample angle disc"]:
+        """Number of pins of every disc that carry load [-]."""
+        return np.asarray((self.forces.pins > 0.0).sum(axis=3))
 
 
 def load_share(pins: Float[np.ndarray, "sample angle disc pin"]) -> Float[np.ndarray, "sample disc"]:
@@ -176,28 +237,8 @@ def load_share(pins: Float[np.ndarray, "sample angle disc pin"]) -> Float[np.nda
     return np.asarray(total / total.sum(axis=1, keepdims=True))
 
 
-def _mean(solved: Solved) -> Float[np.ndarray, " sample"]:
-    return np.asarray(solved.equilibria.transmission_error.mean(axis=1) / ARCSECOND)
-
-
-def _fewest(solved: Solved) -> Float[np.ndarray, " sample"]:
-    return np.asarray(solved.equilibria.pins_in_contact.min(axis=1), float)
-
-
-def _most(solved: Solved) -> Float[np.ndarray, " sample"]:
-    return np.asarray(solved.equilibria.pins_in_contact.max(axis=1), float)
-
-
-def _pin_force(solved: Solved) -> Float[np.ndarray, " sample"]:
-    return np.asarray(solved.forces.pins.max(axis=(1, 2, 3)))
-
-
 def _interface_force(interface: str) -> Callable[[Solved], Float[np.ndarray, " sample"]]:
     return lambda solved: np.asarray(solved.forces.of(interface).max(axis=(1, 2)))
-
-
-def _largest_share(solved: Solved) -> Float[np.ndarray, " sample"]:
-    return np.asarray(load_share(solved.forces.pins).max(axis=1))
 
 
 Quantity = tuple[str, Callable[[Solved], Float[np.ndarray, " sample"]]]
@@ -223,14 +264,15 @@ def outputs_of(reducer: Reducer) -> dict[str, Quantity]:
     named = {"mesh": "gear_mesh", "centre gear mesh": "centre_mesh"}
     mesh = {own: name for own, name in named.items() if getattr(reducer.stiffness, name)}
     return {
-        "mean transmission error": ("arcsec", _mean),
-        "pins in contact, least": ("-", _fewest),
-        "pins in contact, most": ("-", _most),
-        "largest pin force": ("N", _pin_force),
+        "mean transmission error": ("arcsec", lambda own: own.equilibria.transmission_error.mean(axis=1) / ARCSECOND),
+        "pins in contact on a disc, least": ("-", lambda own: own.pins_in_contact.min(axis=(1, 2)).astype(float)),
+        "pins in contact on a disc, most": ("-", lambda own: own.pins_in_contact.max(axis=(1, 2)).astype(float)),
+        "largest pin force": ("N", lambda own: own.forces.pins.max(axis=(1, 2, 3))),
         **{
-            f"largest {own} force": ("N", _interface_force(name)) for own, name in (mesh | bearings_of(reducer)).items()
+            f"largest {called} force": ("N", _interface_force(name))
+            for called, name in (mesh | bearings_of(reducer)).items()
         },
-        "share of the pin force on the most loaded disc": ("-", _largest_share),
+        "share of the pin force on the most loaded disc": ("-", lambda own: load_share(own.forces.pins).max(axis=1)),
     }
 
 
@@ -371,7 +413,9 @@ def line_contact(equilibria: Equilibria, forces: Forces) -> LineContact:
     along_x, along_y = (tables.contact_by_disc[:, :, axis] for axis in (0, 1))
     slope = (sine * x + cosine * y)[..., np.newaxis] * along_x - (cosine * x - sine * y)[..., np.newaxis] * along_y
     if equilibria.reducer.cycloid_stage.crowning:
-        return crowned_contact(equilibria.reducer, _pin_angles(equilibria), forces.pins, slope)
+        return crowned_contact(
+            equilibria.reducer, angles_of_pins(equilibria.reducer, equilibria.carrier_angle), forces.pins, slope
+        )
     return LineContact(
         force=forces.pins,
         stiffness=np.broadcast_to(tables.contact_stiffness.reshape(slope.shape[1:]), slope.shape),
@@ -417,16 +461,26 @@ def unit_pressure(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]
     >>> f"{found.max():.2e}"  # at the tip, where the tooth is most convex [Pa]
     '5.63e+06'
     """
-    reducer, pin_angle = equilibria.reducer, _pin_angles(equilibria)
+    reducer, pin_angle = equilibria.reducer, angles_of_pins(equilibria.reducer, equilibria.carrier_angle)
     even = np.full_like(pin_angle, reducer.cycloid_stage.face_width)
     return peak_pressure(reducer.cycloid_stage, reducer.contact_modulus, pin_angle, even)
 
 
-def _pin_angles(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]:
-    """Return φ of every pin from the crank direction of every disc [rad]."""
-    at = Positions(equilibria.reducer, equilibria.carrier_angle)
-    discs = range(equilibria.reducer.disc_count)
-    return np.stack([at.pin_direction - at.disc_direction(disc)[:, np.newaxis] for disc in discs], axis=1)
+def angles_of_pins(reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle disc pin"]:
+    """Return the angle of every pin from the crank direction of every disc [rad].
+
+    φ_k − β_j, theory page (2) and (13), own derivation.
+
+    Examples
+    --------
+    >>> from tolalloc.reducers.reducer.files import load_reducer
+    >>> found = angles_of_pins(load_reducer("rv20e_liu2020"), np.zeros(1))
+    >>> np.degrees(found[0, :, 0]).round(6).tolist()  # disc 1's crank points at pin 1, disc 2's away from it [°]
+    [0.0, -180.0]
+    """
+    crank, apart = -reducer.cycloid_stage.disc_teeth * carrier_angle, 2.0 * np.pi / reducer.disc_count
+    discs = range(reducer.disc_count)
+    return np.stack([pin_angles(reducer.cycloid_stage, -(crank + apart * disc)) for disc in discs], axis=1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -523,20 +577,23 @@ class Attribution:
     sources: tuple[str, ...]  # Names of the sources that contribute, the torque and the nominal clearances among them
     # What each adds to the transmission error at each angle; their sum is the curve [rad]
     contribution: Float[np.ndarray, "source angle"]
-    order: Int[np.ndarray, " order"]  # Waves per output turn [-]
+    order: Float[np.ndarray, " order"]  # Waves per output turn [-]
     # What each adds to the amplitude of each order: its wave's component along the whole wave, negative where it
     # cancels; the sum is the amplitude [rad]
     share: Float[np.ndarray, "source order"]
     amplitude: Float[np.ndarray, " order"]  # Amplitude of each order of the whole curve [rad]
 
 
-def attribute(model: EquivalentModel, errors: Float[np.ndarray, "1 column"], torque: float) -> Attribution:
+def attribute(
+    model: EquivalentModel, errors: Float[np.ndarray, "1 column"], torque: float, orders: Orders | None = None
+) -> Attribution:
     """Return what every source of one unit [m, angles rad] adds to its transmission error and to each order.
 
     Theory page, equation (32). All gaps, clearances and the torque scaled together scale the transmission error, as
     long as the contact law is linear, so Euler's theorem splits it into deviation times derivative. The split holds for
     this unit: with other errors other pins carry, and a source's share changes. Under the logarithmic law the part that
-    is not proportional is listed by itself.
+    is not proportional is listed by itself. Angles and orders are those of `turn_orders` where its orders are given,
+    else those of the model's search and all below half of them.
 
     TE = Σ ε·∂TE/∂ε + T·∂TE/∂T + Σ c·∂TE/∂c; exact for linear laws.
 
@@ -554,26 +611,35 @@ def attribute(model: EquivalentModel, errors: Float[np.ndarray, "1 column"], tor
     >>> found.sources, f"{206264.8 * found.amplitude.max():.2f}"  # largest order [arcsec]
     (('carrier.assembly', 'torque'), '1.23')
     """
-    curve, derivatives = model.rotation_derivatives(errors, torque)
-    parts: dict[str, Float[np.ndarray, " angle"]] = {}
-    for at in np.flatnonzero(errors[0]):
-        name = source_name(model.columns[at])
-        parts[name] = parts.get(name, 0.0) + errors[0, at] * derivatives.by_error[:, at]
-    for name, own in ((CLEARANCE, derivatives.by_nominal), (FORM, derivatives.by_form)):
-        if own.any():
-            parts[name] = own
-    parts[TORQUE] = torque * derivatives.by_torque
-    if LAWS[model.reducer.stiffness.pin_contact_law] != LINEAR:
-        parts[CURVATURE] = curve[0] - np.sum(list(parts.values()), axis=0)
+    turns, count = (model.reducer.closing_turns, orders.angles) if orders else (1, model.search.coarse)
+    order = orders.order[orders.amplitude[0] > 0] if orders else np.arange(1.0, (count + 1) // 2)
+    made = [_contributions(model, errors, torque, own) for own in _spread(count, turns)]
+    every = {name: np.concatenate([own[name] for own in made]) for name in made[0]}
+    parts = {name: own for name, own in every.items() if own.any() or name not in (CLEARANCE, FORM)}
     contribution = np.array(list(parts.values()))
-    parts_of_order = waves(contribution)
+    parts_of_order = _waves(contribution, order, turns)
     total = parts_of_order.sum(axis=0)
     amplitude = np.abs(total)
     direction = np.divide(total, amplitude, out=np.zeros_like(total), where=amplitude > 0)
     return Attribution(
         sources=tuple(parts),
         contribution=contribution,
-        order=np.arange(1, amplitude.size + 1),
+        order=order,
         share=np.real(parts_of_order * direction.conj()),
         amplitude=amplitude,
     )
+
+
+def _contributions(
+    model: EquivalentModel, errors: Float[np.ndarray, "1 column"], torque: float, angle: Float[np.ndarray, " angle"]
+) -> dict[str, Float[np.ndarray, " angle"]]:
+    """Return what every source adds at the carrier angles [rad]."""
+    curve, derivatives = model.rotation_derivatives(errors, torque, angle)
+    parts: dict[str, Float[np.ndarray, " angle"]] = {}
+    for at in np.flatnonzero(errors[0]):
+        name = source_name(model.columns[at])
+        parts[name] = parts.get(name, 0.0) + errors[0, at] * derivatives.by_error[:, at]
+    parts |= {CLEARANCE: derivatives.by_nominal, FORM: derivatives.by_form, TORQUE: torque * derivatives.by_torque}
+    if LAWS[model.reducer.stiffness.pin_contact_law] != LINEAR:
+        parts[CURVATURE] = curve[0] - np.sum(list(parts.values()), axis=0)
+    return parts

@@ -1,4 +1,4 @@
-"""The reducer without part errors, its bearings yielding: the one answer on forces that every command gives.
+"""Exact parts, modified as drawn, their bearings yielding: the one answer on forces that every command gives.
 
 Units whose parts press each other before any torque acts: forces of the pins, what turning them takes, derivatives.
 
@@ -23,7 +23,7 @@ from tolalloc.reducers.families.known import family_of
 from tolalloc.reducers.reducer.design import Reducer, at_torque, compliances
 
 PHASES = 72
-"""Phases of one pin pitch at which a reducer without errors is solved, for forces over the turn [-]."""
+"""Phases of one pin pitch at which exact parts are solved, for forces over the turn [-]."""
 
 
 def exact_unit(model: EquivalentModel) -> Float[np.ndarray, "1 column"]:
@@ -49,7 +49,7 @@ def exact_loop(reducer: Reducer) -> HysteresisLoop:
 
 
 def perfect_reducer(reducer: Reducer, torque: float) -> Solved:
-    """Return equilibria and forces of the reducer without part errors over one pin pitch of the crank.
+    """Return equilibria and forces of exact parts over one pin pitch of the crank.
 
     Its modification and the stiffness of its parts under the torque are in force. While the carrier turns by a pin
     pitch over the teeth of a disc, the crank direction meets every phase of the pins, and all else repeats.
@@ -197,7 +197,7 @@ def _derived(
 
 @lru_cache(maxsize=256)
 def rated_pin_force(reducer: Reducer) -> float:
-    """Return the largest force of a pin of the perfect reducer under its rated torque [N].
+    """Return the largest force of a pin of exact parts under their rated torque [N].
 
     Largest force of `perfect_reducer`, own derivation; sign of the torque: it resists.
 
@@ -220,7 +220,7 @@ class TwistShare:
 
 
 def twist_shares(reducer: Reducer) -> tuple[TwistShare, ...]:
-    """Return which part yields how much of the twist of the perfect reducer at rated torque, the largest share first.
+    """Return which part yields how much of the twist of exact parts at rated torque, the largest share first.
 
     By virtual work T·θ is the sum of force times way over all springs, each interface divided among its parts by their
     compliances; what is left is that of pins and teeth, their clearance included. Mean over a pin pitch.

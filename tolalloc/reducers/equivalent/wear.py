@@ -13,9 +13,9 @@ from jaxtyping import Float
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import MICROMETRE
 from tolalloc.reducers.cycloid.tooth_profile import path_curvature
-from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, angles_of_pins, sliding_ways
+from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, sliding_ways
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import Solved
+from tolalloc.reducers.equivalent.outputs import Solved, angles_of_pins
 from tolalloc.reducers.equivalent.perfect import PHASES, perfect_reducer
 from tolalloc.reducers.load_case import LoadCase, require_duty
 from tolalloc.reducers.reducer.design import CycloidStage, Reducer, thermal_shift

@@ -6,7 +6,8 @@ Interfaces as springs in series: what every part adds to the way of a bearing, a
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import cos, sqrt
+from fractions import Fraction
+from math import cos, lcm, sqrt
 from typing import Annotated, Any
 
 import numpy as np
@@ -427,6 +428,37 @@ class Reducer:
         if self.first_stage is None:
             return -float(self.cycloid_stage.disc_teeth)
         return 1.0 + self.first_stage.planet_teeth / self.first_stage.sun_teeth * self.cycloid_stage.pin_count
+
+    @property
+    def closing_turns(self) -> int:
+        """Turns of the carrier after which every part is where it was [-]."""
+        if self.first_stage is None:
+            return 1
+        gears, centre = self.first_stage, self.centre_gear
+        sun = Fraction(gears.planet_teeth * self.cycloid_stage.pin_count, gears.sun_teeth)
+        motor = (1 + sun) * Fraction(centre.teeth, centre.pinion_teeth) if centre else sun
+        return lcm(sun.denominator, motor.denominator)
+
+    @property
+    def open_orders(self) -> tuple[float, ...]:
+        """Waves per output turn that errors of sun, centre gear and pinion make, as far as one turn cuts them [-]."""
+        meshes, housing = self.sun_ratio - 1.0, (self.sun_ratio, abs(self.ratio)) if self.centre_gear else ()
+        return tuple(own for own in (meshes, self.crank_count * meshes, *housing) if abs(own - round(own)) > 1e-9)
+
+    @property
+    def contact_orders(self) -> tuple[int, int]:
+        """Waves per output turn that exact parts make: pins with teeth, pins with cranks or output pins [-].
+
+        lcm(n, zp)·zc and lcm(n, n_drive)·zp with n discs, which all meet a pin at once where n divides the number.
+        """
+        stage, discs = self.cycloid_stage, self.disc_count
+        return lcm(discs, stage.pin_count) * stage.disc_teeth, lcm(discs, self.drive_count) * stage.pin_count
+
+    def resolves(self, order: float, angles: int) -> bool:
+        """Return whether equally spaced angles of a turn hold a wave onto which none of exact contacts folds."""
+        made = (number * own for own in self.contact_orders for number in range(1, 5))
+        folded = {abs(own - angles * round(own / angles)) for own in made if own > angles / 2}
+        return order < angles / 2 and order not in folded
 
 
 _PHASES = 2.0 * np.pi * np.arange(64) / 64

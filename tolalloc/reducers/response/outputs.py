@@ -31,12 +31,12 @@ from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop,
 from tolalloc.reducers.equivalent.model import EquivalentModel, Status
 from tolalloc.reducers.equivalent.outputs import (
     Solved,
+    fitted_waves,
     outputs_of,
     peak_line_load,
     radial_clearance,
     radial_clearance_derivatives,
     unit_pressure,
-    waves,
 )
 from tolalloc.reducers.equivalent.perfect import friction_torque_derivatives, pin_force_derivatives, preload
 from tolalloc.reducers.load_case import Combined
@@ -172,24 +172,25 @@ def readings_of(reducer: Reducer, outputs: tuple[str, ...]) -> tuple[Reading, ..
     return tuple(own for own in every if not {*own.outputs}.isdisjoint(outputs))
 
 
-def wave_outputs(order: int) -> tuple[str, str]:
+def wave_outputs(order: float) -> tuple[str, str]:
     """Return the names of the outputs that hold the cosine and the sine of an order of the output turn."""
-    return (f"order {order} cosine [arcsec]", f"order {order} sine [arcsec]")
+    return (f"order {order:g} cosine [arcsec]", f"order {order:g} sine [arcsec]")
 
 
 def _waves(
-    orders: tuple[int, ...], transmission_error: Float[np.ndarray, "chunk angle"]
+    orders: tuple[float, ...], transmission_error: Float[np.ndarray, "chunk angle"]
 ) -> Float[np.ndarray, "chunk output"]:
     """Return cosine and sine of every order [arcsec]."""
+    angle = 2.0 * np.pi * np.arange(transmission_error.shape[1]) / transmission_error.shape[1]
     # An unconverged angle is NaN and would spread over all waves; the status keeps the sample out.
-    wave = waves(np.nan_to_num(transmission_error))[:, np.array(orders) - 1] / ARCSECOND
+    wave = fitted_waves(angle, np.nan_to_num(transmission_error), np.array(orders)) / ARCSECOND
     return np.stack([wave.real, -wave.imag], axis=2).reshape(wave.shape[0], -1)
 
 
-def orders_reading(orders: tuple[int, ...]) -> Reading:
+def orders_reading(orders: tuple[float, ...]) -> Reading:
     """Return the reading of the waves of the transmission error, cosine and sine of every order.
 
-    The waves are those of `tolalloc.reducers.equivalent.outputs.waves`, own derivation from Fourier's sum [arcsec].
+    The waves are those of `tolalloc.reducers.equivalent.outputs.fitted_waves`, own derivation [arcsec].
 
     Examples
     --------
@@ -204,7 +205,7 @@ def orders_reading(orders: tuple[int, ...]) -> Reading:
     return Reading(outputs=tuple(name for order in orders for name in wave_outputs(order)), read=read)
 
 
-def with_orders(readings: tuple[Reading, ...], orders: tuple[int, ...]) -> tuple[Reading, ...]:
+def with_orders(readings: tuple[Reading, ...], orders: tuple[float, ...]) -> tuple[Reading, ...]:
     """Return the readings and that of the waves, which are read off the curve that a peak-to-peak is searched on.
 
     As `orders_reading`, own derivation; the curve's angles are those of the coarse search.

@@ -17,9 +17,9 @@ from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MEGAPASCAL, MIC
 from tolalloc.reducers import DISC_TEMPERATURE, FRICTION_TORQUE, PEAK_TO_PEAK, PRELOAD, RADIAL_CLEARANCE
 from tolalloc.reducers.contact import contact_of
 from tolalloc.reducers.cycloid.clearance import LARGE, is_large
-from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
+from tolalloc.reducers.equivalent.hysteresis import HysteresisLoop
 from tolalloc.reducers.equivalent.model import OUTCOMES, Equilibria
-from tolalloc.reducers.equivalent.outputs import order_spectrum
+from tolalloc.reducers.equivalent.outputs import turn_orders
 from tolalloc.reducers.equivalent.perfect import twist_shares
 from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.reducer.design import CycloidStage, Modification, Reducer
@@ -82,11 +82,9 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
 
     @property
     def facts(self) -> Mapping[str, Any]:
-        """Torsional stiffness of the perfect reducer between 3 % and 100 % of rated torque."""
-        own = self.model.kernel.model.with_form(None)
-        loop = hysteresis_loop(own, np.zeros((1, len(own.columns))), TURN_ANGLES)
-        stiffness = float(loop.torsional_stiffness[0] * ARCMINUTE)
-        return {"torsional stiffness of the perfect reducer [N·m/arcmin]": stiffness}
+        """Torsional stiffness of exact parts between 3 % and 100 % of rated torque."""
+        stiffness = float(self.model.exact_loop_in_force.torsional_stiffness[0] * ARCMINUTE)
+        return {"torsional stiffness of exact parts [N·m/arcmin]": stiffness}
 
     @property
     def assumptions(self) -> tuple[str, ...]:
@@ -165,13 +163,15 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
         return _examination(self, figures)
 
     def illustrated(self, units: Units) -> tuple[Section, ...]:
-        """Return the curves and orders of units, with the built unit first, and how exact teeth carry rated torque."""
+        """Return the curves and orders of units, with the built unit first, and how exact parts carry rated torque."""
         return sections_of("Single units over one output turn", lambda: _illustrated(self.model, units))
 
     def pictured(self, units: Units) -> tuple[Figure, ...]:
         """Return the curves and the orders of units."""
         curves = _curves(self.model, units)
-        return _curve_figure(curves, self.model.kernel.torque), _order_figure(curves, self.model.reducer)
+        return _curve_figure(curves, self.model.kernel.torque), _order_figure(
+            self.model, _order_table(self.model, curves)
+        )
 
     def scene(
         self,
@@ -221,7 +221,7 @@ def _effect(removed: float, more: str, less: str) -> str:
 def against_catalogue(reducer: Reducer, loop: HysteresisLoop) -> tuple[str, tuple[str, ...]]:
     """Return a sentence on rigidity and lost motion beside the catalogue's, and warnings where they are far apart.
 
-    The loop's last sample is the perfect reducer's. Without a catalogue the sentence is empty, and the warning is about
+    The loop's last sample is that of exact parts. Without a catalogue the sentence is empty, and the warning is about
     what all sizes of catalogues have in common.
     """
     stated = reducer.catalogue
@@ -231,13 +231,13 @@ def against_catalogue(reducer: Reducer, loop: HysteresisLoop) -> tuple[str, tupl
         if USUAL_TWIST / FACTOR**2 <= twist <= USUAL_TWIST * FACTOR**2:
             return "", ()
         return "", (
-            f"The perfect reducer twists by {twist:.2g}′ under its rated torque; sizes in catalogues twist by 3 to 4′. "
+            f"Exact parts twist by {twist:.2g}′ under their rated torque; sizes in catalogues twist by 3 to 4′. "
             "Do not trust what depends on the load: state bearings by their dimensions, or a [catalogue] to compare "
             "with.",
         )
     wanted, largest = stated.torsional_rigidity * ARCMINUTE, stated.lost_motion / ARCMINUTE
     sentence = (
-        f"Without part errors the torsional rigidity is {rigidity:.3g} N·m/arcmin where the catalogue states "
+        f"With exact parts the torsional rigidity is {rigidity:.3g} N·m/arcmin where the catalogue states "
         f"{wanted:.3g} ({number(100 * (rigidity / wanted - 1), '+.0f')} %), the lost motion {lost:.2g}′ where it "
         f"allows {largest:.2g}′."
     )
@@ -247,7 +247,7 @@ def against_catalogue(reducer: Reducer, loop: HysteresisLoop) -> tuple[str, tupl
         times = f"{off:.3g} times as stiff as" if off > 1 else f"{1 / off:.3g} times softer than"
         warnings.append(f"The model is {times} the catalogue states: do not trust what depends on the load.")
     if lost > largest:
-        warnings.append(f"The perfect reducer's lost motion of {lost:.2g}′ is above the catalogue's {largest:.2g}′.")
+        warnings.append(f"The lost motion of exact parts, {lost:.2g}′, is above the catalogue's {largest:.2g}′.")
     return sentence, tuple(warnings)
 
 
@@ -377,20 +377,21 @@ def _advice(model: ReducerModel) -> str:
 
 def _illustrated(model: ReducerModel, units: Units) -> tuple[Section, ...]:
     curves = _curves(model, units)
+    orders = _order_table(model, curves)
     return (
         Section(
             heading="Single units over one output turn",
             figures=(
                 _curve_figure(curves, model.kernel.torque),
                 _crank_turn_figure(curves, model.reducer),
-                _order_figure(curves, model.reducer),
+                _order_figure(model, orders),
             ),
-            tables=(("orders of units", _order_table(curves)),),
+            tables=(("orders of units", orders),),
         ),
         Section(
-            heading="How exact teeth carry the rated torque",
+            heading="How exact parts carry the rated torque",
             paragraphs=(
-                "Exact parts, Hertzian line contact, the most loaded disc by Li Lixing's share; a modification that "
+                "Hertzian line contact, the most loaded disc by Li Lixing's share; a modification that "
                 "interferes before any load has no numbers.",
             ),
             tables=(("contact", _contact_table(model, units)),),
@@ -452,35 +453,36 @@ def _crank_turn(label: str, curve: Equilibria, disc_teeth: int) -> Series:
     return Series(label=label, kind="line", x=[360.0 / _PHASES * at for at in known], y=mean, low=low, high=high)
 
 
-def _amplitudes(curve: Equilibria) -> Float[np.ndarray, " order"]:
-    """Return the amplitudes of the first orders [arcsec]."""
-    return np.asarray(order_spectrum(curve.transmission_error).amplitude[0, :_ORDERS] / ARCSECOND)
+def _order_table(model: ReducerModel, curves: Mapping[str, Equilibria]) -> pd.DataFrame:
+    """Return the amplitudes of the first orders, and of those that gears make, as far as the angles hold them."""
+    import pandas as pd
+
+    kernel, columns = model.kernel.model, dict[str, Any]()
+    for label, curve in curves.items():
+        found = turn_orders(kernel, curve.errors, curve.torque, kernel.search.coarse)
+        shown = np.isclose(found.order[:, np.newaxis], [*range(1, _ORDERS + 1), *model.reducer.open_orders]).any(axis=1)
+        columns["order of the output turn [-]"] = found.order[shown].round(3)
+        columns[f"{label} [arcsec]"] = found.amplitude[0, shown] / ARCSECOND
+    return pd.DataFrame(columns)
 
 
-def _order_figure(curves: Mapping[str, Equilibria], reducer: Reducer) -> Figure:
-    stage = reducer.cycloid_stage
+def _order_figure(model: ReducerModel, orders: pd.DataFrame) -> Figure:
+    stage, (order, *units) = model.reducer.cycloid_stage, map(str, orders)
     return Figure(
         name="orders_of_units",
         title=f"Orders: multiples of {stage.disc_teeth} stand still with the housing, of {stage.pin_count} turn with "
         "disc or carrier",
-        x_label="order of the output turn [-]",
+        x_label=order,
         y_label="amplitude, output side [arcsec]",
         series=tuple(
-            Series(label=label, kind="stems", x=list(range(1, _ORDERS + 1)), y=list(_amplitudes(curve)))
-            for label, curve in curves.items()
+            Series(label=own.removesuffix(" [arcsec]"), kind="stems", x=list(orders[order]), y=list(orders[own]))
+            for own in units
         ),
     )
 
 
-def _order_table(curves: Mapping[str, Equilibria]) -> pd.DataFrame:
-    import pandas as pd
-
-    found = {"order of the output turn [-]": np.arange(1, _ORDERS + 1)}
-    return pd.DataFrame(found | {f"{label} [arcsec]": _amplitudes(curve) for label, curve in curves.items()})
-
-
 def _contact_table(model: ReducerModel, units: Units) -> pd.DataFrame:
-    """Return amounts, clearances and how exact teeth carry, for the modification of every unit."""
+    """Return amounts, clearances and how exact parts carry, for the modification of every unit."""
     import pandas as pd
 
     columns: dict[str, dict[str, float]] = {}
@@ -509,7 +511,7 @@ _CARRIED = (
 
 
 def _carried(reducer: Reducer) -> dict[str, float]:
-    """Return how the parts without errors carry the rated torque; not a number where they interfere before any load."""
+    """Return how exact parts carry the rated torque; not a number where they interfere before any load."""
     values, torque = [np.nan] * len(_CARRIED), -reducer.load.rated_torque
     with suppress(InputError):
         found = contact_of(reducer, torque, law=reducer.stiffness.pin_contact_law)

@@ -429,7 +429,7 @@ def _transmission_record(effect: TransmissionEffect) -> dict[str, Any]:
         "assemblies [-]": int(effect.good.size),
         "failed [-]": int((~effect.good).sum()),
         "values": _records(value_table(effect)),
-        "above perfect parts": _records(difference_table(effect)),
+        "above exact parts": _records(difference_table(effect)),
         "smaller than unadjusted": [] if fallen is None else _records(fallen),
     }
 

@@ -184,7 +184,7 @@ class Characteristic:
     angle: str  # Tilt or rotation
     before: float
     after: float
-    noise: float  # What perfect parts would be left with; of measured parts what the turns miss, three deviations
+    noise: float  # What exact parts would be left with; of measured parts what the turns miss, three deviations
     limit: float  # Not a number where there is none
 
     def kept(self, *, measured: bool) -> str:

@@ -70,7 +70,7 @@ def risen(effect: TransmissionEffect, precision: float) -> tuple[str, ...]:
 
 def value_table(effect: TransmissionEffect) -> pd.DataFrame:
     """Return every output over the precision, the median of random assemblies."""
-    names = ["perfect parts", *(f"{precision:g}" for precision in effect.state_weights)]
+    names = ["exact parts", *(f"{precision:g}" for precision in effect.state_weights)]
     columns = {
         PRECISION: names,
         **{
@@ -82,16 +82,16 @@ def value_table(effect: TransmissionEffect) -> pd.DataFrame:
 
 
 def difference_table(effect: TransmissionEffect) -> pd.DataFrame:
-    """Return by how much the outputs of that table are above those of perfect parts; a mean angle has no zero."""
+    """Return by how much the outputs of that table are above those of exact parts; a mean angle has no zero."""
 
     def above(output: str) -> Float[np.ndarray, " state_weight"]:
         return np.asarray(100 * (np.median(answers(effect, output), axis=1) / perfect(effect, output) - 1))
 
     columns = {
         PRECISION: effect.state_weights,
-        **{f"{output.split(' [')[0]}, above perfect parts [%]": above(output) for output in _counted(effect)},
+        **{f"{output.split(' [')[0]}, above exact parts [%]": above(output) for output in _counted(effect)},
     }
-    return rounded(of_positions("above perfect parts", columns, range(effect.state_weights.size)))
+    return rounded(of_positions("above exact parts", columns, range(effect.state_weights.size)))
 
 
 def fallen_table(effect: TransmissionEffect) -> pd.DataFrame | None:
@@ -173,7 +173,7 @@ def transmission_section(effect: TransmissionEffect, precision: float, *, measur
         ),
         tables=(
             ("transmission", value_table(effect)),
-            ("above perfect parts", difference_table(effect)),
+            ("above exact parts", difference_table(effect)),
             *((("smaller than unadjusted", fallen),) if fallen is not None else ()),
         ),
     )
@@ -183,7 +183,7 @@ def curve_figures(effect: TransmissionEffect) -> tuple[Figure, Figure]:
     """Return transmission error and pin force of a disc over the carrier angle."""
     angle = effect.curves.carrier_angle
     shown = angle <= _CRANK_TURNS * 2 * np.pi / effect.reducer.cycloid_stage.disc_teeth
-    labels = ("perfect parts", *(f"Q = {precision:g}" for precision in effect.state_weights))
+    labels = ("exact parts", *(f"Q = {precision:g}" for precision in effect.state_weights))
     both = (effect.perfect_curves, effect.curves)
     force = np.concatenate([each.disc_force for each in both])
     error = np.concatenate([each.transmission_error for each in both]) / ARCSECOND

@@ -1,4 +1,4 @@
-"""What a tooth modification does to clearance and contact, without errors."""
+"""What a tooth modification does to clearance and contact of exact parts."""
 
 from __future__ import annotations
 
@@ -259,7 +259,7 @@ def _contact_summary(contact: LoadedContact) -> dict[str, Any]:
 
 
 def _yielding_summary(found: YieldingContact) -> dict[str, Any]:
-    """Return the reducer without errors, its bearings yielding, units in the names."""
+    """Return exact parts, their bearings yielding, units in the names."""
     return {
         "pins in contact on a disc [-]": list(found.pins_in_contact),
         "largest pin force [N]": found.largest_force,

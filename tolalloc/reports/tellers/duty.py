@@ -43,7 +43,7 @@ _CASES: tuple[Column[CaseLoads], ...] = (
     Column(header="largest line load [N/mm]", value=lambda own: own.line_load),
     Column(header="peak pressure [MPa]", value=lambda own: own.pressure, terminal=True),
     Column(header="friction torque at the output [N·m]", value=lambda own: own.friction_torque),
-    Column(header="efficiency [%]", value=lambda own: 100.0 * own.efficiency, terminal=True),
+    Column(header="overall efficiency [%]", value=lambda own: 100.0 * own.efficiency, terminal=True),
     Column(header="lost power [W]", value=lambda own: own.loss, terminal=True),
 )
 

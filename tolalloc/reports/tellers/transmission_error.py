@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cached_property
 from math import isnan
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,8 +33,8 @@ _MAIN = 8
 """Main orders that are named [-]."""
 _ON_TERMINAL = 5
 """Main orders that fit on a screen [-]."""
-_DRAWN = 120
-"""Orders that are drawn [-]."""
+_DRAWN = 60
+"""Strongest orders that are drawn [-]."""
 _UNIT = 0
 """Sample of a loop that is the unit [-]."""
 _ANGLE, _ERROR = "carrier angle [°]", "transmission error [arcsec]"
@@ -60,7 +61,9 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
         strongest = ", ".join(_say("order", **wave) for wave in found["main_orders"][:3])
         orders = _say("strongest", orders=strongest) if strongest else _say("flat")
         rigidity, _ = self._rigidity
-        rubbing = _say("friction", **friction, idle=self._idle) if friction else ""
+        stated = self.result.reducer.friction
+        assumed = "" if None not in (stated.seals, stated.grease) else _say("assumed")
+        rubbing = _say("friction", **friction, assumed=assumed) if friction else ""
         said = (_say("spans", **found | {"orders": orders}), rubbing, rigidity)
         return tuple(sentence for sentence in said if sentence)
 
@@ -83,14 +86,6 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
             return ()
         taken, ratio = float(found.friction_torque[0]), abs(self.result.reducer.ratio)
         return (_say("preloaded", force=found.pin_force[0], rated=rated, output=taken, motor=taken / ratio),)
-
-    @property
-    def _idle(self) -> str:
-        """What seals and grease take, assumed unless the reducer's file states it."""
-        reducer = self.result.reducer
-        found, stated = IdleTorque.of(reducer), reducer.friction
-        key = "idle" if None not in (stated.seals, stated.grease) else "idle_assumed"
-        return _say(key, seals=found.seals, grease=found.grease)
 
     @property
     def assumptions(self) -> tuple[str, ...]:
@@ -117,7 +112,7 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
                     heading=_say("friction_heading"),
                     paragraphs=(_say("friction_section"),),
                     figures=(_loop_figure(friction),),
-                    tables=(("friction", _friction_table(reducer, friction)),),
+                    tables=(("friction", _friction_table(reducer, friction.torque[-1], self.summary["friction"])),),
                 )
             )
         if self.result.attribution is not None:
@@ -159,14 +154,18 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
                 "mean": float(reversed_by.mean() / ARCSECOND),
                 "peak_to_peak": float(np.ptp(reversed_by) / ARCSECOND),
             },
-            "angles": {"equally_spaced": result.equally_spaced, "solved_in_all": int(extremes.solves[0])},
+            "angles": {
+                "equally_spaced": result.equilibria.carrier_angle.size,
+                "solved_in_all": int(extremes.solves[0]),
+                "of_the_orders": result.orders.angles,
+            },
             "largest_residual_of_largest_force": float(extremes.residual[0]),
             "statuses": dict(self.header.statuses),
             "warnings": list(self.warnings),
             "assumptions": list(self.assumptions),
         }
         if result.attribution is not None:
-            found["attribution"] = _attributed(result.attribution)
+            found["attribution"] = _attributed(result.attribution, [order for order, *_ in result.orders.main(_MAIN)])
         return found
 
     @property
@@ -178,6 +177,19 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
         shown = self.attribution_table.iloc[:, : 2 + _ON_TERMINAL]
         shown.columns = [str(name).removesuffix(" [arcsec]").removeprefix("order ") for name in shown]
         return turn, (shown.map(_tenths), _say("sources_on_terminal"))
+
+    def add_files(self, folder: Path) -> None:
+        """Add the curve at the equally spaced angles, which `diagnose` and `lot` read."""
+        import pandas as pd
+
+        from tolalloc.reports.writer import write_csv, write_json
+
+        found = self.result.equilibria
+        columns = found.carrier_angle / DEGREE, found.transmission_error[0] / ARCSECOND
+        curve = pd.DataFrame(dict(zip(("angle [deg]", "transmission error [arcsec]"), columns, strict=True)))
+        curve["torque [N·m]"] = self.result.torque
+        write_csv(curve, folder / "curve.csv")
+        write_json({str(name): values.tolist() for name, values in curve.items()}, folder / "curve.json")
 
     @cached_property
     def turn_table(self) -> pd.DataFrame:
@@ -193,17 +205,13 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
             (f"smallest, at {found['smallest_at_deg']:.2f}° [arcsec]", f"{found['smallest_arcsec']:.2f}"),
             *(
                 (
-                    f"order {wave['order']} of the output turn, amplitude [arcsec] and phase",
+                    f"order {wave['order']:.6g} of the output turn, amplitude [arcsec] and phase",
                     f"{wave['amplitude_arcsec']:.2f} ∠ {wave['phase_deg']:.0f}°",
                 )
                 for wave in found["main_orders"]
             ),
             *((f"{item['name']} [{item['unit']}]", _short(item["value"])) for item in found["outputs"]),
             ("largest pin force without torque [N]", _short(found["pin_force_without_torque_n"])),
-            (
-                "largest friction torque of the pins without load, at the output [N·m]",
-                _short(found["largest_friction_torque_of_pins_without_load_nm"]),
-            ),
             *(
                 (row.format(f", {whose.replace('_', ' ')}"), "not found" if value is None else _short(value))
                 for key, row in _LOOP.items()
@@ -223,7 +231,7 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
         import pandas as pd
 
         found = self.summary["attribution"]
-        names = [f"order {order} [arcsec]" for order in found["orders"]]
+        names = [f"order {order:.6g} [arcsec]" for order in found["orders"]]
         rows = [
             {
                 "source": item["source"],
@@ -262,15 +270,15 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
 
     @property
     def _order_figure(self) -> Figure:
-        """The amplitude of the first orders."""
-        orders, shown = self.result.orders, slice(0, _DRAWN)
-        amplitude = list(orders.amplitude[0, shown] / ARCSECOND)
+        """The amplitudes of the strongest orders."""
+        shown = sorted(self.result.orders.main(_DRAWN))
+        x, y = [order for order, *_ in shown], [amplitude / ARCSECOND for _, amplitude, _ in shown]
         return Figure(
             name="orders",
             title=_say("order_figure"),
             x_label="order of the output turn [-]",
             y_label="amplitude [arcsec]",
-            series=(Series(label="amplitude", kind="stems", x=list(orders.order[shown]), y=amplitude),),
+            series=(Series(label="amplitude", kind="stems", x=x, y=y),),
         )
 
 
@@ -293,9 +301,13 @@ def force_figure(equilibria: Equilibria) -> Figure:
 
 def _friction(loop: FrictionLoop, idle: IdleTorque) -> dict[str, Any]:
     """Return efficiency, loop, friction by contact of the unit, and what turns it beside, for a program."""
+    rated, contacts = abs(loop.rated.torque), float(loop.no_load.friction_torque[_UNIT])
+    driven = rated + float(loop.rated.friction_torque[_UNIT]) + idle.turning
     return {
         "efficiency_at_rated_torque_percent": 100.0 * float(loop.rated.efficiency[_UNIT]),
-        "no_load_torque_nm": float(loop.no_load.friction_torque[_UNIT]),
+        "overall_efficiency_at_rated_torque_percent": 100.0 * rated / driven,
+        "no_load_torque_nm": contacts + idle.turning,
+        "no_load_torque_of_contacts_nm": contacts,
         "lost_motion_arcmin": float(loop.lost_motion[_UNIT] / ARCMINUTE),
         "hysteresis_loss_arcmin": float(loop.hysteresis_loss[_UNIT] / ARCMINUTE),
         "by_contact": [
@@ -311,29 +323,20 @@ def _friction(loop: FrictionLoop, idle: IdleTorque) -> dict[str, Any]:
     }
 
 
-def _friction_table(reducer: Reducer, loop: FrictionLoop) -> pd.DataFrame:
-    """Return the friction torque of every kind of contact, at rated torque and without torque."""
+def _friction_table(reducer: Reducer, rated: float, found: dict[str, Any]) -> pd.DataFrame:
+    """Return the friction torque of every kind of contact, at rated torque [N·m] and without torque."""
     import pandas as pd
 
-    idle, rated = IdleTorque.of(reducer), abs(loop.rated.torque)
-    found = _friction(loop, idle)["by_contact"]
-    coefficients = {CONTACTS[name]: value for name, value in reducer.friction.coefficients.items()}
-    rows = [(own["contact"], f"{coefficients[own['contact']]:g}", own["rated_nm"], own["no_load_nm"]) for own in found]
-    without_load = sum(row[3] for row in rows)
-    rows.append(("contacts together", "", sum(row[2] for row in rows), without_load))
-    told = [(name, value, f"{at:.3g}", f"{100 * at / rated:.2f}", f"{none:.2g}") for name, value, at, none in rows]
-    beside = (("seals", idle.seals), ("grease", idle.grease), ("with seals and grease", without_load + idle.turning))
-    told += [(name, "", "", "", "?" if torque is None else f"{torque:.2g}") for name, torque in beside]
-    return pd.DataFrame(
-        told,
-        columns=[
-            "contact",
-            "coefficient [-]",
-            "rated torque [N·m]",
-            "of the rated torque [%]",
-            "without torque [N·m]",
-        ],
-    )
+    coefficients = {CONTACTS[name]: f"{value:g}" for name, value in reducer.friction.coefficients.items()}
+    rows = [(own["contact"], own["rated_nm"], own["no_load_nm"]) for own in found["by_contact"]]
+    rows.append(("contacts together", sum(row[1] for row in rows), found["no_load_torque_of_contacts_nm"]))
+    beside = {"seals": "seals_nm", "grease": "grease_nm", "with seals and grease": "no_load_torque_nm"}
+    told = [
+        (name, coefficients.get(name, ""), f"{at:.3g}", f"{100 * at / rated:.2f}", f"{none:.2g}")
+        for name, at, none in rows
+    ] + [(name, "", "", "", "?" if found[key] is None else f"{found[key]:.2g}") for name, key in beside.items()]
+    heads = "contact", "coefficient [-]", "rated torque [N·m]", "of the rated torque [%]", "no-load torque [N·m]"
+    return pd.DataFrame(told, columns=heads)
 
 
 def _loop_figure(loop: FrictionLoop) -> Figure:
@@ -353,9 +356,9 @@ def _loop_figure(loop: FrictionLoop) -> Figure:
 
 
 def _pair(values: Float[np.ndarray, " sample"], unit_of_measurement: float) -> dict[str, float | None]:
-    """Return a number of this unit and of the perfect reducer; none where an angle has no answer."""
-    this, perfect = (None if np.isnan(value) else float(value / unit_of_measurement) for value in values[:2])
-    return {"this_unit": this, "perfect_reducer": perfect}
+    """Return a number of this unit and of exact parts; none where an angle has no answer."""
+    this, exact = (None if np.isnan(value) else float(value / unit_of_measurement) for value in values)
+    return {"this_unit": this, "exact_parts": exact}
 
 
 def _own_loads(loop: HysteresisLoop) -> dict[str, float]:
@@ -366,11 +369,11 @@ def _own_loads(loop: HysteresisLoop) -> dict[str, float]:
     }
 
 
-def _attributed(found: Attribution) -> dict[str, Any]:
+def _attributed(found: Attribution, orders: list[float]) -> dict[str, Any]:
     """Return which source makes how much of each main order, the source that moves the curve most first."""
-    main, span = np.argsort(-found.amplitude)[:_MAIN], np.ptp(found.contribution, axis=1)
+    main, span = [found.order.tolist().index(order) for order in orders], np.ptp(found.contribution, axis=1)
     return {
-        "orders": [int(order) for order in found.order[main]],
+        "orders": orders,
         "amplitude_arcsec": [float(value / ARCSECOND) for value in found.amplitude[main]],
         "sources": [
             {

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Duty(Inquiry["tuple[Reducer, tuple[LoadCase, ...]]"]):
-    """Lives of the bearings, loads, losses and temperature of the discs under a duty cycle, without part errors."""
+    """Lives of the bearings, loads, losses and temperature of the discs under a duty cycle, of exact parts."""
 
     word: ClassVar[str] = "duty"
     by_position: ClassVar[int] = 1
