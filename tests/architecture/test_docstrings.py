@@ -132,7 +132,6 @@ COMPUTES_NOTHING = {
     "allocation.search.discrete.group_options": "orders",
     "allocation.search.lagrange_dual.by_form": "orders",
     "capability.limit_state.run_of": "orders",
-    "sensitivity.sobol.joined": "orders",
     # asks others one after the other and passes on what they say
     "reducers.cycloid.solvers.pins.pin_forces": "passes on",
     "reducers.dynamics.solvers.stepping.advance": "passes on",
@@ -166,6 +165,7 @@ COMPUTES_NOTHING = {
     "reducers.equivalent.solvers.contact_solver.solve_at_node": "passes on",
     "reducers.equivalent.solvers.extremes.refine": "passes on",
     "reducers.equivalent.solvers.extremes.solve_extremes": "passes on",
+    "reducers.equivalent.solvers.turn.part_of": "picks",
     "reducers.equivalent.solvers.turn.solve_batch": "passes on",
     "reducers.equivalent.solvers.turn.solve_curves": "passes on",
     "reducers.equivalent.solvers.turn.solve_forces": "passes on",

@@ -10,7 +10,6 @@ from tests.validation_manual import shown
 from tolalloc.capability.indices import (
     Limits,
     capability,
-    defects_per_million_opportunities,
     quantile_interval,
     wilson_interval,
 )
@@ -70,12 +69,6 @@ def test_skewed_units_part_the_two_figures(generator):
     found = capability(generator.exponential(size=200_000), Limits(upper=6.0))
     assert found.empirical_ppm == pytest.approx(1e6 * np.exp(-6), rel=0.15)
     assert found.normal_ppm < 5.0
-
-
-def test_defects_per_million_opportunities():
-    assert defects_per_million_opportunities(3, 1000, 4) == pytest.approx(750.0)
-    found = capability(SAMPLE, Limits(upper=11.5))
-    assert defects_per_million_opportunities(found.outside, found.units) == pytest.approx(found.empirical_ppm)
 
 
 def test_wilson_ends_solve_its_equation():
@@ -150,7 +143,6 @@ def test_arguments_out_of_range():
         lambda: capability(np.array([1.0, np.nan]), Limits(upper=1.0)),
         lambda: capability(np.ones(4), Limits(upper=1.0)),
         lambda: capability(SAMPLE, Limits(upper=1.0), subgroup=4),
-        lambda: defects_per_million_opportunities(5, 2, 2),
         lambda: wilson_interval(0, 0),
         lambda: wilson_interval(10, 11),
         lambda: wilson_interval(10, 5, 1.0),

@@ -9,6 +9,7 @@ import pytest
 
 import tolalloc as ta
 from tests.builders import says, sizes
+from tests.verification.test_saltelli import of_the_largest
 from tolalloc.capability.indices import Limits
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.drawings.seeds import SeedTree
@@ -193,3 +194,35 @@ def test_a_function_of_arrays_has_the_shares_of_a_sum_to_a_hundredth_in_a_quick_
     assert found.blocks == QUICK_RANKING.of_fast_model(3).sobol.limit > 100 * QUICK_RANKING.sobol.limit
     assert (found.total_interval[1] - found.total_interval[0] < 0.05).all()
     assert EFFORT.of_fast_model(3) is EFFORT  # numbers of a user stay
+
+
+def largest_of_twelve(a, b, c, d, e, f, g, h, i, j, k, m):
+    return float(max(abs(n * x) for n, x in enumerate((a, b, c, d, e, f, g, h, i, j, k, m), start=1)))
+
+
+@pytest.mark.slow
+def test_a_quick_run_says_of_which_sources_too_few_blocks_show_what_they_do():
+    """max |n·x| of one number at a time: 64 blocks, a third of the sources hardly ever the largest."""
+    span = {"plus": 10.0, "minus": -10.0, "unit": "µm", "min": 1.0, "max": 90.0, "cost": 1.0}
+    output = "largest [mm]"
+    study = ta.Study(
+        ta.model(largest_of_twelve, inputs=dict.fromkeys("abcdefghijkm", 0.0), outputs=(output,)),
+        ta.Drawing.of_rows([{"id": name, **span} for name in "abcdefghijkm"]),
+        limits={output: ta.Limit(upper=0.2)},
+        questions=[ta.Ranking()],
+        name="largest",
+    )
+    answer = study.rank("quick")
+    found = answer.result.sobol.of(0)
+    assert found.blocks == QUICK_RANKING.sobol.limit
+    assert says(answer.sentences, "ranking.unseen", blocks=64, fewest=5)
+    (said,) = (own for own in answer.sentences if "too few to say" in own)
+    named = said.rpartition(": ")[2].partition(".")[0].split(", ")
+    assert {"a", "b", "c"} <= set(named) and not {"k", "m"} & set(named)
+    for low, high in (found.first_interval, found.total_interval, answer.result.sobol.overall.total_interval):
+        assert low.min() >= 0.0 and high.max() <= 1.0
+    assert (found.total_interval[1, :3] > 0.03).all()
+    table = answer.tables["ranking"]
+    assert table["S1 low 5 % [-]"].min() >= 0.0
+    exact = of_the_largest(np.arange(1.0, 13.0))[1]
+    assert ((found.total_interval[0] <= exact) & (exact <= found.total_interval[1])).sum() >= 10

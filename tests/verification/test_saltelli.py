@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import combinations
 
 import numpy as np
 import pytest
 from SALib.analyze import sobol as salib
-from scipy.stats import t
+from scipy.integrate import cumulative_trapezoid, trapezoid
+from scipy.stats import norm, t
 
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
@@ -20,14 +22,17 @@ from tolalloc.sensitivity.ranking import (
     percentile_interval,
     rank_interval,
     ranks,
+    share_interval,
     until_converged,
 )
 from tolalloc.sensitivity.saltelli import (
+    SaltelliDesign,
     SaltelliIndices,
     drawn,
     one_pass,
     saltelli_indices,
     t_weights,
+    unseen,
     without_each,
 )
 
@@ -186,8 +191,10 @@ def test_one_failed_sample_drops_its_block_and_nothing_else():
 
 def test_too_many_failed_samples_stop_the_analysis():
     values, size = answers(), 2 * SOURCES + 2
-    values[5] = np.inf
-    with pytest.raises(SolveError, match=r"1 of 96 blocks hold a failed sample; allowed is 0\.01"):
+    values[:11] = np.inf
+    assert indices(values).dropped == 1
+    values[5 * size] = np.inf
+    with pytest.raises(SolveError, match=r"12 of 1,152 units have no usable answer; allowed is a share of 0\.01"):
         indices(values)
     values[::size] = np.nan
     with pytest.raises(SolveError, match="0 of 96 blocks are left"):
@@ -229,6 +236,92 @@ def test_wrong_sizes_are_refused():
         indices(answers()[:-1])
 
 
+def normal_blocks(function: Callable[[np.ndarray], np.ndarray], sources: int, blocks: int, seed: int) -> np.ndarray:
+    """Return what a function says of normal numbers of a design [block·sample, 1]."""
+    design = SaltelliDesign(factor_groups=tuple(f"x{at}" for at in range(sources)), seed=seed)
+    return function(norm.ppf(np.maximum(np.concatenate(list(design.chunks(0, blocks))), 2.0**-31)))[:, np.newaxis]
+
+
+def intervals(found: SaltelliIndices) -> np.ndarray:
+    """Return the 90 % intervals of first-order and total indices of one output [kind, end, source]."""
+    return np.stack([share_interval(own[0], found.unseen[0]) for own in (found.first_resamples, found.total_resamples)])
+
+
+def of_the_largest(scales: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return first-order and total indices of max |sᵢ·xᵢ|, from E[max(a, R)] = a + ∫ₐ (1 − F_R) by trapezoids."""
+    m = np.linspace(0.0, 8.0 * scales.max(), 100_001)
+    below = 2.0 * norm.cdf(m / scales[:, np.newaxis]) - 1.0
+
+    def spread(of: np.ndarray, against: np.ndarray) -> float:
+        beyond = trapezoid(1.0 - against, m) - cumulative_trapezoid(1.0 - against, m, initial=0.0)
+        density, mean = np.gradient(of, m), m + beyond
+        return float(trapezoid(mean**2 * density, m) - trapezoid(mean * density, m) ** 2)
+
+    whole = spread(below.prod(axis=0), np.ones_like(m))
+    rest = [np.delete(below, at, axis=0).prod(axis=0) for at in range(scales.size)]
+    first = [spread(own, other) / whole for own, other in zip(below, rest, strict=True)]
+    total = [1.0 - spread(other, own) / whole for own, other in zip(below, rest, strict=True)]
+    return np.array(first), np.maximum(total, 1e-9)
+
+
+SCALES = np.arange(1.0, 13.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("blocks", "seeds", "alone"), [(16, 300, 0.9), (64, 300, 0.8), (256, 150, 0.75)])
+def test_intervals_of_sources_that_few_blocks_show_hold_as_often_as_they_say(blocks, seeds, alone):
+    """max |i·xᵢ|: of 12 sources a quarter is hardly ever the largest. A share over seeds errs by some 0.7 %."""
+    truth, held = np.array(of_the_largest(SCALES)), []
+    for seed in range(1, seeds + 1):
+        values = normal_blocks(lambda x: np.abs(x * SCALES).max(axis=1), 12, blocks, seed)
+        low, high = np.moveaxis(intervals(saltelli_indices(evaluation(values), 12, SeedTree(seed))), 1, 0)
+        assert low.min() >= 0.0 and high.max() <= 1.0
+        held.append((low <= truth) & (truth <= high))
+    by_kind = np.mean(held, axis=2)  # [seed, kind]
+    error = by_kind.std(axis=0) / np.sqrt(seeds)
+    assert error.max() < 0.01
+    assert (by_kind.mean(axis=0) + 2.0 * error > 0.9).all()
+    assert np.mean(held, axis=0).min() > alone
+
+
+@pytest.mark.parametrize(
+    ("function", "sources", "nothing"),
+    [
+        (lambda x: np.abs(x * SCALES).max(axis=1), 12, [0, 1, 2]),
+        (lambda x: x[:, 0] + 3.0 * (x[:, 1] > 3.0) * x[:, 2], 3, [1, 2]),  # one unit of 740 knows of them
+        (lambda x: x[:, 0] + np.maximum(x[:, 1] - 3.5, 0.0), 2, [1]),
+        (lambda x: np.minimum(x[:, 0], 4.0 + x[:, 1]), 2, [1]),
+        (lambda x: x @ np.array([3.0, 1.0, 0.0]), 3, [2]),
+        (lambda x: np.where(np.abs(x[:, 0]) < 3.2, x[:, 1], 9.0), 2, [0]),
+    ],
+)
+def test_what_no_block_shows_may_still_be_a_share(function, sources, nothing):
+    """Draws from blocks that show nothing are all 0, and an interval of them would be [0, 0]."""
+    found = saltelli_indices(evaluation(normal_blocks(function, sources, 64, 2)), sources, SeedTree(2))
+    known = [at for at in range(sources) if at not in nothing]
+    assert (found.unseen[0, nothing] > 0.01).all()
+    assert (intervals(found)[:, 0, nothing] == 0.0).all()
+    assert (intervals(found)[1, 1, nothing] == np.minimum(found.unseen[0, nothing], 1.0)).all()
+    assert (found.unseen[0, known[-1]] == 0.0).all()
+    more = saltelli_indices(evaluation(normal_blocks(function, sources, 4096, 2)), sources, SeedTree(2))
+    assert (more.unseen[0] < 0.05).all()
+
+
+def test_what_is_unseen_is_poissons_end_by_hand():
+    """None of 50 blocks: −ln 0.05/50 of a size of 4; two of them of one size: λ with e^−λ·(1 + λ + λ²/2) = 5 %."""
+    parts = np.zeros((50, 4))
+    parts[:, 0], parts[:2, 1], parts[:5, 3] = 4.0, 1.0, 1.0
+    found = unseen(parts)
+    assert found[0] == found[3] == 0.0
+    assert found[2] == pytest.approx(-np.log(0.05) / 50 * 4.0)
+    events = 50 * found[1] / ((1.0 + 1.0 + 4.0) / 3.0)
+    assert np.exp(-events) * (1.0 + events + events**2 / 2) == pytest.approx(0.05)
+    np.testing.assert_array_equal(unseen(np.stack([parts, 2 * parts], axis=1)), [found, 2 * found])
+    assert (
+        unseen(np.abs(SeedTree(1).generator().normal(size=(8, 100)))) == 0.0
+    ).all()  # a third of few blocks is enough
+
+
 def ranking(
     total: list[float] | np.ndarray, resamples: np.ndarray, sources: str = "abc", blocks: int = 64
 ) -> SourceRanking:
@@ -241,6 +334,7 @@ RESAMPLED = np.array([[0.5, 0.3, 0.2], [0.5, 0.2, 0.3], [0.6, 0.2, 0.1], [0.4, 0
 def test_ranks_and_orders_of_a_ranking_made_by_hand():
     assert ranks(RESAMPLED).tolist() == [[1, 2, 3], [1, 3, 2], [1, 2, 3], [1, 2, 3]]
     assert rank_interval(RESAMPLED).tolist() == [[1, 2, 2], [1, 3, 3]]
+    assert rank_interval(RESAMPLED * [1.0, 0.0, 0.0]).tolist() == [[1, 2, 2], [1, 3, 3]]  # equals share their ranks
     made = ranking([0.5, 0.3, 0.2], RESAMPLED)
     np.testing.assert_array_equal(made.among_first(2), [1.0, 0.75, 0.25])
     np.testing.assert_array_equal(before(RESAMPLED), [[0.5, 1, 1], [0, 0.5, 0.75], [0, 0.25, 0.5]])

@@ -173,7 +173,7 @@ def test_a_failed_sample_drops_its_permutation_and_too_many_stop_the_analysis():
     assert 0 < found.dropped <= 40
     assert found.permutations == 4000 - found.dropped
     within_standard_errors(found, 0, exact_linear(WEIGHTS, errors.normal_correlation))
-    with pytest.raises(SolveError, match=r"permutations hold a failed sample; allowed is 0\.01"):
+    with pytest.raises(SolveError, match=r"units have no usable answer; allowed is a share of 0\.01"):
         shapley_effects(Experiment.of(Function((linear,), fail_above=1.5), errors, SeedTree(0)), 4000)
     with pytest.raises(InputError, match="permutations is 1; allowed is 2 or more"):
         shapley_effects(Experiment.of(Function((linear,)), errors, SeedTree(0)), 1)

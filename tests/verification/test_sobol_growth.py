@@ -257,11 +257,12 @@ def test_one_failed_sample_drops_its_block_and_nothing_else(sample):
         np.testing.assert_allclose(getattr(broken.indices, name), getattr(whole, name), rtol=0, atol=1e-12)
 
 
-def test_more_than_one_block_in_a_hundred_stops_the_analysis_unless_the_caller_allows_it():
-    broken, weights = (0, 40), [[1.0, 2.0, 0.5]]
-    with pytest.raises(SolveError, match=r"2 of 128 blocks hold a failed sample; allowed is 0\.01"):
+def test_more_than_one_unit_in_a_hundred_stops_the_analysis_unless_the_caller_allows_it():
+    broken, weights = tuple(range(0, 70, 10)), [[1.0, 2.0, 0.5]]
+    assert analysis(weights, fixed(128), broken=broken[:6]).dropped == 6
+    with pytest.raises(SolveError, match=r"7 of 640 units have no usable answer; allowed is a share of 0\.01"):
         analysis(weights, fixed(128), broken=broken)
-    assert analysis(weights, fixed(128), broken=broken, share=0.02).dropped == 2
+    assert analysis(weights, fixed(128), broken=broken, share=0.02).dropped == 7
 
 
 def test_a_second_seed_reproduces_what_the_first_promises():

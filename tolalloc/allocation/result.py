@@ -86,72 +86,33 @@ class AssembledDrawing:
 
 @dataclass(frozen=True, kw_only=True)
 class AllocationResult:
-    """The cheapest drawing that keeps every requirement.
+    """The cheapest drawing that keeps every requirement."""
 
-    Parameters
-    ----------
-    name
-        Name of the study.
-    model
-        The model at the sources of the tolerance table.
-    requirements
-        What must be kept, the leading one first.
-    space
-        Design variables with every setting free.
-    fixed
-        The allocation with the settings as they are, if the question asks for it and the model has any.
-    free
-        The allocation of tolerances and settings together.
-    graded
-        The same on ladders of zones, if the question asks for it.
-    shares
-        Sobol indices of the leading output at the zones of the drawing.
-    shares_of_dimensions
-        The same of the dimensions of the drawing: all members of a group exchanged together.
-    trade
-        Cost of the cheapest zones over the settings, if asked for.
-    fronts
-        What can be had at which cost, if asked for.
-    front_lacks
-        Why it could not be found although it was asked for; empty otherwise.
-    robustness
-        Answers under changed assumptions, if asked for.
-    prices
-        Price of a good unit over yield targets, if the question states what becomes of the others.
-    loss
-        What the leading output costs a user, if the question states it.
-    error
-        Probability up to which the answer may call a design met that misses a limit [-].
-    examination
-        What the model counted of random units of the drawing, units in the names.
-    statuses
-        Outcome → number of units that were solved for the answer, without those that the front was searched with [-].
-    assembled
-        What was compared of the ways to choose parts at assembly, if the question names any.
-    proven
-        What no drawing with free zones costs less than on the real model, if asked for.
-    """
-
-    name: str
-    model: Model
-    requirements: tuple[Requirement, ...]
-    space: DesignSpace
+    name: str  # Name of the study
+    model: Model  # The model at the sources of the tolerance table
+    requirements: tuple[Requirement, ...]  # What must be kept, the leading one first
+    space: DesignSpace  # Design variables with every setting free
+    # The allocation with the settings as they are, if the question asks for it and the model has any
     fixed: ZoneAllocation | None
-    free: ZoneAllocation
-    graded: GradedAllocation | None
-    shares: SobolIndices
+    free: ZoneAllocation  # The allocation of tolerances and settings together
+    graded: GradedAllocation | None  # The same on ladders of zones, if the question asks for it
+    shares: SobolIndices  # Sobol indices of the leading output at the zones of the drawing
+    # The same of the dimensions of the drawing: all members of a group exchanged together
     shares_of_dimensions: SobolIndices
-    trade: SettingTrade | None
-    fronts: Fronts | None
-    robustness: Robustness | None
+    trade: SettingTrade | None  # Cost of the cheapest zones over the settings, if asked for
+    fronts: Fronts | None  # What can be had at which cost, if asked for
+    robustness: Robustness | None  # Answers under changed assumptions, if asked for
+    # Price of a good unit over yield targets, if the question states what becomes of the others
     prices: YieldLadder | None
-    loss: QualityLoss | None
-    error: float
-    examination: Mapping[str, float]
+    loss: QualityLoss | None  # What the leading output costs a user, if the question states it
+    error: float  # Probability up to which the answer may call a design met that misses a limit [-]
+    examination: Mapping[str, float]  # What the model counted of random units of the drawing, units in the names
+    # Outcome → number of units that were solved for the answer, without those that the front was searched with [-]
     statuses: Mapping[str, int]
-    front_lacks: str = ""
+    front_lacks: str = ""  # Why it could not be found although it was asked for; empty otherwise
+    # What was compared of the ways to choose parts at assembly, if the question names any
     assembled: AssembledDrawing | None = None
-    proven: ProvenBound | None = None
+    proven: ProvenBound | None = None  # What no drawing with free zones costs less than on the real model, if asked for
 
     @property
     def leading(self) -> str:

@@ -55,8 +55,6 @@ def transmission_curves(
 
     Parameters
     ----------
-    model
-        The reducer.
     errors
         Deviations in the order of the model's columns, `OrientationResponse.errors` [m, angles rad].
     torque
@@ -225,8 +223,6 @@ def transmission_effect(
         Measured errors of the parts; unless given, parts are drawn from the plan's tolerances [rad].
     state_weights
         Q [-].
-    seeds
-        Node of the seed tree.
     observe
         Told the statuses of each chunk.
 

@@ -11,15 +11,7 @@ from jaxtyping import Float, UInt8
 from scipy.stats import chi2
 
 from tolalloc.bench.measurements import MeasuredCurve
-from tolalloc.bench.posterior import (
-    CurveProblem,
-    DiagnosisEffort,
-    GaugeReading,
-    Noise,
-    explain,
-    posterior,
-    thinned,
-)
+from tolalloc.bench.posterior import CurveProblem, DiagnosisEffort, GaugeReading, Noise, explain, posterior, thinned
 from tolalloc.bench.readings import ANGLE, TRANSMISSION_ERROR, clean_curve, load_readings, require_torque
 from tolalloc.bench.repair import Advice, Repair, advised
 from tolalloc.bench.sources import (

@@ -591,7 +591,4 @@ def _row(plain: Source, cp: float, mean: float) -> tuple[Source, bool]:
         return row, clipped
     # Half the zone is the unit of a shift; a distribution that starts at a limit has a mean without any.
     shift = 2.0 * ((mean - plain.middle) / plain.zone - row.zone_mapping.moments[0])
-    return (
-        replace(row, shift=round(min(max(shift, -_SHIFT), _SHIFT), _WRITTEN)),
-        clipped or abs(shift) > _SHIFT,
-    )
+    return (replace(row, shift=round(min(max(shift, -_SHIFT), _SHIFT), _WRITTEN)), clipped or abs(shift) > _SHIFT)

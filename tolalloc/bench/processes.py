@@ -266,8 +266,6 @@ class Lots:
         Tests that are made of the lot [-].
     level
         False-alarm rate of all of them together [-].
-    seed
-        Seed of the random numbers [-].
     """
 
     def __init__(self, tests: int, level: float, seed: int) -> None:

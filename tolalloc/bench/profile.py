@@ -145,10 +145,7 @@ class ParameterEstimate:
 
 
 def estimates(
-    parameters: Sequence[Parameter],
-    found: Information,
-    written: Information,
-    profiles: Sequence[ParameterProfile],
+    parameters: Sequence[Parameter], found: Information, written: Information, profiles: Sequence[ParameterProfile]
 ) -> tuple[ParameterEstimate, ...]:
     """Return all parameters.
 

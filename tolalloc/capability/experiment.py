@@ -41,10 +41,7 @@ class Experiment(Generic[Answering]):
 
     @staticmethod
     def of(
-        response: Given,
-        errors: ErrorModel,
-        seeds: SeedTree,
-        largest_failed_share: float = LARGEST_FAILED_SHARE,
+        response: Given, errors: ErrorModel, seeds: SeedTree, largest_failed_share: float = LARGEST_FAILED_SHARE
     ) -> Experiment[Given]:
         """Return the experiment at the zones that the drawing has."""
         return Experiment(response, errors, errors.zones, seeds, largest_failed_share)

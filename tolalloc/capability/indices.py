@@ -140,8 +140,6 @@ def capability(sample: Float[np.ndarray, " unit"], limits: Limits, subgroup: int
     ----------
     sample
         Values of the characteristic [unit of the characteristic].
-    limits
-        One or two limits.
     subgroup
         Consecutive units that form a subgroup; 1 takes the mean moving range of neighbours instead [-].
 
@@ -185,32 +183,6 @@ def capability(sample: Float[np.ndarray, " unit"], limits: Limits, subgroup: int
     )
 
 
-def defects_per_million_opportunities(defects: int, units: int, opportunities: int = 1) -> float:
-    """Return defects per million opportunities, DPMO = 10⁶·defects / (units·opportunities) [-].
-
-    Parameters
-    ----------
-    defects
-        Violated limits over all units; one unit can have several [-].
-    units
-        Units inspected [-].
-    opportunities
-        Limited characteristics of one unit; with one, the figure is the empirical parts per million [-].
-
-    References
-    ----------
-    Montgomery 2012, Statistical Quality Control.
-
-    Examples
-    --------
-    >>> defects_per_million_opportunities(3, 1000, opportunities=2)
-    1500.0
-    """
-    if units < 1 or opportunities < 1 or not 0 <= defects <= units * opportunities:
-        raise InputError.at("DPMO", "defects", defects, f"0 to {units} units × {opportunities} opportunities")
-    return MILLION * defects / (units * opportunities)
-
-
 def wilson_interval(units: int, accepted: int, confidence: float = 0.95) -> ShareInterval:
     """Return a yield with its two-sided Wilson interval, which covers on average as stated, not at every yield.
 
@@ -218,8 +190,6 @@ def wilson_interval(units: int, accepted: int, confidence: float = 0.95) -> Shar
     ----------
     units, accepted
         Units of the sample, and how many are within the limits [-].
-    confidence
-        Confidence of the interval [-].
 
     References
     ----------
@@ -258,8 +228,6 @@ def quantile_interval(sample: Float[np.ndarray, " unit"], share: float, confiden
         Independent values of the characteristic [unit of the characteristic].
     share
         Which quantile [-].
-    confidence
-        Confidence of the interval [-].
 
     References
     ----------

@@ -45,8 +45,6 @@ class CountedLimitState:
 
     Parameters
     ----------
-    limit_state
-        The limit state.
     largest_failed_share
         Share of calls that may fail [-].
     """
@@ -96,10 +94,10 @@ class RareFailure:
     standard_error: float
     # Calls of the limit state, and how many of them gave no usable answer [-]
     calls: int
-    failed: int
+    failed: int = 0
     method: str  # Name of the method
-    cautions: tuple[str, ...]  # Reasons not to rely on the estimate; empty if the method sees none
-    effective_samples: float  # Number of equally weighted failures that would know as much; 0 if no sample failed [-]
+    cautions: tuple[str, ...] = ()  # Reasons not to rely on the estimate; empty if the method sees none
+    effective_samples: float = 0.0  # Equally weighted failures that would know as much; 0 if no sample failed [-]
 
     @property
     def coefficient_of_variation(self) -> float:

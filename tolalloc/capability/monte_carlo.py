@@ -221,8 +221,6 @@ class ProcessDoubt:
 
         Parameters
         ----------
-        errors
-            The sources.
         x
             Deviations of random units [m, angles rad].
         values
@@ -398,8 +396,6 @@ def monte_carlo(
 
     Parameters
     ----------
-    units
-        Number of units [-].
     design
         How the units are spread; all intervals assume the first one.
 
@@ -548,10 +544,7 @@ def share_change(before: Bool[np.ndarray, " unit"], after: Bool[np.ndarray, " un
 
 
 def quantile_change(
-    before: Float[np.ndarray, " unit"],
-    after: Float[np.ndarray, " unit"],
-    share: float,
-    generator: np.random.Generator,
+    before: Float[np.ndarray, " unit"], after: Float[np.ndarray, " unit"], share: float, generator: np.random.Generator
 ) -> Change:
     """Return how a quantile of the units with both answers changes [unit of the output].
 
@@ -621,10 +614,7 @@ def largest_excess(
 
 
 def kept_at_once(
-    evaluation: Evaluation,
-    outputs: Sequence[str],
-    limits: Mapping[str, Limits],
-    doubting: Doubting | None = None,
+    evaluation: Evaluation, outputs: Sequence[str], limits: Mapping[str, Limits], doubting: Doubting | None = None
 ) -> Yield:
     """Return the share of units that keep all limits at once; one without an answer keeps none.
 

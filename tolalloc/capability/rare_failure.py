@@ -41,10 +41,6 @@ def subset_simulation(
 
     Parameters
     ----------
-    limit_state
-        The limit state.
-    seeds
-        Node of the seed tree.
     samples
         Samples of each level, a multiple of 10 [-].
     runs
@@ -65,12 +61,10 @@ def subset_simulation(
     --------
     A plane at a distance of 3 has the probability Φ(−3) = 1.35e-3.
 
-    >>> class Plane:
-    ...     variables = 2
-    ...
-    ...     def __call__(self, u):
-    ...         return 3.0 - u.sum(axis=1) / np.sqrt(2)
-    >>> found = subset_simulation(Plane(), SeedTree(1), samples=1000)
+    >>> from tolalloc.capability.experiment import sum_of_sizes
+    >>> from tolalloc.capability.limit_state import ResponseLimit
+    >>> plane = ResponseLimit(experiment=sum_of_sizes(6.0, 12.0), limit=3.0 * np.sqrt(5.0))
+    >>> found = subset_simulation(plane, SeedTree(1), samples=1000)
     >>> abs(found.probability - 1.35e-3) < 3 * found.standard_error
     True
     """
@@ -143,10 +137,6 @@ def scaled_sigma_sampling(
 
     Parameters
     ----------
-    limit_state
-        The limit state.
-    seeds
-        Node of the seed tree.
     samples
         Samples of each width, a multiple of 10 [-].
     runs
@@ -176,12 +166,10 @@ def scaled_sigma_sampling(
     --------
     A plane at a distance of 3 has the probability Φ(−3) = 1.35e-3.
 
-    >>> class Plane:
-    ...     variables = 2
-    ...
-    ...     def __call__(self, u):
-    ...         return 3.0 - u.sum(axis=1) / np.sqrt(2)
-    >>> found = scaled_sigma_sampling(Plane(), SeedTree(1), samples=1000)
+    >>> from tolalloc.capability.experiment import sum_of_sizes
+    >>> from tolalloc.capability.limit_state import ResponseLimit
+    >>> plane = ResponseLimit(experiment=sum_of_sizes(6.0, 12.0), limit=3.0 * np.sqrt(5.0))
+    >>> found = scaled_sigma_sampling(plane, SeedTree(1), samples=1000)
     >>> abs(found.probability - 1.35e-3) < 3 * found.standard_error
     True
     """

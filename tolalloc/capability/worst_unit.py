@@ -38,10 +38,7 @@ _Units = tuple[Float[np.ndarray, " start"], Float[np.ndarray, "start column"], F
 
 
 def worst_unit(
-    experiment: Experiment[ResponseWithDerivatives],
-    starts: int = 32,
-    steps: int = 60,
-    sense: Literal[1, -1] = 1,
+    experiment: Experiment[ResponseWithDerivatives], starts: int = 32, steps: int = 60, sense: Literal[1, -1] = 1
 ) -> WorstUnit:
     """Return the worst unit that an ascent from many random units finds inside the zones.
 
@@ -102,11 +99,7 @@ def worst_unit(
         values, gradients = _solved(experiment, sense, units, gradients, weight)
         failed += int(np.isinf(values).sum())
         worse = (values > worst[0])[:, np.newaxis]
-        worst = (
-            np.maximum(worst[0], values),
-            np.where(worse, units, worst[1]),
-            np.where(worse, gradients, worst[2]),
-        )
+        worst = (np.maximum(worst[0], values), np.where(worse, units, worst[1]), np.where(worse, gradients, worst[2]))
     if failed > allowed * starts * (steps + 1) or np.isinf(worst[0]).all():
         raise SolveError(
             f"Worst case: {failed} of {starts * (steps + 1)} units have no usable answer; allowed is a share of "
@@ -164,8 +157,6 @@ def _extreme_in_zone(
 
     Parameters
     ----------
-    source
-        The source.
     units
         Its columns now, from which waves are searched [-].
     gradients
@@ -199,17 +190,12 @@ def _extreme_in_zone(
 
 
 def _moved_towards(
-    source: Source,
-    units: Float[np.ndarray, "unit column"],
-    targets: Float[np.ndarray, "unit column"],
-    part: float,
+    source: Source, units: Float[np.ndarray, "unit column"], targets: Float[np.ndarray, "unit column"], part: float
 ) -> Float[np.ndarray, "unit column"]:
     """Return the parts that lie between two parts inside the zone, waves with phases between theirs.
 
     Parameters
     ----------
-    source
-        The source.
     units, targets
         Its columns of either part [-].
     part

@@ -16,14 +16,7 @@ from scipy.stats import binom
 from scipy.stats import t as student
 
 from tolalloc.capability.experiment import FEWEST_RUNS
-from tolalloc.capability.indices import (
-    MILLION,
-    Capability,
-    Limits,
-    ShareInterval,
-    capability,
-    defects_per_million_opportunities,
-)
+from tolalloc.capability.indices import MILLION, Capability, Limits, ShareInterval, capability
 from tolalloc.capability.limit_state import ChainedEstimate, LimitState, RareFailure, ResponseLimit
 from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo, ProcessDoubt, Yield, require_few_failures
 from tolalloc.capability.rare_failure import MOST_KNOWN, ScaledSigmaEstimate, scaled_sigma_sampling, subset_simulation
@@ -73,13 +66,9 @@ def agreement(
 
     Parameters
     ----------
-    limit_state
-        The limit state.
     plain
         Share of random units beyond the limit, those without an answer included; they decide alone if 30 or more of
         them lie there, or if more than a thousandth has no answer.
-    seeds
-        Node of the seed tree.
     samples, scaled
         Samples of each level of subset simulation and of each width of scaled-sigma sampling, multiples of 10 [-].
     runs
@@ -102,15 +91,7 @@ def agreement(
 
     >>> from tolalloc.capability.experiment import sum_of_sizes
     >>> state = ResponseLimit(experiment=sum_of_sizes(6.0, 12.0), limit=4.0 * np.sqrt(5.0))
-    >>> plain = RareFailure(
-    ...     probability=0.0,
-    ...     standard_error=np.inf,
-    ...     calls=1000,
-    ...     failed=0,
-    ...     method="Monte Carlo",
-    ...     cautions=(),
-    ...     effective_samples=0.0,
-    ... )
+    >>> plain = RareFailure(probability=0.0, standard_error=np.inf, calls=1000, method="Monte Carlo")
     >>> found = agreement(state, plain, SeedTree(1), samples=1000, runs=2, scaled=500).estimate
     >>> abs(found.probability - 3.17e-5) < 3.0 * found.standard_error
     True
@@ -152,15 +133,7 @@ def judged(plain: RareFailure, levels: ChainedEstimate, scaled: ScaledSigmaEstim
 
     >>> from tolalloc.capability.experiment import sum_of_sizes
     >>> state = ResponseLimit(experiment=sum_of_sizes(6.0, 12.0), limit=4.0 * np.sqrt(5.0))
-    >>> plain = RareFailure(
-    ...     probability=0.0,
-    ...     standard_error=np.inf,
-    ...     calls=1000,
-    ...     failed=0,
-    ...     method="Monte Carlo",
-    ...     cautions=(),
-    ...     effective_samples=0.0,
-    ... )
+    >>> plain = RareFailure(probability=0.0, standard_error=np.inf, calls=1000, method="Monte Carlo")
     >>> levels = subset_simulation(state, SeedTree(1), 1000, 2)
     >>> scaled = scaled_sigma_sampling(state, SeedTree(2), 500, 2, known=levels.failing)
     >>> found = judged(plain, levels, scaled).estimate
@@ -279,7 +252,6 @@ class YieldAtLimit:
     estimates: tuple[RareFailure, ...]  # What every method said, random units first
     verdict: str  # One sentence that says whether to rely on the estimate, and why
     capability: Capability  # Indices of the random units
-    defects_per_million: float  # Random units rejected per million opportunities, one for each unit [-]
 
     @property
     def parts_per_million(self) -> ShareInterval:
@@ -303,19 +275,12 @@ class YieldAtLimit:
 
 
 def yield_at_limit(
-    limit_state: ResponseLimit,
-    sample: MonteCarlo,
-    *,
-    samples: int = 4000,
-    runs: int = 5,
-    scaled: int = 2000,
+    limit_state: ResponseLimit, sample: MonteCarlo, *, samples: int = 4000, runs: int = 5, scaled: int = 2000
 ) -> YieldAtLimit:
     """Return the yield at a limit.
 
     Parameters
     ----------
-    limit_state
-        The limit on the response.
     sample
         Random units whose first output is the limited one; they decide alone if 30 or more exceed the limit, units
         without an answer included.
@@ -356,15 +321,8 @@ def yield_at_limit(
     require_few_failures(sample, "yield at a limit", allowed)
     within = sample.within(limit)
     plain = _random_units(sample, within)
-    found = agreement(
-        limit_state,
-        plain,
-        experiment.seeds,
-        samples=samples,
-        runs=runs,
-        scaled=scaled,
-        largest_failed_share=allowed,
-    )
+    effort = {"samples": samples, "runs": runs, "scaled": scaled}
+    found = agreement(limit_state, plain, experiment.seeds, largest_failed_share=allowed, **effort)
     counted = ShareInterval(estimate=within.estimate, low=within.low, high=within.high, confidence=CONFIDENCE)
     interval = counted if found.estimate.method == _RANDOM_UNITS else log_normal_interval(found.estimate, runs)
     return YieldAtLimit(
@@ -374,7 +332,6 @@ def yield_at_limit(
         estimates=found.estimates,
         verdict=found.verdict,
         capability=capability(sample.values, Limits(upper=limit)),
-        defects_per_million=defects_per_million_opportunities(within.rejected, within.units),
     )
 
 
@@ -403,8 +360,6 @@ def log_normal_interval(failure: RareFailure, runs: int, confidence: float = CON
         Estimate above zero with its standard error.
     runs
         Independent runs that it is the mean of, two or more [-].
-    confidence
-        Confidence of the interval [-].
 
     References
     ----------

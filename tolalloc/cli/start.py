@@ -199,8 +199,6 @@ def sources_of(reducer: Reducer, complete: bool = False) -> tuple[Source, ...]:
 
     Parameters
     ----------
-    reducer
-        The reducer.
     complete
         Whether every source has a zone and may change, as in the shipped drawings; or else the first stage is locked,
         and phases, tilts, single pins and teeth are neglected.

@@ -7,7 +7,7 @@ rank, judge and allocate.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
@@ -51,6 +51,13 @@ class Evaluation:
     def good(self) -> Bool[np.ndarray, " sample"]:
         """Which samples may be used."""
         return np.asarray((self.status == 0) & np.isfinite(self.values).all(axis=1))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Evaluation]) -> Evaluation:
+        """Return the answers of several parts, one after the other."""
+        return cls(
+            values=np.concatenate([own.values for own in parts]), status=np.concatenate([own.status for own in parts])
+        )
 
 
 @runtime_checkable

@@ -31,8 +31,6 @@ def read_bytes(path: Path, what: str) -> bytes:
 
     Parameters
     ----------
-    path
-        The file.
     what
         What it should be, for messages.
 
@@ -74,8 +72,6 @@ def require_table(path: Path, content: bytes, is_workbook: bool) -> None:
 
     Parameters
     ----------
-    path
-        The file, for messages.
     content
         What it holds.
     is_workbook

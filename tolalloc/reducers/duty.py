@@ -138,8 +138,6 @@ def duty_of(reducer: Reducer, cases: Sequence[LoadCase], resistance: float | Non
 
     Parameters
     ----------
-    reducer
-        The reducer.
     cases
         Load cases with torque and speed.
     resistance

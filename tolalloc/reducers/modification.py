@@ -280,8 +280,6 @@ def rotated_profile_fit(
 
     Parameters
     ----------
-    stage
-        Cycloid stage.
     shift_sign
         1 for a positive and −1 for a negative shift [-].
     metric

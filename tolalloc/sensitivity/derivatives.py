@@ -10,13 +10,13 @@ from jaxtyping import Float
 from scipy.special import ndtr, ndtri
 
 from tolalloc.capability.experiment import Experiment
-from tolalloc.capability.monte_carlo import MonteCarlo, require_few_failures
+from tolalloc.capability.monte_carlo import AnsweredUnits, MonteCarlo, require_few_failures
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import SolveError
 from tolalloc.models.model import Response, ResponseWithDerivatives
 from tolalloc.reading.units import MICROMETRE
 from tolalloc.sensitivity.ranking import percentile_interval
-from tolalloc.sensitivity.saltelli import resample_counts
+from tolalloc.sensitivity.saltelli import resample_counts, unseen
 
 _STEP = 1e-4
 """Step of the differences in standard normal space; rounding and curvature then both cost about 1e-8 [-]."""
@@ -91,6 +91,7 @@ class DerivativeMeasures:
     variance: float  # Variance of the output [output²]
     bound: Float[np.ndarray, " source"]  # Measure over variance, not less than the total Sobol index [-]
     bound_resamples: Float[np.ndarray, "resample source"]  # The same from bootstrap resamples of the units [-]
+    unseen: Float[np.ndarray, " source"]  # Bound possible where too few units show an effect, else 0 [-]
     # Good units, and those without a usable answer [-]
     units: int
     failed: int
@@ -98,7 +99,7 @@ class DerivativeMeasures:
     @property
     def bound_interval(self) -> Float[np.ndarray, "2 source"]:
         """90 % percentile interval of the bounds [-]."""
-        return percentile_interval(self.bound_resamples)
+        return percentile_interval(self.bound_resamples, unseen=self.unseen)
 
 
 def local_derivatives(experiment: Experiment[ResponseWithDerivatives], units: int = 1024) -> LocalDerivatives:
@@ -202,6 +203,7 @@ def derivative_measures(
         variance=float(variance[0]),
         bound=bounds[0],
         bound_resamples=bounds[1:],
+        unseen=unseen(squares) / variance[0],
         units=centred.size,
         failed=sample.failed,
     )
@@ -273,7 +275,7 @@ def classical_estimate(experiment: Experiment[Response]) -> ClassicalEstimate:
     Raises
     ------
     SolveError
-        A sample failed.
+        The unit without errors failed, or more of the others than allowed.
 
     Notes
     -----
@@ -307,9 +309,10 @@ def classical_estimate(experiment: Experiment[Response]) -> ClassicalEstimate:
         x.append(rows)
         start = own.stop
     evaluation = experiment.response(np.concatenate(x))
-    if not evaluation.good.all():
-        raise SolveError(f"Classical estimate: {np.count_nonzero(~evaluation.good)} single-error units failed.")
-    values = evaluation.values[:, 0]
+    require_few_failures(AnsweredUnits(evaluation=evaluation), "classical estimate", experiment.largest_failed_share)
+    values = np.where(evaluation.good, evaluation.values[:, 0], -np.inf)
+    if not evaluation.good[0]:
+        raise SolveError("Classical estimate: the unit without errors has no usable answer.")
     without = float(values[0])
     return ClassicalEstimate(
         sources=tuple(source.name for source in errors.active),

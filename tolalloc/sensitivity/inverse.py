@@ -55,11 +55,7 @@ class InverseSensitivity:
 
 
 def inverse_sensitivity(
-    experiment: Experiment[Response],
-    *,
-    limit: float,
-    target: float,
-    units: int = 2048,
+    experiment: Experiment[Response], *, limit: float, target: float, units: int = 2048
 ) -> InverseSensitivity:
     """Return how far each zone may open, or must close, alone.
 
@@ -274,10 +270,7 @@ def _squared(excess: Float[np.ndarray, " found"], limit: float) -> Float[np.ndar
 
 
 def _crossings(
-    openings: _Openings,
-    sources: Int[np.ndarray, " found"],
-    bracket: Float[np.ndarray, "4 found"],
-    limit: float,
+    openings: _Openings, sources: Int[np.ndarray, " found"], bracket: Float[np.ndarray, "4 found"], limit: float
 ) -> tuple[Float[np.ndarray, " found"], Float[np.ndarray, "found 3"]]:
     """Return the factors at which the quantile equals the limit [-], and there the quantile and its interval."""
     stale, fresh = bracket[:2].copy()

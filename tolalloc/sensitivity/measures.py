@@ -211,13 +211,6 @@ def _first(sample: MonteCarlo, units: int) -> MonteCarlo:
 def rank(asked: Measures, record: RunRecord) -> RankingResult:
     """Return what drives the outputs of a model at the zones of its drawing.
 
-    Parameters
-    ----------
-    asked
-        What may be measured.
-    record
-        Keeps statuses and times.
-
     Raises
     ------
     InputError, UnknownNameError

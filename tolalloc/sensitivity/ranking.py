@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.stats import norm
+from scipy.stats import norm, rankdata
 
 from tolalloc.exceptions import InputError
 
@@ -42,11 +42,13 @@ class SourceRanking:
     total_resamples: Float[np.ndarray, "resample source"]
     blocks: int  # Saltelli blocks used [-]
     drives: tuple[str, ...] = ()  # Of a ranking over several outputs: the one for which each source has that index
+    # Index that a source may have where too few blocks show it, else 0 [-]
+    unseen: Float[np.ndarray, " source"] | float = 0.0
 
     @property
     def total_interval(self) -> Float[np.ndarray, "2 source"]:
-        """90 % percentile interval of the total indices [-]."""
-        return percentile_interval(self.total_resamples)
+        """90 % interval of the total indices [-]."""
+        return share_interval(self.total_resamples, self.unseen)
 
     @property
     def order(self) -> list[int]:
@@ -55,17 +57,7 @@ class SourceRanking:
 
     @property
     def rank_interval(self) -> Float[np.ndarray, "2 source"]:
-        """90 % percentile interval of each source's rank over the resamples, 1 for the largest [-].
-
-        References
-        ----------
-        Percentiles of the ranks of draws, as of bootstrap resamples: Hall & Miller 2009, Annals of Statistics 37.
-
-        Examples
-        --------
-        >>> rank_interval(np.array([[0.2, 0.5]] * 99 + [[0.6, 0.5]])).tolist()
-        [[2, 1], [2, 1]]
-        """
+        """90 % interval of each source's rank, `tolalloc.sensitivity.ranking.rank_interval` [-]."""
         return rank_interval(self.total_resamples).astype(float)
 
     @property
@@ -107,21 +99,40 @@ class SourceRanking:
         return np.asarray((ranks(self.total_resamples) <= count).mean(axis=0))
 
 
-def percentile_interval(
-    resamples: Float[np.ndarray, "resample source"], confidence: float = 0.9
+def share_interval(
+    resamples: Float[np.ndarray, "resample source"], unseen: Float[np.ndarray, " source"] | float = 0.0
 ) -> Float[np.ndarray, "2 source"]:
-    """Return the two-sided percentile interval of every index [-].
+    """Return the two-sided 90 % interval of shares of a variance, which lie within 0 and 1 [-].
+
+    Efron & Tibshirani 1993, ch. 13, as `percentile_interval`.
+
+    Examples
+    --------
+    >>> share_interval(np.linspace(-0.2, 0.8, 101)[:, np.newaxis])[:, 0].round(3).tolist()
+    [0.0, 0.75]
+    """
+    return np.asarray(np.clip(percentile_interval(resamples, unseen=unseen), 0.0, 1.0))
+
+
+def percentile_interval(
+    resamples: Float[np.ndarray, "resample source"],
+    confidence: float = 0.9,
+    unseen: Float[np.ndarray, " source"] | float = 0.0,
+) -> Float[np.ndarray, "2 source"]:
+    """Return the two-sided percentile interval of every index, from 0 to what is unseen where that is more [-].
 
     References
     ----------
     Efron & Tibshirani 1993, ch. 13: the quantiles (1 ∓ confidence)/2 of the resamples. For 100 resamples or more.
+    What is unseen: `tolalloc.sensitivity.saltelli.unseen`.
 
     Examples
     --------
     >>> percentile_interval(np.linspace(0.0, 1.0, 101)[:, np.newaxis])[:, 0].round(3).tolist()
     [0.05, 0.95]
     """
-    return np.asarray(np.quantile(resamples, _tails(confidence), axis=0))
+    low, high = np.quantile(resamples, _tails(confidence), axis=0)
+    return np.array([np.where(unseen > high, 0.0, low), np.maximum(high, unseen)])
 
 
 def ranks(resamples: Float[np.ndarray, "resample source"]) -> Int[np.ndarray, "resample source"]:
@@ -134,11 +145,11 @@ def ranks(resamples: Float[np.ndarray, "resample source"]) -> Int[np.ndarray, "r
     >>> ranks(np.array([[0.2, 0.5, 0.5]])).tolist()
     [[3, 1, 2]]
     """
-    return np.asarray(np.argsort(np.argsort(-resamples, axis=1, kind="stable"), axis=1, kind="stable") + 1)
+    return np.asarray(rankdata(-resamples, "ordinal", axis=1))
 
 
 def rank_interval(resamples: Float[np.ndarray, "resample source"]) -> Int[np.ndarray, "2 source"]:
-    """Return the two-sided 90 % interval of every rank, of whole ranks that some resample has [-].
+    """Return the two-sided 90 % interval of every rank, of whole ranks that some resample has; equals share theirs [-].
 
     Quantiles 5 % and 95 % of the ranks of draws from the errors, inverse of their distribution: Hall & Miller 2009,
     Annals of Statistics 37, 3929–3959.
@@ -150,7 +161,10 @@ def rank_interval(resamples: Float[np.ndarray, "resample source"]) -> Int[np.nda
     >>> rank_interval(np.array([[0.2, 0.5]] * 99 + [[0.6, 0.5]])).tolist()
     [[2, 1], [2, 1]]
     """
-    return np.asarray(np.quantile(ranks(resamples), _tails(_CONFIDENCE), axis=0, method="inverted_cdf").astype(int))
+    ends = zip(("min", "max"), _tails(_CONFIDENCE), strict=True)
+    return np.array(
+        [np.quantile(rankdata(-resamples, way, axis=1), at, axis=0, method="inverted_cdf") for way, at in ends], int
+    )
 
 
 def before(resamples: Float[np.ndarray, "resample source"]) -> Float[np.ndarray, "source source"]:

@@ -22,7 +22,9 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from scipy.special import gammaincinv
 
+from tolalloc.capability.monte_carlo import AnsweredUnits, require_few_failures
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Evaluation
@@ -186,6 +188,7 @@ class SaltelliIndices:
     variance_left_out: Float[np.ndarray, "output replicate"]
     weights: Float[np.ndarray, "resample replicate"]
     varies: Bool[np.ndarray, " output"]  # Whether the output varies; only then do its indices exist
+    unseen: Float[np.ndarray, "output source"]  # Index that a source may have where too few blocks show it, else 0 [-]
     # Blocks used, and blocks dropped because one of their samples failed [-]
     blocks: int
     dropped: int
@@ -233,14 +236,14 @@ def saltelli_indices(
     resamples
         Draws from the errors of the indices [-].
     largest_failed_share
-        Share of blocks that may hold a failed sample [-].
+        Share of samples that may fail [-].
     control
         Answers of a cheap model, with which first-order and total indices are corrected.
 
     Raises
     ------
     SolveError
-        More blocks than allowed hold a failed sample, or fewer than two are left.
+        More samples than allowed failed, or fewer than two blocks without a failed one are left.
 
     Notes
     -----
@@ -269,7 +272,9 @@ def saltelli_indices(
         raise InputError.at("Sobol indices", "samples", evaluation.status.size, f"a multiple of {size}")
     whole = evaluation.good.reshape(-1, size).all(axis=1)
     blocks = int(np.count_nonzero(whole))
-    _require_blocks(whole.size, blocks, largest_failed_share)
+    require_few_failures(AnsweredUnits(evaluation=evaluation), "Sobol indices", largest_failed_share)
+    if blocks < 2:
+        raise SolveError(f"Sobol indices: {blocks} of {whole.size} blocks are left; at least 2 are needed.")
     values = evaluation.values.reshape(whole.size, size, -1)
     present, replicate = np.unique(np.flatnonzero(whole) % min(replicates, whole.size), return_inverse=True)
     _require_replicates(present.size, blocks)
@@ -281,14 +286,15 @@ def saltelli_indices(
             for at in range(values.shape[2])  # one copy in memory at a time
         ]
         varies, variance, first, total, second = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        plain = total
+        plain, shown = total, [_shown(values[:, :, at][whole], sources) for at in range(values.shape[2])]
         if control is not None:
             own, many = (answers.reshape(-1, size, values.shape[2]) for answers in (control.own, control.many))
             first, total = first.copy(), total.copy()
             for at in np.flatnonzero(varies):
-                both = values[:, :, at][whole], own[:, :, at][whole]
-                first[at], total[at] = _controlled(*both, many[:, :, at], (first[at], total[at]), counts, sources)
+                both, mine = (values[:, :, at][whole], own[:, :, at][whole]), (first[at], total[at], shown[at])
+                first[at], total[at], shown[at] = _controlled(*both, many[:, :, at], mine, counts, sources)
     return SaltelliIndices(
+        unseen=np.stack([unseen(np.abs(own)) for own in shown]),
         first=first[:, 0],
         total=total[:, 0],
         second=second[:, 0],
@@ -337,11 +343,11 @@ def _controlled(
     answers: Float[np.ndarray, "block sample"],
     cheap: Float[np.ndarray, "block sample"],
     many: Float[np.ndarray, "cheap_block sample"],
-    plain: tuple[Float[np.ndarray, "row source"], Float[np.ndarray, "row source"]],
+    plain: tuple[Float[np.ndarray, "row source"], Float[np.ndarray, "row source"], Float[np.ndarray, "block source"]],
     counts: Float[np.ndarray, "row block"],
     sources: int,
-) -> tuple[Float[np.ndarray, "row source"], Float[np.ndarray, "row source"]]:
-    """Return first-order and total indices of one output, less what a cheap model tells of their error.
+) -> tuple[Float[np.ndarray, "row source"], Float[np.ndarray, "row source"], Float[np.ndarray, "block source"]]:
+    """Return first-order and total indices of one output, and what blocks show, less what a cheap model tells of it.
 
     That is the difference between its indices from the same blocks and from many others. Each row leaves out a
     replicate of both, so that the error of the cheap indices counts too.
@@ -351,13 +357,20 @@ def _controlled(
     if not (same[0][0] and other[0][0]):
         return plain
     indices, cheap_indices, known = (
-        np.concatenate(both, axis=1) for both in (plain, *((own[2][0], own[3][0]) for own in (same, other)))
+        np.concatenate(both, axis=1) for both in (plain[:2], *((own[2][0], own[3][0]) for own in (same, other)))
     )
     weights = optimal_weights(
         _influences(answers, indices[0], sources), _influences(cheap, cheap_indices[0], sources), counts
     )
     found = indices - weights.T * (cheap_indices - known)
-    return found[:, :sources], np.maximum(found[:, sources:], 0.0)
+    left = plain[2] - weights[sources:, 0] * _shown(cheap, sources)
+    return found[:, :sources], np.maximum(found[:, sources:], 0.0), left
+
+
+def _shown(answers: Float[np.ndarray, "block sample"], sources: int) -> Float[np.ndarray, "block source"]:
+    """Return what every block shows of the total index of each source, 0 of an output that does not vary [-]."""
+    changes, variance = (answers[:, :1] - answers[:, 1 : sources + 1]) ** 2 / 2, answers[:, [0, -1]].var()
+    return np.asarray(changes / (variance or np.inf))
 
 
 def _contributions(
@@ -506,6 +519,35 @@ def salib_estimates(
     return found["S1"], found["ST"], np.array([found["S2"][pair] for pair in pairs])
 
 
+FEWEST_SHOWING = 5
+"""Blocks that show a source, at most, below which draws hold its index too rarely: 79 % of max |i·xᵢ|, none 0 % [-]."""
+
+
+def unseen(parts: Float[np.ndarray, "block *output source"]) -> Float[np.ndarray, "*output source"]:
+    """Return the mean that a part may have which too few blocks show, and 0 for all others [unit of the parts].
+
+    Blocks count as n = (Σp)²/Σp² of the size Σp²/Σp. Where n < 5, and less than a third of all, one more of the largest
+    size of any source is taken into the mean size, and the 95 % end of Poisson's law for n into their number.
+
+    References
+    ----------
+    Bohm & Zech 2014, Nucl. Instrum. Methods A 748 (weighted events as Poisson's); Garwood 1936 (ends of that law).
+
+    Examples
+    --------
+    Sources that no block of 100 shows, and one that all show; 3.0 in 100 of its size are possible, at 95 %.
+
+    >>> unseen(np.array([[0.0, 1.0]] * 100)).round(3).tolist()
+    [0.03, 0.0]
+    """
+    whole, squares = parts.sum(axis=0), (parts**2).sum(axis=0)
+    size = np.divide(squares, whole, out=np.zeros_like(whole), where=whole > 0)
+    showing = np.divide(whole, size, out=np.zeros_like(whole), where=size > 0)
+    mean_size = (whole + size.max(axis=-1, keepdims=True)) / (showing + 1)
+    few = showing < min(FEWEST_SHOWING, len(parts) / 3)
+    return np.asarray(np.where(few, gammaincinv(showing + 1, 0.95) * mean_size / len(parts), 0.0))
+
+
 def resample_counts(blocks: int, resamples: int, seeds: SeedTree) -> Float[np.ndarray, "row block"]:
     """Return how often each resample holds each block [-]; the first row is no resample and holds each once.
 
@@ -588,17 +630,6 @@ def _over_variance(
 ) -> Float[np.ndarray, "output row index"]:
     """Return parts of the variance over it, 0 where there is none [-]."""
     return np.asarray(np.divide(part, variance, out=np.zeros_like(part), where=variance > np.finfo(float).eps))
-
-
-def _require_blocks(drawn: int, whole: int, largest_failed_share: float) -> None:
-    """Raise unless the blocks that are left can be trusted."""
-    if drawn - whole > largest_failed_share * drawn:
-        raise SolveError(
-            f"Sobol indices: {drawn - whole} of {drawn} blocks hold a failed sample; allowed is "
-            f"{largest_failed_share:.4g} of them, because more would bias the indices."
-        )
-    if whole < 2:
-        raise SolveError(f"Sobol indices: {whole} of {drawn} blocks are left; at least 2 are needed.")
 
 
 def _require_replicates(present: int, blocks: int) -> None:

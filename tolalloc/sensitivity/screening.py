@@ -20,15 +20,15 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
-from tolalloc.capability.monte_carlo import MonteCarlo, require_few_failures
+from tolalloc.capability.monte_carlo import AnsweredUnits, MonteCarlo, require_few_failures
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Response
 from tolalloc.running.compiled import in_threads
 from tolalloc.sensitivity.effort import CLASSES, FEWEST_TRAJECTORIES, FEWEST_UNITS_OF_CLASS
-from tolalloc.sensitivity.ranking import percentile_interval
-from tolalloc.sensitivity.saltelli import resample_counts
+from tolalloc.sensitivity.ranking import percentile_interval, share_interval
+from tolalloc.sensitivity.saltelli import resample_counts, unseen
 from tolalloc.sensitivity.target import limited_measures
 
 _CURVE_POINTS = 100
@@ -159,13 +159,14 @@ class ElementaryEffects:
     mu_star_resamples: Float[np.ndarray, "output resample source"]
     # Standard deviation of the effects, NaN for a source of several columns [output]
     sigma: Float[np.ndarray, "output source"]
+    unseen: Float[np.ndarray, "output source"]  # Mean possible where too few show an effect, else 0 [output]
     # Trajectories used, and those dropped because one of their samples failed [-]
     trajectories: int
     dropped: int
 
     def mu_star_interval(self, output: int) -> Float[np.ndarray, "2 source"]:
         """Return the 90 % percentile interval of the mean magnitudes of one output [output]."""
-        return percentile_interval(self.mu_star_resamples[output])
+        return percentile_interval(self.mu_star_resamples[output], unseen=self.unseen[output])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,8 +186,8 @@ class MomentIndependent:
 
     @property
     def delta_interval(self) -> Float[np.ndarray, "2 source"]:
-        """90 % percentile interval of delta [-]."""
-        return percentile_interval(self.delta_resamples)
+        """90 % interval of delta [-]."""
+        return share_interval(self.delta_resamples)
 
 
 def elementary_effects(experiment: Experiment[Response], trajectories: int) -> ElementaryEffects:
@@ -202,7 +203,7 @@ def elementary_effects(experiment: Experiment[Response], trajectories: int) -> E
     InputError
         Fewer than two trajectories.
     SolveError
-        More trajectories hold a failed sample than allowed, or fewer than two are left.
+        More samples failed than allowed, or fewer than two trajectories without a failed one are left.
 
     References
     ----------
@@ -235,11 +236,9 @@ def elementary_effects(experiment: Experiment[Response], trajectories: int) -> E
     evaluation = experiment.response(experiment.deviations(errors.standard_values(uniform)))
     whole = evaluation.good.reshape(trajectories, -1).all(axis=1)
     used = int(np.count_nonzero(whole))
-    if trajectories - used > experiment.largest_failed_share * trajectories or used < FEWEST_TRAJECTORIES:
-        raise SolveError(
-            f"Elementary effects: {trajectories - used} of {trajectories} trajectories hold a failed sample; allowed "
-            f"is {experiment.largest_failed_share:.4g} of them, and two must be left."
-        )
+    require_few_failures(AnsweredUnits(evaluation=evaluation), "elementary effects", experiment.largest_failed_share)
+    if used < FEWEST_TRAJECTORIES:
+        raise SolveError(f"Elementary effects: {used} of {trajectories} trajectories are left; at least 2 are needed.")
     members = np.array(groups)[:, np.newaxis] == names
     x, y = (own.reshape(trajectories, len(names) + 1, -1)[whole] for own in (uniform, evaluation.values))
     effects = _effects(x, y, members, _LEVELS / (2.0 * (_LEVELS - 1)))
@@ -251,6 +250,7 @@ def elementary_effects(experiment: Experiment[Response], trajectories: int) -> E
         mu_star=mu_star,
         mu_star_resamples=counts @ np.abs(effects) / used,
         sigma=sigma,
+        unseen=unseen(np.abs(effects).transpose(1, 0, 2)),
         trajectories=used,
         dropped=trajectories - used,
     )
@@ -379,9 +379,7 @@ def _known(errors: ErrorModel, x: Float[np.ndarray, "unit column"]) -> list[Floa
 
 
 def _reduced_deltas(
-    columns: Float[np.ndarray, "unit source"],
-    y: Float[np.ndarray, " unit"],
-    drawn: Int[np.ndarray, "resample unit"],
+    columns: Float[np.ndarray, "unit source"], y: Float[np.ndarray, " unit"], drawn: Int[np.ndarray, "resample unit"]
 ) -> Float[np.ndarray, "resample source"]:
     """Return twice the estimates less those of each resample; their mean is the estimate without its bias [-].
 

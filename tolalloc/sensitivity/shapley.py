@@ -9,10 +9,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.capability.experiment import Experiment
+from tolalloc.capability.monte_carlo import AnsweredUnits, require_few_failures
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Evaluation, Response
-from tolalloc.sensitivity.ranking import percentile_interval, rank_interval
-from tolalloc.sensitivity.saltelli import resample_counts
+from tolalloc.sensitivity.ranking import rank_interval, share_interval
+from tolalloc.sensitivity.saltelli import resample_counts, unseen
 
 _RESAMPLES = 400
 _AT_ONCE = 128
@@ -32,14 +33,15 @@ class ShapleyEffects:
     # for all samples [-].
     effects: Float[np.ndarray, "output source"]
     resamples: Float[np.ndarray, "output resample source"]  # The same from bootstrap resamples of the permutations [-]
+    unseen: Float[np.ndarray, "output source"]  # Share possible where too few permutations show a source, else 0 [-]
     # Permutations used, and permutations dropped because one of their samples failed [-]
     permutations: int
     dropped: int
     samples: int  # Samples evaluated [-]
 
     def interval(self, output: int) -> Float[np.ndarray, "2 source"]:
-        """Return the 90 % percentile interval of the effects on an output [-]."""
-        return percentile_interval(self.resamples[output])
+        """Return the 90 % interval of the effects on an output [-]."""
+        return share_interval(self.resamples[output], self.unseen[output])
 
     def rank_interval(self, output: int) -> Int[np.ndarray, "2 source"]:
         """Return the 90 % percentile interval of each source's rank, 1 for the largest effect on an output [-]."""
@@ -59,7 +61,7 @@ def shapley_effects(experiment: Experiment[Response], permutations: int) -> Shap
     Raises
     ------
     SolveError
-        More permutations than allowed hold a failed sample.
+        More samples than allowed failed, or fewer than two permutations without a failed one are left.
 
     Notes
     -----
@@ -86,23 +88,23 @@ def shapley_effects(experiment: Experiment[Response], permutations: int) -> Shap
     """
     if permutations < 2:
         raise InputError.at("Shapley effects", "permutations", permutations, "2 or more")
-    response, allowed = experiment.response, experiment.largest_failed_share
-    names = tuple(dict.fromkeys(experiment.errors.source_of_column))
-    parts = [_added(response(x), position) for position, x in _samples(experiment, permutations)]
-    added = np.concatenate(parts)
+    response, names = experiment.response, tuple(dict.fromkeys(experiment.errors.source_of_column))
+    answered = [(response(x), position) for position, x in _samples(experiment, permutations)]
+    evaluation = Evaluation.joined([own for own, _ in answered])
+    require_few_failures(AnsweredUnits(evaluation=evaluation), "Shapley effects", experiment.largest_failed_share)
+    added = np.concatenate([_added(*own) for own in answered])
     used = added.shape[0]
-    if permutations - used > allowed * permutations or used < 2:
-        raise SolveError(
-            f"Shapley effects: {permutations - used} of {permutations} permutations hold a failed sample; allowed is "
-            f"{allowed:.4g} of them, because more would bias the effects."
-        )
+    if used < 2:
+        raise SolveError(f"Shapley effects: {used} of {permutations} permutations are left; at least 2 are needed.")
     counts = resample_counts(used, _RESAMPLES, experiment.seeds.child("resamples"))
-    effects = _shares(added, counts)
+    effects, possible = _shares(added, counts), unseen(np.abs(added))
+    whole = added.mean(axis=0).sum(axis=1, keepdims=True)
     return ShapleyEffects(
         sources=names,
         outputs=response.outputs,
         effects=effects[:, 0],
         resamples=effects[:, 1:],
+        unseen=np.divide(possible, whole, out=np.zeros_like(possible), where=whole > 0.0),
         permutations=used,
         dropped=permutations - used,
         samples=permutations * (len(names) + 1),

@@ -25,7 +25,7 @@ from tolalloc.sensitivity.ranking import (
     Resampled,
     SourceRanking,
     indistinguishable_from_zero,
-    percentile_interval,
+    share_interval,
     until_converged,
 )
 from tolalloc.sensitivity.saltelli import REPLICATES, SaltelliDesign, SaltelliIndices, drawn, saltelli_indices
@@ -50,13 +50,15 @@ class SobolIndices(SourceRanking):
 
     @property
     def first_interval(self) -> Float[np.ndarray, "2 source"]:
-        """90 % percentile interval of the first-order indices [-]."""
-        return percentile_interval(self.first_resamples)
+        """90 % interval of the first-order indices [-]."""
+        return share_interval(self.first_resamples, self.unseen)
 
     @property
     def second_interval(self) -> Float[np.ndarray, "2 pair"]:
-        """90 % percentile interval of the second-order indices [-]."""
-        return percentile_interval(self.second_resamples)
+        """90 % interval of the second-order indices [-]."""
+        one, other = np.reshape(self.pairs, (-1, 2)).astype(int).T
+        unseen = np.broadcast_to(self.unseen, len(self.sources))
+        return share_interval(self.second_resamples, np.minimum(unseen[one], unseen[other]))
 
     @property
     def first_is_zero(self) -> Bool[np.ndarray, " source"]:
@@ -189,6 +191,7 @@ def _indices_of(
         blocks=blocks,
         dropped=found.dropped,
         samples=samples,
+        unseen=found.unseen[at],
     )
 
 
@@ -212,6 +215,7 @@ def _overall_ranking(
         total_resamples=indices.total_resamples[varying].max(axis=0),
         blocks=indices.blocks,
         drives=tuple(outputs[varying[at]] for at in total.argmax(axis=0)),
+        unseen=indices.unseen[varying].max(axis=0),
     )
 
 
@@ -228,18 +232,19 @@ class OrderContribution:
     # The same as draws from their errors [-]
     first_resamples: Float[np.ndarray, "order resample source"]
     total_resamples: Float[np.ndarray, "order resample source"]
+    unseen: Float[np.ndarray, "order source"]  # Share that a source may have where too few blocks show it, else 0 [-]
     # Root of the sum of the variances of cosine and sine, the standard deviation of the wave [output]
     deviation: Float[np.ndarray, " order"]
 
     @property
     def first_interval(self) -> Float[np.ndarray, "order 2 source"]:
-        """90 % percentile interval of the shares that the sources give alone [-]."""
-        return np.stack([percentile_interval(own) for own in self.first_resamples])
+        """90 % interval of the shares that the sources give alone [-]."""
+        return np.stack([share_interval(*own) for own in zip(self.first_resamples, self.unseen, strict=True)])
 
     @property
     def total_interval(self) -> Float[np.ndarray, "order 2 source"]:
-        """90 % percentile interval of the shares in which the sources take part [-]."""
-        return np.stack([percentile_interval(own) for own in self.total_resamples])
+        """90 % interval of the shares in which the sources take part [-]."""
+        return np.stack([share_interval(*own) for own in zip(self.total_resamples, self.unseen, strict=True)])
 
 
 def order_contribution(analysis: SobolAnalysis, waves: Mapping[float, Sequence[str | int]]) -> OrderContribution:
@@ -286,6 +291,7 @@ def order_contribution(analysis: SobolAnalysis, waves: Mapping[float, Sequence[s
         total=total[:, 0],
         first_resamples=drawn(first, found.weights),
         total_resamples=drawn(total, found.weights, positive=True),
+        unseen=_of_waves(found.unseen[pairs][:, :, np.newaxis], variance[:, :, :1])[:, 0],
         deviation=np.sqrt(variance[:, :, 0].sum(axis=1)),
     )
 
@@ -338,7 +344,7 @@ def sobol_indices(
     Raises
     ------
     SolveError
-        Too many blocks hold a failed sample, or no output varies.
+        Too many samples failed, or no output varies.
 
     Notes
     -----
@@ -418,7 +424,7 @@ class _Blocks:
         if self.steps:
             start = self.steps[-1].blocks + self.steps[-1].dropped
             more = solved(self.experiment, self.further, self.design.chunks(start, blocks))
-            self.answers = joined([self.answers, more])
+            self.answers = Evaluation.joined([self.answers, more])
             outputs = self.further.outputs
             self.steps.append(self._indices(self.answers, outputs))
         else:
@@ -474,14 +480,7 @@ def solved(
     """Return what a response says of the samples of a design, uniform numbers chunk by chunk."""
     errors = experiment.errors
     standard = (errors.standard_values(np.maximum(uniform, _HALF_STEP)) for uniform in chunks)
-    return joined([response(experiment.deviations(own)) for own in standard])
-
-
-def joined(parts: Sequence[Evaluation]) -> Evaluation:
-    """Return the answers of several parts together."""
-    return Evaluation(
-        values=np.concatenate([part.values for part in parts]), status=np.concatenate([part.status for part in parts])
-    )
+    return Evaluation.joined([response(experiment.deviations(own)) for own in standard])
 
 
 def _groups(errors: ErrorModel, factor_groups: tuple[str, ...]) -> tuple[str, ...]:
@@ -516,7 +515,7 @@ def regrouped(
     Raises
     ------
     SolveError
-        Too many blocks hold a failed sample, or the output does not vary.
+        Too many samples failed, or the output does not vary.
 
     References
     ----------

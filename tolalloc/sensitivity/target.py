@@ -14,7 +14,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import limited_measure
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.sensitivity.effort import FEWEST_OUTSIDE, WORST_SHARE, fewest_units
-from tolalloc.sensitivity.ranking import percentile_interval
+from tolalloc.sensitivity.ranking import percentile_interval, share_interval
 
 _CLASSES_PER_ROOT = 2
 """Classes of a measure over √units: fewer would hide how steeply the chance rises, more would scatter [-]."""
@@ -46,8 +46,8 @@ class TargetSensitivity:
 
     @property
     def first_interval(self) -> Float[np.ndarray, "2 source"]:
-        """90 % percentile interval of the first-order target indices [-]."""
-        return percentile_interval(self.first_resamples)
+        """90 % interval of the first-order target indices [-]."""
+        return share_interval(self.first_resamples)
 
     @property
     def lift_interval(self) -> Float[np.ndarray, "2 source"]:
@@ -85,8 +85,6 @@ def target_sensitivity(
         The sources that the units were drawn from, at any zones.
     limit
         Largest output allowed; unless enough units stand on either side, the worst 5 % are taken instead [output].
-    seeds
-        Node of the seed tree.
     resamples, permutations
         Bootstrap resamples, and random choices of units for the test of no effect [-].
     largest_failed_share

@@ -57,8 +57,6 @@ def uncertain_effect(
     ----------
     model
         What answers, to first order by `with_uncertain` and exactly by `changed`.
-    output
-        Name of the output with its unit.
     x
         Good units, the first of which are taken.
     seeds
@@ -76,14 +74,10 @@ def uncertain_effect(
     >>> from unittest.mock import Mock
     >>> from tolalloc.models.model import Evaluation, Model
     >>> answer = lambda x, k: Evaluation(values=(x[:, :1] * k), status=np.zeros(len(x), np.uint8))
-    >>> model = Mock(
-    ...     spec=Model,
-    ...     uncertain=(CorrelatedSource(name="k", columns=("k",), covariance=np.array([[0.01]])),),
-    ...     accuracy={},
-    ...     reading=lambda _: lambda x: answer(x, 1.0),
-    ...     with_uncertain=lambda _: lambda x: answer(x, 1.0 + x[:, 1:]),
-    ...     changed=lambda by: Mock(reading=lambda _: lambda x: answer(x, 1.0 + by[0])),
-    ... )
+    >>> k = CorrelatedSource(name="k", columns=("k",), covariance=np.eye(1) / 100)
+    >>> model = Mock(spec=Model, uncertain=(k,), accuracy={}, reading=lambda _: lambda x: answer(x, 1.0))
+    >>> model.with_uncertain = lambda _: lambda x: answer(x, 1.0 + x[:, 1:])
+    >>> model.changed = lambda by: Mock(reading=lambda _: lambda x: answer(x, 1.0 + by[0]))
     >>> round(uncertain_effect(model, "y [mm]", np.array([[2.0]]), SeedTree(1)).sigma, 6)
     0.2
     """
@@ -123,14 +117,10 @@ def first_order_error(
     >>> from unittest.mock import Mock
     >>> from tolalloc.models.model import Evaluation, Model
     >>> answer = lambda x, k: Evaluation(values=(x[:, :1] * k), status=np.zeros(len(x), np.uint8))
-    >>> model = Mock(
-    ...     spec=Model,
-    ...     uncertain=(CorrelatedSource(name="k", columns=("k",), covariance=np.array([[0.01]])),),
-    ...     accuracy={},
-    ...     reading=lambda _: lambda x: answer(x, 1.0),
-    ...     with_uncertain=lambda _: lambda x: answer(x, 1.0 + x[:, 1:]),
-    ...     changed=lambda by: Mock(reading=lambda _: lambda x: answer(x, 1.0 + by[0])),
-    ... )
+    >>> k = CorrelatedSource(name="k", columns=("k",), covariance=np.eye(1) / 100)
+    >>> model = Mock(spec=Model, uncertain=(k,), accuracy={}, reading=lambda _: lambda x: answer(x, 1.0))
+    >>> model.with_uncertain = lambda _: lambda x: answer(x, 1.0 + x[:, 1:])
+    >>> model.changed = lambda by: Mock(reading=lambda _: lambda x: answer(x, 1.0 + by[0]))
     >>> found = first_order_error(model, "y [mm]", np.array([[2.0]]), np.array([[0.1]]))
     >>> round(found.effect, 6), found.root_mean_square < 1e-12
     (0.2, True)

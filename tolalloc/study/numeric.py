@@ -118,8 +118,6 @@ def deviations(reducer: Reducer, by_name: Mapping[str, Any]) -> Float[np.ndarray
 
     Parameters
     ----------
-    reducer
-        The reducer.
     by_name
         Name of a column → its deviation, a number for all samples or an array of one for each [m, angles rad]. A
         deviation that is not named is 0; ``modification.equidistant``, ``modification.shift`` and
@@ -168,8 +166,6 @@ def transmission_error(
 
     Parameters
     ----------
-    reducer
-        The reducer.
     deviations
         Errors of its parts, by name or as rows.
     carrier_angle
@@ -530,7 +526,7 @@ def sobol(
     Raises
     ------
     SolveError
-        More than one in a hundred blocks has no answer.
+        More than one in a hundred samples has no answer.
 
     References
     ----------
@@ -547,6 +543,7 @@ def sobol(
     """
     from tolalloc.drawings.seeds import SeedTree
     from tolalloc.models.model import Evaluation
+    from tolalloc.sensitivity.ranking import share_interval
     from tolalloc.sensitivity.saltelli import REPLICATES, SaltelliDesign, saltelli_indices
 
     names, replicates = tuple(f"{at}" for at in range(inputs)), min(REPLICATES, blocks)
@@ -560,7 +557,7 @@ def sobol(
         replicates=replicates,
         resamples=resamples,
     )
-    intervals = [np.percentile(own[0], (5, 95), axis=0) for own in (found.first_resamples, found.total_resamples)]
+    intervals = [share_interval(own[0], found.unseen[0]) for own in (found.first_resamples, found.total_resamples)]
     return SobolIndices(found.first[0], found.total[0], *intervals)
 
 
@@ -593,8 +590,6 @@ def failure_probability(
         Samples of each level, a multiple of 10 [-].
     runs
         Independent runs, whose mean is the estimate and whose scatter its standard error [-].
-    seed
-        Seed [-].
 
     Raises
     ------

@@ -49,10 +49,6 @@ class Question(NamedFields, ABC):
 
         Parameters
         ----------
-        prepared
-            The checked study.
-        record
-            Told of stages and solved units.
         checkpoint
             File that keeps an interrupted search, if one is wanted.
         """

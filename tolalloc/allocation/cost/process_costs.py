@@ -45,14 +45,7 @@ UNITS = {
 
 
 CostCurve = Literal[
-    "reciprocal",
-    "reciprocal power",
-    "reciprocal squared",
-    "exponential",
-    "combined",
-    "tabulated",
-    "spline",
-    "fitted",
+    "reciprocal", "reciprocal power", "reciprocal squared", "exponential", "combined", "tabulated", "spline", "fitted"
 ]
 """How a cost falls with the zone."""
 
@@ -169,9 +162,7 @@ def today(source: Source) -> Process:
 
 
 def priced(
-    rows: Mapping[str, Iterable[PricedWay]],
-    sources: Sequence[Source],
-    tolerance: Literal["zone", "half zone"] = "zone",
+    rows: Mapping[str, Iterable[PricedWay]], sources: Sequence[Source], tolerance: Literal["zone", "half zone"] = "zone"
 ) -> ProcessesOfSources:
     """Return the ways to make features from costs A + B/t, for a user's own model.
 
@@ -183,8 +174,6 @@ def priced(
     ----------
     rows
         Source → name of a process, A [cost units], B [cost units × mm], and smallest and largest t that it holds [mm].
-    sources
-        Rows of the tolerance table.
     tolerance
         Whether t is the whole zone, or half of it as in ± t.
 
@@ -232,8 +221,6 @@ def load_process_costs(name: str | Path, sources: Sequence[Source]) -> Processes
     ----------
     name
         Shipped name, or path of the user's CSV file; files of points stand beside it.
-    sources
-        Rows of the tolerance table.
 
     Raises
     ------

@@ -126,12 +126,8 @@ def search(
 
     Parameters
     ----------
-    problem
-        What is searched.
     known
         Genes of designs known to be good, part of the first generation, possibly none.
-    seeds
-        Node of the seed tree.
     population, generations
         Designs of a generation and number of generations, the first among them [-].
     checkpoint

@@ -93,8 +93,6 @@ def pareto_front(
 
     Parameters
     ----------
-    space
-        The design variables.
     kernel
         Quantile of a design on the real kernel; several searches may share its cached answers.
     baseline
@@ -105,10 +103,6 @@ def pareto_front(
         First designs to run on the kernel.
     convex_front
         Designs of the convex program, run on the kernel too and part of every first population.
-    seeds
-        Node of the seed tree.
-    effort
-        How much may be spent.
     ladders
         Group → the scales that it may have, rising [-].
     large
@@ -178,8 +172,6 @@ def exact_front(
 
     Parameters
     ----------
-    space
-        The design variables.
     stacks
         Convex models with the budget of the limits, that of the peak-to-peak first.
     limit
@@ -232,8 +224,6 @@ def searched_front(
 
     Parameters
     ----------
-    space
-        The design variables.
     kernel
         Quantile of a design on the real kernel, common random numbers, at the spread of the verified design.
     best
@@ -242,10 +232,6 @@ def searched_front(
         Its local models with at least the budget that it takes; designs must keep those of the other requirements.
     exact
         Exact front of its models, from which the search starts.
-    seeds
-        Node of the seed tree.
-    effort
-        How much may be spent.
     ladders
         Group → the scales that it may have, rising [-].
     large

@@ -53,8 +53,6 @@ def price_ranges(problem: AllocationProblem, optimum: Solution) -> tuple[PriceRa
 
     Parameters
     ----------
-    problem
-        The allocation with the local models.
     optimum
         Its cheapest design; processes stay as they are.
 
@@ -158,8 +156,7 @@ def graded_price_ranges(problem: DiscreteProblem, optimum: DiscreteSolution) -> 
     _require_proven(optimum)
     return tuple(
         PriceRange(
-            low=_break_even(problem, optimum, at, coarser=False),
-            high=_break_even(problem, optimum, at, coarser=True),
+            low=_break_even(problem, optimum, at, coarser=False), high=_break_even(problem, optimum, at, coarser=True)
         )
         for at in range(len(optimum.options))
     )
@@ -212,8 +209,6 @@ def worst_prices(problem: AllocationProblem, optimum: Solution, nodes: int = 100
 
     Parameters
     ----------
-    problem
-        The allocation with the local models.
     optimum
         Its cheapest design.
     nodes
@@ -314,10 +309,7 @@ def _cut(feature: PricedFeature, cost: float) -> Iterator[Process]:
     """Return a feature's processes, cheaper than a cost with their price raised, dearer with it lowered."""
     for made in feature.processes:
         middle = _zone_of_cost(made, cost)
-        for low, high, weight in (
-            (made.minimum, middle, 1 - COST_CHANGE),
-            (middle, made.maximum, 1 + COST_CHANGE),
-        ):
+        for low, high, weight in ((made.minimum, middle, 1 - COST_CHANGE), (middle, made.maximum, 1 + COST_CHANGE)):
             if low < high or made.minimum == made.maximum:
                 yield replace(
                     made,

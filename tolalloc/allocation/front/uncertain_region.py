@@ -136,8 +136,6 @@ def uncertain_region(verifier: Verifier, allocation: ZoneAllocation) -> Uncertai
     ----------
     verifier
         Verifies the chosen design again with every changed model.
-    allocation
-        What was found.
 
     Returns
     -------

@@ -71,8 +71,6 @@ def cost_at_yield(space: DesignSpace, allocation: ZoneAllocation, target: float)
 
     Parameters
     ----------
-    space
-        The design variables.
     allocation
         What was found for the yield asked for; its local models are used.
     target
@@ -284,8 +282,6 @@ def robustness(
     ----------
     verifier
         Verifies the chosen design again with every changed model.
-    allocation
-        What was found.
     nodes
         Most nodes of the search for the worst prices [-].
     graded

@@ -48,8 +48,6 @@ class ConvexProgram:
 
     Parameters
     ----------
-    features
-        What is chosen.
     processes
         Position of the process of every feature.
     stacks
@@ -118,8 +116,6 @@ class ConvexProgram:
 
         Parameters
         ----------
-        stacks
-            What must be kept.
         lower, upper
             Bounds of the zones, inside those of the processes unless they are given [unit of the zone].
         shared
@@ -249,11 +245,7 @@ class WholeNumbers:
 
 
 def choose_whole_numbers(
-    cost: Float[np.ndarray, " column"],
-    rows: Any,
-    limits: Float[np.ndarray, " row"],
-    one_each: Any,
-    most_nodes: int,
+    cost: Float[np.ndarray, " column"], rows: Any, limits: Float[np.ndarray, " row"], one_each: Any, most_nodes: int
 ) -> WholeNumbers:
     """Return the zeros and ones z of least cost·z with rows·z ≤ limits and one_each·z = 1.
 

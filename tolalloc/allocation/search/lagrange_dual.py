@@ -264,10 +264,7 @@ _STEPS = 60
 
 
 def ascend(
-    dual: LagrangeDual,
-    start: PricedProcesses,
-    allowed: Bool[np.ndarray, " process"],
-    enough: float = np.inf,
+    dual: LagrangeDual, start: PricedProcesses, allowed: Bool[np.ndarray, " process"], enough: float = np.inf
 ) -> list[PricedProcesses]:
     """Return the multipliers tried on the way to the largest lower bound, the start first.
 
@@ -340,8 +337,6 @@ def cost_bound(
 
     Parameters
     ----------
-    problem
-        The allocation.
     prices
         Price of every stack's budget to start from, 0 or above; any give a valid bound, the shadow prices a tight one
         [cost units per unit of the stack].

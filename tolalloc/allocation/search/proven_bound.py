@@ -207,8 +207,6 @@ def cheapest_box(space: DesignSpace, conditions: Conditions, units: int, cost: f
 
     Parameters
     ----------
-    space
-        The design variables.
     conditions
         What a design keeps.
     units

@@ -27,8 +27,6 @@ class Programs:
 
     Parameters
     ----------
-    space
-        The design variables.
     stacks
         Number of one-sided constraints of all requirements [-].
     """
@@ -179,8 +177,6 @@ def aimed(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float = 1.0
 
     Parameters
     ----------
-    last
-        The design.
     tried
         It and all designs before it.
     margin
@@ -243,8 +239,6 @@ def model_range(chosen: VerifiedDesign, tried: Iterable[VerifiedDesign]) -> Mode
 
     Parameters
     ----------
-    chosen
-        The design.
     tried
         Designs that were verified, whatever their members and steps are.
 
@@ -280,8 +274,6 @@ def kept_stacks(chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margi
 
     Parameters
     ----------
-    chosen
-        The design.
     tried
         All designs of its search, which tell how lucky its own sample was.
     margin
@@ -530,10 +522,6 @@ def _cheapest_by_models(
 
     Parameters
     ----------
-    space
-        The design variables.
-    chosen
-        The verified design.
     tried
         All designs of its search.
     margin
@@ -567,8 +555,6 @@ def allocate(
         Verifies designs on random units.
     proportional_tried
         Designs with all zones scaled alike, `tolalloc.allocation.search.zone_allocation.scale_in_proportion`.
-    effort
-        How much may be spent.
     start
         A verified design to start from, the best of proportional scaling if there is none; with the reducer's own
         modification it tells tolerances alone from tolerances and modification together.

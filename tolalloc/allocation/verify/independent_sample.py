@@ -173,7 +173,7 @@ class SolvedPart:
         """Return all units of several parts as one."""
         drawn = [own.units.drawn for own in parts]
         return cls(
-            evaluation=_joined([own.evaluation for own in parts]),
+            evaluation=Evaluation.joined([own.evaluation for own in parts]),
             units=SolvedUnits(
                 drawn=Drawn(units=sum(own.units for own in drawn), whatever=sum(own.whatever for own in drawn)),
                 near=np.concatenate([own.units.near for own in parts]),
@@ -211,7 +211,7 @@ class UnitSolver:
                 parts.append(self._answered(np.concatenate(rows)))
                 rows.clear()
         parts += [self._answered(np.concatenate(rows))] if rows else []
-        evaluation = _joined([own for own, *_ in parts])
+        evaluation = Evaluation.joined([own for own, *_ in parts])
         off_the_law = {name: np.concatenate([own[name] for _, own, _ in parts]) for name in self.laws}
         whatever = np.arange(evaluation.status.size) < drawn.whatever
         return SolvedPart(
@@ -233,9 +233,3 @@ class UnitSolver:
 
 def _known(evaluation: Evaluation) -> Float[np.ndarray, "solved output"]:
     return np.where(evaluation.good[:, np.newaxis], evaluation.values, np.nan)
-
-
-def _joined(parts: list[Evaluation]) -> Evaluation:
-    return Evaluation(
-        values=np.concatenate([own.values for own in parts]), status=np.concatenate([own.status for own in parts])
-    )

@@ -256,10 +256,5 @@ def orders_against_speed(
         peak_to_peak[:, at], unsettled[:, at] = np.ptp(last, axis=1), np.abs(difference).max(axis=1)
         status[:, at] = found.status.max(axis=1)
     return OrdersAgainstSpeed(
-        speed=speeds,
-        order=order,
-        amplitude=amplitude,
-        peak_to_peak=peak_to_peak,
-        unsettled=unsettled,
-        status=status,
+        speed=speeds, order=order, amplitude=amplitude, peak_to_peak=peak_to_peak, unsettled=unsettled, status=status
     )

@@ -42,8 +42,8 @@ def _search(discs: int) -> None:
     solves, status, curve = np.zeros(1, np.int64), np.zeros(1, np.uint8), np.zeros((1, 0))
     found = SolvedExtremes(extreme, position, left_over, solves, status, residual, curve)
     tables, errors = model.tables_at(model.search.node_angle), np.zeros((1, len(model.columns)))
-    given = (columns.layout, columns.map, model.design, errors, -1.0, model.search)
-    refine((0,) * discs, tables, *given, turn, found)
+    given = (columns.layout, columns.map, model.design, errors, -1.0)
+    refine((0,) * discs, tables, given, model.search, turn, found)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -158,11 +158,7 @@ GEAR_MESH = Interface(
         ErrorSource(name="sun.eccentricity", characteristic=ECCENTRIC, shape="vector", place="sun", first_stage=True),
         ErrorSource(name="sun.pitch", shape="waves", place="sun.teeth", neglected="sun.pitch", first_stage=True),
         ErrorSource(
-            name="planet{i}.eccentricity",
-            characteristic=ECCENTRIC,
-            shape="vector",
-            place="planet{i}",
-            first_stage=True,
+            name="planet{i}.eccentricity", characteristic=ECCENTRIC, shape="vector", place="planet{i}", first_stage=True
         ),
         ErrorSource(
             name="planet{i}.pitch", shape="waves", place="planet{i}.teeth", neglected="planet*.pitch", first_stage=True
@@ -569,6 +565,12 @@ def _of_tooth(kind: Literal["pitch", "runout"]) -> tuple[ErrorSource, ...]:
     )
 
 
+def _of_pin(kind: str, place: str, **other: Any) -> ErrorSource:
+    """Return a deviation of every pin alone, fixed in the housing as they are."""
+    name, neglected = f"each_pin.{kind}", "each_pin.*"
+    return ErrorSource(name=name, fixed=True, each="pin", place=place, neglected=neglected, fine=True, **other)
+
+
 PIN_SOURCES = (
     ErrorSource(
         name="pin.diameter", fixed=True, place="pins", nominal=Nominal(said="twice its pin radius", of=_pin_diameter)
@@ -589,34 +591,9 @@ PIN_SOURCES = (
     ErrorSource(name="modification.rotation", silent=True, characteristic=ROTATION, fine=True),
     ErrorSource(name="housing.runout", shape="waves", place="housing.pins"),
     ErrorSource(name="housing.pitch", shape="waves", place="housing.pins"),
-    ErrorSource(
-        name="each_pin.diameter",
-        fixed=True,
-        each="pin",
-        place="pins",
-        neglected="each_pin.*",
-        fine=True,
-        nominal=Nominal(said="twice its pin radius", of=_pin_diameter),
-    ),
-    ErrorSource(
-        name="each_pin.groove",
-        fixed=True,
-        each="pin",
-        place="housing.grooves",
-        neglected="each_pin.*",
-        fine=True,
-        nominal=Nominal(said="its pin radius", of=_pin_radius),
-    ),
-    ErrorSource(
-        name="each_pin.position",
-        fixed=True,
-        shape="vector",
-        mirror="kept",
-        each="pin",
-        place="housing.pins",
-        neglected="each_pin.*",
-        fine=True,
-    ),
+    _of_pin("diameter", "pins", nominal=Nominal(said="twice its pin radius", of=_pin_diameter)),
+    _of_pin("groove", "housing.grooves", nominal=Nominal(said="its pin radius", of=_pin_radius)),
+    _of_pin("position", "housing.pins", shape="vector", mirror="kept"),
     *_of_tooth("pitch"),
     *_of_tooth("runout"),
     ErrorSource(

@@ -24,6 +24,7 @@ from tolalloc.reducers.equivalent.solvers.records import (
     NOT_RESISTED,
     OUT_OF_RANGE,
     AngleSearch,
+    Given,
     SolvedDerivatives,
     SolvedExtremes,
     SolverDesign,
@@ -184,9 +185,7 @@ class EquivalentModel:
         for name in ("_tables", "_turn"):
             vars(self).pop(name, None)
 
-    def _given(
-        self, errors: Float[np.ndarray, "sample column"], torque: float | Float[np.ndarray, " sample"]
-    ) -> tuple[Any, Any, Any, Any, Any]:
+    def _given(self, errors: Float[np.ndarray, "sample column"], torque: float | Float[np.ndarray, " sample"]) -> Given:
         """Return what every solver takes next to the tables: places of the columns, reducer, errors, torque."""
         columns = self.error_columns
         return columns.layout, columns.map, self.design, np.ascontiguousarray(errors), torque
@@ -225,7 +224,7 @@ class EquivalentModel:
         from tolalloc.reducers.equivalent.solvers.turn import make_turn, solve_curves
 
         turn = make_turn(errors.shape[0], angle.size, tables.load.shape[2])
-        solve_curves(self._discs, turn_of_crank, tables, *self._given(errors, torque), turn)
+        solve_curves(self._discs, turn_of_crank, tables, self._given(errors, torque), turn)
         self._mark_out_of_range(turn.rotation, turn.status)
         turn.rotation[turn.status != CONVERGED] = np.nan  # an unconverged angle is a status, never a number
         return Equilibria(
@@ -311,8 +310,7 @@ class EquivalentModel:
             np.empty(samples),
             curve,
         )
-        given = self._given(errors, torque)
-        solve_extremes(self._discs, self._tables, *given, search, found)
+        solve_extremes(self._discs, self._tables, self._given(errors, torque), search, found)
         self._mark_out_of_range(np.abs(found.extreme).max(axis=1), found.status)
         found.extreme[found.status != CONVERGED] = np.nan
         return Extremes(
@@ -340,7 +338,7 @@ class EquivalentModel:
         derivative.status[:] = extremes.status
         position, step = extremes.carrier_angle / search.node_step + search.first, 0.5**search.levels
         given = self._given(errors, torque)
-        solve_peak_to_peak_derivatives(self._tables, *given, position, search.nodes_per_coarse * step, derivative)
+        solve_peak_to_peak_derivatives(self._tables, given, position, search.nodes_per_coarse * step, derivative)
         np.maximum(extremes.status, derivative.status, out=extremes.status)
         return extremes, self._derivatives(derivative)
 
@@ -361,7 +359,7 @@ class EquivalentModel:
         tables, position = self._padded(carrier_angle), 1.0 + np.arange(float(carrier_angle.size))
         samples = errors.shape[0]
         derivative, torques = self._derivative(samples * position.size), np.broadcast_to(torque, samples)
-        solve_rotation_derivatives(tables, *self._given(errors, np.ascontiguousarray(torques)), position, derivative)
+        solve_rotation_derivatives(tables, self._given(errors, np.ascontiguousarray(torques)), position, derivative)
         self._mark_out_of_range(derivative.rotation, derivative.status)
         derivative.rotation[derivative.status != CONVERGED] = np.nan
         return derivative.rotation.reshape(samples, position.size), self._derivatives(derivative)
@@ -383,9 +381,8 @@ class EquivalentModel:
 
         derivative = self._derivative(errors.shape[0])
         of_pins = np.ascontiguousarray(weights.reshape(errors.shape[0], -1))
-        solve_pin_force_derivatives(
-            self._padded(carrier_angle), *self._given(errors, torque), 1.0 + at, of_pins, derivative
-        )
+        given = self._given(errors, torque)
+        solve_pin_force_derivatives(self._padded(carrier_angle), given, 1.0 + at, of_pins, derivative)
         return self._derivatives(derivative)
 
     @property

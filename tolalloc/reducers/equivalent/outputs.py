@@ -76,23 +76,15 @@ def forces(equilibria: Equilibria) -> Forces:
     """
     from tolalloc.reducers.equivalent.solvers.turn import solve_forces
 
-    tables, columns = equilibria.tables, equilibria.columns
+    tables, columns, errors = equilibria.tables, equilibria.columns, np.ascontiguousarray(equilibria.errors)
     shape = equilibria.status.shape
     pins = np.empty((*shape, tables.contact_by_disc.shape[1], tables.contact_by_disc.shape[3]))
     rows = np.empty((*shape, tables.row_stiffness.shape[1]))
     elements = np.empty((*shape, tables.play_stiffness.shape[1], 2))
     solve_forces(
         tables,
-        columns.layout,
-        columns.map,
-        design_of(equilibria.reducer),
-        np.ascontiguousarray(equilibria.errors),
-        equilibria.torque,
-        equilibria.status,
-        equilibria.retained,
-        pins,
-        rows,
-        elements,
+        (columns.layout, columns.map, design_of(equilibria.reducer), errors, equilibria.torque),
+        *(equilibria.status, equilibria.retained, pins, rows, elements),
     )
     return Forces(pins=pins, rows=rows, elements=elements, rows_of_stiffness=columns.rows_of_stiffness)
 

@@ -321,10 +321,7 @@ class PeakBounds:
 
 
 def _retained(
-    model: EquivalentModel,
-    tables: CondensedAngles,
-    errors: Float[np.ndarray, " column"],
-    torque: float,
+    model: EquivalentModel, tables: CondensedAngles, errors: Float[np.ndarray, " column"], torque: float
 ) -> Float[np.ndarray, "angle coordinate"]:
     """Return the coordinates of a unit at its two angles, 0 where it has no equilibrium [m]."""
     solved = model.equilibria_of(tables, errors[np.newaxis], torque, np.zeros(2))

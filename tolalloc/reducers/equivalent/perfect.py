@@ -56,8 +56,6 @@ def perfect_reducer(reducer: Reducer, torque: float) -> Solved:
 
     Parameters
     ----------
-    reducer
-        The reducer.
     torque
         Torque on the carrier, negative where it resists the rotation [N·m].
 

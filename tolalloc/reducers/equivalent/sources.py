@@ -31,54 +31,30 @@ class Nominal:
 
 @dataclass(frozen=True, kw_only=True)
 class ErrorSource:
-    """A kind of source, one for each part that has it: ``crank{i}.journal{j}.eccentricity``.
+    """A kind of source, one for each part that has it: ``crank{i}.journal{j}.eccentricity``."""
 
-    Parameters
-    ----------
-    name
-        Name of the sources, ``{i}`` and ``{j}`` for the numbers of parts and features; an angle's ends as
-        `tolalloc.drawings.sources.ANGULAR` says, by which a tolerance table knows it.
-    shape
-        What one deviation is: a number, a vector in the plane, or waves along a ring.
-    each
-        Whether every ``pin``, every ``tooth`` or every ``output pin`` (or its hole) has a deviation of its own.
-    place
-        Where the picture shows it, as `tolalloc.reducers.scene.Place.id` says; nowhere if empty.
-    mirror
-        What a vector becomes where half a turn carries the reducer into itself: its direction is ``reversed``, or
-        ``kept`` where it counts along the part's own radius or acts by its height between the discs.
-    teeth
-        Whether its angles count from the teeth of a disc, which half a turn does not carry into those of the other one.
-    neglected
-        Pattern by which a table may leave it out; empty where it may not.
-    silent
-        Whether a unit that does not state it is exact there without saying so, as all that were written before the
-        source was declared.
-    fine
-        Whether a first study leaves it out: it is in the new table with a zone of 0.
-    first_stage
-        Whether the first stage has it, whose errors the ratio divides.
-    nominal
-        Nominal size, if there is one.
-    characteristic
-        What a drawing writes for it, if its feature alone does not say it.
-    fixed
-        Whether it stands fixed in the housing, so that it is mounted and measured with it.
-    """
-
+    # Name of the sources, ``{i}`` and ``{j}`` for the numbers of parts and features; an angle's ends as
+    # `tolalloc.drawings.sources.ANGULAR` says, by which a tolerance table knows it
     name: str
+    # What one deviation is: a number, a vector in the plane, or waves along a ring
     shape: Literal["number", "vector", "waves"] = "number"
+    # Whether every ``pin``, every ``tooth`` or every ``output pin`` (or its hole) has a deviation of its own
     each: Literal["", "pin", "tooth", "output pin"] = ""
-    place: str = ""
+    place: str = ""  # Where the picture shows it, as `tolalloc.reducers.scene.Place.id` says; nowhere if empty
+    # What a vector becomes where half a turn carries the reducer into itself: its direction is ``reversed``, or
+    # ``kept`` where it counts along the part's own radius or acts by its height between the discs
     mirror: Literal["reversed", "kept"] = "reversed"
+    # Whether its angles count from the teeth of a disc, which half a turn does not carry into those of the other one
     teeth: bool = False
-    neglected: str = ""
+    neglected: str = ""  # Pattern by which a table may leave it out; empty where it may not
+    # Whether a unit that does not state it is exact there without saying so, as all that were written before the
+    # source was declared
     silent: bool = False
-    fine: bool = False
-    first_stage: bool = False
-    nominal: Nominal | None = None
-    characteristic: Characteristic | None = None
-    fixed: bool = False
+    fine: bool = False  # Whether a first study leaves it out: it is in the new table with a zone of 0
+    first_stage: bool = False  # Whether the first stage has it, whose errors the ratio divides
+    nominal: Nominal | None = None  # Nominal size, if there is one
+    characteristic: Characteristic | None = None  # What a drawing writes for it, if its feature alone does not say it
+    fixed: bool = False  # Whether it stands fixed in the housing, so that it is mounted and measured with it
 
     @property
     def angular(self) -> bool:

@@ -168,8 +168,6 @@ def support(at: Positions, first: int, name: str, stiffness_name: str, error: st
 
     Parameters
     ----------
-    at
-        Where the parts stand.
     first
         First of the part's coordinates, X and Y behind it [-].
     name, stiffness_name

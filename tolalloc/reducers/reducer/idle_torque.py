@@ -116,8 +116,6 @@ def grease_torque(factor: float, bearing: RollingBearing, speed: float) -> float
     ----------
     factor
         Palmgren's f0 [-].
-    bearing
-        The bearing.
     speed
         Of one ring against the other [1/min].
 

@@ -277,9 +277,7 @@ _LEAST_AXIS = 1e-9
 """Variance along an axis over the largest one below which it is rounding [-]."""
 
 
-def principal_axes(
-    covariance: Float[np.ndarray, "stiffness stiffness"],
-) -> Float[np.ndarray, "axis stiffness"]:
+def principal_axes(covariance: Float[np.ndarray, "stiffness stiffness"]) -> Float[np.ndarray, "axis stiffness"]:
     """Return one standard deviation along every principal axis of a covariance, upwards on the whole [-].
 
     Axes √λ·q of C·q = λ·q with λ > 0 (own derivation): C is the sum of their squares.

@@ -243,13 +243,7 @@ class AssemblyTeller(Teller[AssemblyResult]):
         if not rose.size:
             return ()
         named = ", ".join(
-            _say(
-                "larger_angle",
-                part=names[at],
-                axis="xyz"[axis],
-                before=before[at, axis],
-                after=after[at, axis],
-            )
+            _say("larger_angle", part=names[at], axis="xyz"[axis], before=before[at, axis], after=after[at, axis])
             for at, axis in rose
         )
         return (_say("section_larger", norm=norm_of(self.result), rose=len(rose), angles=before.size, named=named),)
@@ -399,8 +393,7 @@ class AssemblyTeller(Teller[AssemblyResult]):
 def _finite(measured: AdjustedParts) -> Section:
     difference = measured.finite_difference / ARCSECOND
     return Section(
-        heading=_say("finite_heading"),
-        paragraphs=(_say("section_finite", name=measured.name, difference=difference),),
+        heading=_say("finite_heading"), paragraphs=(_say("section_finite", name=measured.name, difference=difference),)
     )
 
 

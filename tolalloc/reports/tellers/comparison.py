@@ -188,12 +188,7 @@ class ComparisonTeller(Teller[Comparison]):
             columns = (list(own[column].astype(float)) for column in (TOTAL, LOW, HIGH))
             total, low, high = columns
             series.append(Series(label=label, kind="bars", x=names, y=total, low=low, high=high))
-        return Figure(
-            name="rankings",
-            title=_say("figure"),
-            x_label="total index ST [-]",
-            series=tuple(series),
-        )
+        return Figure(name="rankings", title=_say("figure"), x_label="total index ST [-]", series=tuple(series))
 
 
 def _named(name: str, cost_unit: str) -> str:

@@ -60,12 +60,7 @@ class DifferenceTeller(Teller[DifferenceResult]):
         result, cost = self.result, self.result.cost_change
         leading, found = result.requirements[0], _in_percent(result.yield_change)
         quantiles = " and ".join(
-            _say(
-                "quantile",
-                share=_percent(share),
-                output=short(own.output),
-                **_with_interval(change, own.output),
-            )
+            _say("quantile", share=_percent(share), output=short(own.output), **_with_interval(change, own.output))
             for (own, share), change in zip(result.limited, result.quantile_changes, strict=True)
             if own is leading
         )

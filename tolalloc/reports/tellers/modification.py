@@ -123,10 +123,7 @@ class ModificationTeller(Teller[ModificationResult]):
                 ("flank clearance [µm]", flank, self.result.delivered_flank / MICROMETRE),
                 (radial, f"{asked:g}", self.result.delivered_radial / MICROMETRE),
             ]
-        rows = [
-            *first,
-            ("smallest clearance after the first contact [µm]", "0", lowest / MICROMETRE),
-        ]
+        rows = [*first, ("smallest clearance after the first contact [µm]", "0", lowest / MICROMETRE)]
         return Table(name="delivered", columns=_DELIVERED, rows=rows).frame()
 
     @cached_property

@@ -23,6 +23,7 @@ from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import QUICK_RUN, alike, enumerated, number, quantity, sign_of
 from tolalloc.sensitivity.ranking import Convergence, Neighbours
 from tolalloc.sensitivity.result import RankingResult
+from tolalloc.sensitivity.saltelli import FEWEST_SHOWING
 from tolalloc.sensitivity.sobol import SobolIndices
 from tolalloc.sensitivity.surrogate.validation import Choice
 
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 _RARE = 1000.0
 """Units of a million from which a share is said in percent [-]."""
 _SLIGHT = 0.05
-"""Share of a wave's variance below which a second source is not named for it [-]."""
+"""Share of a variance below which a further source is not named for it [-]."""
 _NEGLIGIBLE = 1e-3
 """End of an interval over the estimate below which it is 0 [-]."""
 _MOSTLY = 0.5
@@ -81,6 +82,7 @@ class RankingTeller(Teller[RankingResult]):
         found = self.result
         return (
             *_drivers(found.dimensions or found.indices),
+            *_unseen(found.dimensions or found.indices),
             *self._per_micrometre(),
             converged(found.sobol.convergence),
             *self._orders(),
@@ -506,8 +508,8 @@ class RankingTeller(Teller[RankingResult]):
                         kind="bars",
                         x=[indices.sources[at] for at in rows],
                         y=np.clip(values[rows], 0.0, 1.0).tolist(),
-                        low=np.clip(interval[0, rows], 0.0, 1.0).tolist(),
-                        high=np.clip(interval[1, rows], 0.0, 1.0).tolist(),
+                        low=interval[0, rows].tolist(),
+                        high=interval[1, rows].tolist(),
                     )
                     for name, values, interval in bars
                 ),
@@ -626,7 +628,7 @@ def _carried(narrowed: float) -> str:
 
 def _drivers(sobol: SobolIndices) -> Iterator[str]:
     """Yield who drives the leading output, and how sure each place is."""
-    low, high = np.clip(sobol.total_interval, 0.0, 1.0)
+    low, high = sobol.total_interval
     following = {pair.before: pair for pair in sobol.neighbours}
     for place, at in enumerate(sobol.order[:_NAMED], start=1):
         yield _say(
@@ -640,9 +642,16 @@ def _drivers(sobol: SobolIndices) -> Iterator[str]:
         )
 
 
+def _unseen(sobol: SobolIndices) -> Iterator[str]:
+    """Yield of which sources too few blocks show enough to say how much they do."""
+    names = [sobol.sources[at] for at in np.flatnonzero(sobol.unseen > _SLIGHT)]
+    if names:
+        yield _say("unseen", blocks=sobol.blocks, fewest=FEWEST_SHOWING, names=", ".join(names))
+
+
 def _named_drivers(sobol: SobolIndices, output: str) -> str:
     """Return the same of all of them in one sentence, without the places."""
-    low, high = np.clip(sobol.total_interval, 0.0, 1.0)
+    low, high = sobol.total_interval
     named = (
         _say(
             "driver_short", source=sobol.sources[at], total=min(sobol.total[at], 1.0), low=100 * low[at], high=high[at]

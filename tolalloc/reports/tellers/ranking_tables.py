@@ -22,12 +22,7 @@ from tolalloc.sensitivity.result import OutputCapability, RankingResult
 from tolalloc.sensitivity.shapley import ShapleyEffects
 from tolalloc.sensitivity.sobol import SobolIndices
 from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
-from tolalloc.sensitivity.surrogate.validation import (
-    LARGEST_FAILED_SHARE,
-    LARGEST_QUANTILE_ERROR,
-    Choice,
-    Score,
-)
+from tolalloc.sensitivity.surrogate.validation import LARGEST_FAILED_SHARE, LARGEST_QUANTILE_ERROR, Choice, Score
 from tolalloc.sensitivity.target import TargetSensitivity
 
 if TYPE_CHECKING:

@@ -284,12 +284,7 @@ def run_figures(found: SimulationResult) -> tuple[Figure, ...]:
     figures = []
     for kind, label, factor, values in (
         ("speed", "speed [rpm]", RPM, (series.input_speed, series.output_speed)),
-        (
-            "acceleration",
-            "angular acceleration [rad/s²]",
-            1.0,
-            (series.input_acceleration, series.output_acceleration),
-        ),
+        ("acceleration", "angular acceleration [rad/s²]", 1.0, (series.input_acceleration, series.output_acceleration)),
     ):
         for part, own in zip(("input", "output"), values, strict=True):
             title = _say("speed_figure", part=part) if kind == "speed" else _say("acceleration_figure", part=part)

@@ -239,8 +239,6 @@ def fit_box_polynomial(
         The box [variable].
     degree
         Largest total degree of a term [-].
-    seeds
-        Node of the seed tree.
 
     References
     ----------

@@ -118,10 +118,6 @@ def answers_of(
         What is stood in for; its first output counts.
     x
         Columns of every sample [m, angles rad].
-    seeds
-        Node of the seed tree.
-    folds
-        Number of folds [-].
     largest_failed_share
         Share of samples that may fail [-].
     evaluation
@@ -272,8 +268,6 @@ def choose(
         What may stand in, in the order of trying; one that passes with `ENOUGH_Q2` ends it.
     x
         Columns of random samples to learn from and to be judged on, in five folds [m, angles rad].
-    seeds
-        Node of the seed tree.
     quantile
         Share of the units below the quantile that is compared, the yield that the surrogate is asked about [-].
     largest_failed_share

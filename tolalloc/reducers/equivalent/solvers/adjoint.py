@@ -16,7 +16,7 @@ import numpy as np
 
 from tolalloc.reducers.cycloid.solvers.pins import pin_force
 from tolalloc.reducers.equivalent.solvers.contact_solver import assemble, compress, play_force, solve_tangent, values_of
-from tolalloc.reducers.equivalent.solvers.records import CONVERGED, NOT_FINITE
+from tolalloc.reducers.equivalent.solvers.records import CONVERGED, NOT_FINITE, Given
 from tolalloc.reducers.equivalent.solvers.workspace import interpolation, make_memory, solve_between
 from tolalloc.running.compiled import in_threads, jit, jit_in_place
 
@@ -239,59 +239,34 @@ def _pin_forces(first, last, tables, layout, mapped, design, errors, torque, pos
             derivative.status[s] = _add_derivative(position[s], 1.0, 0.0, of_pins[s], *given)
 
 
-def solve_peak_to_peak_derivatives(
-    tables: Any,
-    layout: Any,
-    mapped: Any,
-    design: Any,
-    errors: Any,
-    torque: Any,
-    position: Any,
-    step: Any,
-    derivative: Any,
-) -> None:
+def solve_peak_to_peak_derivatives(tables: Any, given: Given, position: Any, step: Any, derivative: Any) -> None:
     """Fill the derivatives of the peak-to-peak from the positions of its two extremes, [sample, 2].
 
     ``step`` is the distance in nodes within which the extremes were found.
     """
 
     def solve(part: slice) -> None:
-        given = (tables, layout, mapped, design, errors, torque)
-        _peak_to_peaks(part.start, part.stop, *given, position, step, derivative)
+        _peak_to_peaks(part.start, part.stop, tables, *given, position, step, derivative)
 
-    in_threads(solve, errors.shape[0], _AT_ONCE)
+    in_threads(solve, len(given[3]), _AT_ONCE)
 
 
-def solve_rotation_derivatives(
-    tables: Any, layout: Any, mapped: Any, design: Any, errors: Any, torque: Any, position: Any, derivative: Any
-) -> None:
+def solve_rotation_derivatives(tables: Any, given: Given, position: Any, derivative: Any) -> None:
     """Fill the derivatives of the carrier rotation of every sample, each at its torque, at every position.
 
     The derivatives stand in one row, sample by sample, and position by position within a sample.
     """
 
     def solve(part: slice) -> None:
-        given = (tables, layout, mapped, design, errors, torque)
-        _rotations(part.start, part.stop, *given, position, derivative)
+        _rotations(part.start, part.stop, tables, *given, position, derivative)
 
-    in_threads(solve, errors.shape[0] * position.size, _AT_ONCE)
+    in_threads(solve, len(given[3]) * position.size, _AT_ONCE)
 
 
-def solve_pin_force_derivatives(
-    tables: Any,
-    layout: Any,
-    mapped: Any,
-    design: Any,
-    errors: Any,
-    torque: Any,
-    position: Any,
-    of_pins: Any,
-    derivative: Any,
-) -> None:
+def solve_pin_force_derivatives(tables: Any, given: Given, position: Any, of_pins: Any, derivative: Any) -> None:
     """Fill the derivatives of a weighted sum of every sample's pin forces at one position, disc by disc."""
 
     def solve(part: slice) -> None:
-        given = (tables, layout, mapped, design, errors, torque)
-        _pin_forces(part.start, part.stop, *given, position, of_pins, derivative)
+        _pin_forces(part.start, part.stop, tables, *given, position, of_pins, derivative)
 
-    in_threads(solve, errors.shape[0], _AT_ONCE)
+    in_threads(solve, len(given[3]), _AT_ONCE)

@@ -23,9 +23,16 @@ from jaxtyping import Float, Int
 from tolalloc.reducers.equivalent.solvers.batch import most_steps, settle
 from tolalloc.reducers.equivalent.solvers.contact_solver import values_of
 from tolalloc.reducers.equivalent.solvers.play import settle_with_play
-from tolalloc.reducers.equivalent.solvers.records import CONVERGED, MARGIN, NOT_FINITE, SolvedExtremes, SolvedTurn
+from tolalloc.reducers.equivalent.solvers.records import (
+    CONVERGED,
+    MARGIN,
+    NOT_FINITE,
+    Given,
+    SolvedExtremes,
+    SolvedTurn,
+)
 from tolalloc.reducers.equivalent.solvers.simd import ALL, WIDTH
-from tolalloc.reducers.equivalent.solvers.turn import batch_size, make_turn, solve_batch
+from tolalloc.reducers.equivalent.solvers.turn import batch_size, make_turn, part_of, solve_batch
 from tolalloc.reducers.equivalent.solvers.workspace import (
     fill_lane,
     look_at_all_taken,
@@ -302,49 +309,37 @@ def _prepare(layout, mapped, errors, torque, turn, values, found):
     return alone
 
 
-def refine(
-    discs: Any,
-    tables: Any,
-    layout: Any,
-    mapped: Any,
-    design: Any,
-    errors: Any,
-    torque: Any,
-    search: Any,
-    turn: Any,
-    found: Any,
-) -> None:
+def refine(discs: Any, tables: Any, given: Given, search: Any, turn: Any, found: Any) -> None:
     """Fill the extremes of some samples whose coarse turn is solved.
 
     Not compiled itself: what it calls would be compiled a second time as a part of it.
     """
+    layout, mapped, design, errors, torque = given
     contacts, values = tables.contact_stiffness.shape[1], np.empty((errors.shape[0], layout.end))
     best, left_over = np.full((errors.shape[0], 2), -np.inf), np.zeros((errors.shape[0], 2))
     alone = _prepare(layout, mapped, errors, torque, turn, values, found)
     size, elements = turn.retained.shape[2], tables.play_stiffness.shape[1]
     own, workspace = _make_searches(size), make_workspace(layout, size, contacts, elements)
     memory, play = make_memory(design.law, tables), workspace.play if elements else None
-    given = (discs, alone, play, tables, layout, design, values, search, turn, best)
+    searched = (discs, alone, play, tables, layout, design, values, search, turn, best)
     highest = _highest(turn, found)
-    _search_peaks(*given, highest, own, memory, workspace, found)
+    _search_peaks(*searched, highest, own, memory, workspace, found)
     _keep_best(highest, best, left_over, found)
     others = _make_peaks(_others(turn, search, best, highest, found))
-    _search_peaks(*given, others, own, memory, workspace, found)
+    _search_peaks(*searched, others, own, memory, workspace, found)
     _keep_best(others, best, left_over, found)
     found.left_over[:] = left_over.sum(axis=1)
 
 
-def solve_extremes(
-    discs: Any, tables: Any, layout: Any, mapped: Any, design: Any, errors: Any, torque: Any, search: Any, found: Any
-) -> None:
+def solve_extremes(discs: Any, tables: Any, given: Given, search: Any, found: Any) -> None:
     """Fill the extremes of every sample."""
 
     def solve(part: slice) -> None:
-        given = (tables, layout, mapped, design, errors[part], torque)
+        mine = part_of(given, part)
         turn = make_turn(part.stop - part.start, search.coarse + 2, tables.load.shape[2])
-        solve_batch(discs, MARGIN, search.nodes_per_coarse, search.turn_of_crank(layout.teeth), *given, turn)
+        solve_batch(discs, MARGIN, search.nodes_per_coarse, search.turn_of_crank(given[0].teeth), tables, mine, turn)
         own = SolvedExtremes(*(values[part] for values in found))
         own.curve[:] = turn.rotation[:, 1 : 1 + own.curve.shape[1]]
-        refine(discs, *given, search, turn, own)
+        refine(discs, tables, mine, search, turn, own)
 
-    in_threads(solve, errors.shape[0], batch_size(errors.shape[0]))
+    in_threads(solve, len(given[3]), batch_size(len(given[3])))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import pi
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8, UInt16
@@ -26,6 +26,9 @@ def design_of(reducer: Reducer) -> SolverDesign:
     """Return a reducer as the solvers take it."""
     return SolverDesign(LAWS[reducer.stiffness.pin_contact_law], reducer.cycloid_stage.face_width)
 
+
+Given = tuple[Any, Any, Any, Any, Any]
+"""What every solver takes next to the tables: layout, map and design, errors and torque of the samples."""
 
 MARGIN = 2
 """Nodes beyond the coarse angles before and behind the turn that the cubic interpolation needs [-]."""

@@ -30,7 +30,7 @@ from tolalloc.reducers.equivalent.solvers.contact_solver import (
     values_of,
 )
 from tolalloc.reducers.equivalent.solvers.play import make_play
-from tolalloc.reducers.equivalent.solvers.records import CONVERGED, NOT_FINITE, SolvedTurn
+from tolalloc.reducers.equivalent.solvers.records import CONVERGED, NOT_FINITE, Given, SolvedTurn
 from tolalloc.reducers.equivalent.solvers.workspace import make_memory
 from tolalloc.running.compiled import in_threads, jit, jit_in_place, thread_count
 
@@ -138,40 +138,22 @@ def _side_by_side(
             _give_up(turn, s)
 
 
-def solve_batch(
-    discs: Any,
-    first: Any,
-    stride: Any,
-    turn_of_crank: Any,
-    tables: Any,
-    layout: Any,
-    mapped: Any,
-    design: Any,
-    errors: Any,
-    torque: Any,
-    turn: Any,
-) -> None:
+def part_of(given: Given, part: slice) -> Given:
+    """Return the same of some samples."""
+    return *given[:3], given[3][part], given[4]
+
+
+def solve_batch(discs: Any, first: Any, stride: Any, turn_of_crank: Any, tables: Any, given: Given, turn: Any) -> None:
     """Solve up to a batch of samples at every ``stride``-th node of the tables, from node ``first`` on.
 
     A crank turns once in ``turn_of_crank`` of these nodes; 0 where that is no whole number, or they are not equally far
     apart.
     """
     elements = tables.play_stiffness.shape[1] or None
-    given = (tables, layout, mapped, design, errors, torque)
-    _side_by_side(discs, elements, first, stride, turn_of_crank, *given, turn)
+    _side_by_side(discs, elements, first, stride, turn_of_crank, tables, *given, turn)
 
 
-def solve_curves(
-    discs: Any,
-    turn_of_crank: Any,
-    tables: Any,
-    layout: Any,
-    mapped: Any,
-    design: Any,
-    errors: Any,
-    torque: Any,
-    turn: Any,
-) -> None:
+def solve_curves(discs: Any, turn_of_crank: Any, tables: Any, given: Given, turn: Any) -> None:
     """Fill the equilibria of every sample at every node of the tables, of which a crank's turn has so many.
 
     ``discs`` has one entry per disc: its length is part of its type, so loops over coordinates become straight code.
@@ -179,9 +161,9 @@ def solve_curves(
 
     def solve(part: slice) -> None:
         own = SolvedTurn(*(values[part] for values in turn))
-        solve_batch(discs, 0, 1, turn_of_crank, tables, layout, mapped, design, errors[part], torque, own)
+        solve_batch(discs, 0, 1, turn_of_crank, tables, part_of(given, part), own)
 
-    in_threads(solve, errors.shape[0], batch_size(errors.shape[0]))
+    in_threads(solve, len(given[3]), batch_size(len(given[3])))
 
 
 @jit
@@ -223,23 +205,10 @@ def _forces_of_sample(
             rows[at, row] = tables.row_stiffness[at, row] * compression
 
 
-def solve_forces(
-    tables: Any,
-    layout: Any,
-    mapped: Any,
-    design: Any,
-    errors: Any,
-    torque: Any,
-    status: Any,
-    retained: Any,
-    pins: Any,
-    rows: Any,
-    elements: Any,
-) -> None:
+def solve_forces(tables: Any, given: Given, status: Any, retained: Any, pins: Any, rows: Any, elements: Any) -> None:
     """Fill the `Forces` of all samples at all nodes of the tables."""
 
     def fill(part: slice) -> None:
-        given = (tables, layout, mapped, design, errors, torque)
-        _forces(part.start, part.stop, *given, status, retained, pins, rows, elements)
+        _forces(part.start, part.stop, tables, *given, status, retained, pins, rows, elements)
 
-    in_threads(fill, errors.shape[0], _AT_ONCE)
+    in_threads(fill, len(given[3]), _AT_ONCE)
