@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import http.client
 import json
 import resource
@@ -465,6 +466,57 @@ def _is_closed(own: socket.socket) -> bool:
         return False
     except OSError:
         return True
+
+
+def _drip(server, begin: bytes, until: threading.Event) -> None:
+    """Send a byte at a time on as many connections as there are, each sooner than any byte is waited for."""
+    place = ("127.0.0.1", server.http.server_port)
+    held = [socket.create_connection(place, timeout=10) for _ in range(MOST_CONNECTIONS)]
+    for own in held:
+        own.sendall(begin)
+    while not until.wait(0.05):
+        for own in held:
+            with contextlib.suppress(OSError):
+                own.sendall(b"a")
+    for own in held:
+        own.close()
+
+
+@pytest.mark.parametrize(
+    "begin",
+    [
+        b"",
+        b"GET /",
+        b"GET / HTTP/1.1\r\nX-Drip: ",
+        b"GET / HTTP/1.1\r\nHost: HOST\r\nX-Drip: ",
+        b"POST /api/study HTTP/1.1\r\nHost: HOST\r\nX-Token: TOKEN\r\nContent-Length: 60000\r\n\r\n",
+    ],
+    ids=["nothing", "path", "header", "second header", "body"],
+)
+def test_connections_that_drip_do_not_keep_the_page_away(server, monkeypatch, begin):
+    monkeypatch.setattr("tolalloc.cli.live.server.PATIENCE", 0.5)
+    until, said = threading.Event(), begin.replace(b"HOST", server.host.encode())
+    said = said.replace(b"TOKEN", server.token.encode())
+    dripping = threading.Thread(target=_drip, args=(server, said, until))
+    dripping.start()
+    try:
+        time.sleep(1.0)
+        assert send(server)[0] == 200
+    finally:
+        until.set()
+        dripping.join()
+
+
+def test_a_request_in_pieces_and_a_later_one_on_the_same_connection_are_answered(server, monkeypatch):
+    monkeypatch.setattr("tolalloc.cli.live.server.PATIENCE", 0.8)
+    with socket.create_connection(("127.0.0.1", server.http.server_port), timeout=10) as own:
+        for _ in range(3):  # together longer than one request may take
+            for piece in (b"GET /live.css HTTP/1.1\r\n", b"Host: ", server.host.encode(), b"\r\n\r\n"):
+                own.sendall(piece)
+                time.sleep(0.1)
+            answer = http.client.HTTPResponse(own)
+            answer.begin()
+            assert answer.status == 200 and answer.read()
 
 
 def test_the_program_that_fails_says_so_and_goes_on(server, monkeypatch):

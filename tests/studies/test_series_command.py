@@ -143,3 +143,49 @@ def test_a_change_in_a_helper_module_is_run_again_into_the_next_folder(tmp_path)
     assert sorted(path.name for path in (tmp_path / "runs").iterdir() if not path.name.startswith(".")) == [
         *("one", "one-2", "one-3")
     ]
+
+
+HELD = {
+    "DataFrame": "import pandas as pd\nT = pd.DataFrame({{'k': [{0}]}})\ndef k(): return T['k'].iloc[0]\n",
+    "dict six deep": "D = dict(a=dict(b=dict(c=dict(d=dict(e=dict(k={0}))))))\n"
+    "def k(): return D['a']['b']['c']['d']['e']['k']\n",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("held", HELD.values(), ids=HELD)
+def test_a_constant_that_is_held_in_whatever_is_run_again_when_it_is_edited_and_only_then(tmp_path, held):
+    out, calls = ("--out", tmp_path / "runs"), "def scale(gap): return 0.1 + k() * (gap - 0.1)\n"
+    first, again, edited = (
+        costs_of(helped(tmp_path / "a", "one", held.format(own) + calls), *out)["one"] for own in ("1.0", "1.0", "1.5")
+    )
+    assert first == again == (first[0], "one")
+    assert edited == (pytest.approx(1.5 * first[0], rel=0.01), "one-2")
+
+
+@pytest.mark.slow
+def test_what_reads_a_file_is_run_again_and_says_why(tmp_path):
+    kept = tmp_path / "k.txt"
+    path = helped(
+        tmp_path / "a", "one", f"def scale(gap): return 0.1 + float(open({str(kept)!r}).read()) * (gap - 0.1)"
+    )
+    said, found = [], []
+    for own in ("1.0", "1.0", "1.5"):
+        kept.write_text(own)
+        series = tolalloc("series", path, "--out", tmp_path / "runs", "--json")
+        (row,) = json.loads(series.stdout)["studies"]
+        found.append((row["cost [cost units]"], row["folder"]))
+        said.append(" ".join(series.stderr.split()))
+    cost = found[0][0]
+    assert found == [(cost, "one"), (cost, "one-2"), (pytest.approx(1.5 * cost, rel=0.01), "one-3")]
+    sentence = (
+        "one is run again: whether the model of study one is the same as before is not known: io.open may look at"
+    )
+    assert [sentence in own for own in said] == [False, True, True]
+    run = tolalloc(
+        "run", path, "--only", "allocation", "--checkpoint", tmp_path / "kept.npz", "--out", tmp_path / "run"
+    )
+    assert run.returncode == 0 and "kept.npz is neither read nor written: whether the model" in " ".join(
+        run.stderr.split()
+    )
+    assert not (tmp_path / "kept.npz").exists()

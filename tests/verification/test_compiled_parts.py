@@ -67,6 +67,34 @@ def test_what_a_part_raises_arrives():
         whole(_outer)(VALUES, 3)
 
 
+CUTS = {
+    "index cut": ("*.nbi", lambda content: content[:20]),
+    "index of nothing": ("*.nbi", lambda content: b""),
+    "index of something else": ("*.nbi", lambda content: b"no index\n" * 9),
+    "code cut": ("*.nbc", lambda content: content[: len(content) // 2]),
+    "code of nothing": ("*.nbc", lambda content: b""),
+    "all cut": ("*.nb?", lambda content: content[:7]),
+}
+
+
+@pytest.mark.parametrize(("files", "damaged"), CUTS.values(), ids=CUTS)
+def test_what_is_kept_and_was_cut_is_compiled_again_by_itself(tmp_path, monkeypatch, files, damaged):
+    def answer():
+        new = whole(_inner)
+        compiled._keep(new, tmp_path / "wholes")
+        compiled._keep(new.part, tmp_path / "parts")
+        monkeypatch.setitem(globals(), "inner", new)
+        return new(VALUES, 1), nb.njit(_outer)(VALUES, 1), sum(new.stats.cache_hits.values())
+
+    assert answer() == (11.0, 121.0, 0)
+    cut = [*tmp_path.rglob(files)]
+    assert cut
+    for path in cut:
+        path.write_bytes(damaged(path.read_bytes()))
+    assert answer() == (11.0, 121.0, 0)
+    assert answer() == (11.0, 121.0, 1)
+
+
 def test_what_is_kept_is_not_compiled_again(tmp_path, monkeypatch):
     def kept(function):
         new = whole(function)

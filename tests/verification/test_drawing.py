@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import importlib
+import os
 import re
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -19,6 +24,7 @@ from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
 from tolalloc.reading.units import MICROMETRE
 from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.study.script import load_study
 
 ZONE = {"plus": 0.1, "minus": -0.1, "unit": "mm", "min": 0.02, "max": 0.5, "cost": 3}
 HUB = {"id": "hub", "nominal": 55.29, **ZONE}
@@ -105,13 +111,74 @@ def test_files_are_found_beside_the_study_and_shipped_ones_by_name(tmp_path, mon
         load_drawing("none.csv", folder=folder)
 
 
+IMPORTED = """
+import tolalloc as ta
+drawing = ta.drawing("tables/t.csv", correlations="like.csv", costs="costs.csv")
+def drawing_when_called():
+    return ta.drawing("tables/t.csv")
+"""
+
+
+@pytest.fixture
+def imported(tmp_path, monkeypatch):
+    """Return the module of another folder that reads tables beside itself, with others of their names all around."""
+    cages = {"mine": 1, "here": 2, ".": 3}
+    for name, places in cages.items():
+        (tmp_path / name / "tables").mkdir(parents=True, exist_ok=True)
+        table = pd.DataFrame([HUB, *({**CAGE, "id": f"cage{at}" if at else "cage"} for at in range(places))])
+        table.to_csv(tmp_path / name / "tables" / "t.csv", index=False)
+        (tmp_path / name / "like.csv").write_text(f"sources,correlation\nhub cage,0.{places}\n", encoding="utf-8")
+    (tmp_path / "mine" / "reads_beside.py").write_text(IMPORTED, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.chdir(tmp_path / "here")
+    yield importlib.import_module("mine.reads_beside")
+    for name in ("mine.reads_beside", "mine"):
+        sys.modules.pop(name, None)
+
+
+def test_an_imported_file_reads_what_stands_beside_itself(imported, tmp_path):
+    assert [own.name for own in imported.drawing.sources] == ["hub", "cage"]
+    assert imported.drawing.correlation.source_matrix(imported.drawing.sources)[0, 1] == 0.1
+    assert len(imported.drawing_when_called().sources) == 2
+    assert len(load_drawing("tables/t.csv").sources) == 3  # who asks here has none beside it: the current folder
+    assert len(load_drawing(tmp_path / "tables" / "t.csv").sources) == 4
+    (tmp_path / "mine" / "tables" / "t.csv").unlink()
+    assert len(imported.drawing_when_called().sources) == 3
+
+
+def test_a_study_script_reads_nothing_of_the_current_folder_but_a_module_what_stands_beside_it(imported, tmp_path):
+    script = tmp_path / "office" / "own_study.py"
+    script.parent.mkdir()
+    script.write_text(
+        "import sys\nimport tolalloc as ta\nfrom mine.reads_beside import drawing_when_called\n"
+        "drawing = drawing_when_called()\n"
+        "study = ta.Study(ta.model(lambda hub, cage: hub - cage, inputs=('hub', 'cage'), outputs=('y [mm]',)),\n"
+        "    drawing, limits={'y [mm]': ta.Limit(upper=60)})\n"
+    )
+    assert len(load_study(script).drawing.sources) == 2
+    script.write_text("import tolalloc as ta\ndrawing = ta.drawing('tables/t.csv')\n")
+    with pytest.raises(InputError, match=f"{script.parent}/tables/t.csv: no such file"):
+        load_study(script)
+
+
+def test_a_console_reads_beside_the_study_that_it_imports(imported, tmp_path):
+    shown = subprocess.run(
+        [sys.executable, "-c", "from mine.reads_beside import drawing\nprint(len(drawing.sources))"],
+        cwd=tmp_path / "here",
+        env={**os.environ, "PYTHONPATH": f"{tmp_path}:{Path(ta.__file__).parents[1]}"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert shown.stdout.split() == ["2"]
+
+
 def test_a_drawing_carries_correlations_and_processes_written_in_python():
     pair = Pair(one="hub", other="cage", correlation=0.3)
     ways = {"hub": ("turned", "ground")}
     drawing = Drawing.of_rows([HUB, CAGE], correlations=Correlation(pairs=(pair,)), costs=ways)
     assert drawing.errors.is_correlated
     assert drawing.costs is ways
-    assert drawing.content == (drawing.sources, drawing.correlation)
 
 
 def test_a_notebook_shows_the_table():

@@ -77,6 +77,24 @@ def test_one_id_twice_is_refused(changed, words):
         ta.Drawing.of_rows([*ROWS[:2], {**ROWS[2], **changed}])
 
 
+@pytest.mark.parametrize("sign", ["\x00", "\x07", "\x1b", "\t", "\n", "\r", "\x7f", "\x85", "\u2028", "\ud800"])
+@pytest.mark.parametrize("field", ["id", "source", "group"])
+def test_a_name_that_no_line_holds_is_refused_when_the_drawing_is_read(field, sign):
+    with pytest.raises(ta.InputError) as caught:
+        ta.Drawing.of_rows([*ROWS[:2], {**ROWS[2], field: f"a{sign}b"}], place="own")
+    said = str(caught.value)
+    assert said.startswith(f"own, row 3: {field} is {f'a{sign}b'!r}; allowed is text without control characters")
+    assert said.isprintable()
+
+
+@pytest.mark.parametrize("field", ["note", "label", "drawing"])
+def test_a_text_that_no_table_is_read_back_with_is_refused_and_one_of_two_lines_is_not(tmp_path, field):
+    with pytest.raises(ta.InputError, match=f"row 1: {field} is 'a.x07b'; allowed is text without control"):
+        ta.Drawing.of_rows([{**ROWS[0], field: "a\x07b"}])
+    drawing = ta.Drawing.of_rows([{**ROWS[0], field: "a\nb"}])
+    assert ta.drawing(drawing.to_csv(tmp_path / "zones.csv")).sources == drawing.sources
+
+
 def test_suggestions_know_them():
     drawing = ta.Drawing.of_rows(ROWS)
     with pytest.raises(UnknownNameError, match="4711-12"):

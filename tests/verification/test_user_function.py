@@ -13,8 +13,11 @@ import numpy as np
 import pytest
 from scipy.optimize import newton
 
+import tolalloc as ta
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.models.user_function import UserFunction, identity
+from tolalloc.models.identity import identity
+from tolalloc.models.model import ARRAY_RATE
+from tolalloc.models.user_function import UserFunction
 
 
 def returned(function, values, samples):
@@ -230,7 +233,7 @@ def test_what_a_function_calls_in_its_module_tells_it_too(monkeypatch):
 
 def test_a_function_is_the_same_in_another_process():
     code = textwrap.dedent("""
-        from tolalloc.models.user_function import identity
+        from tolalloc.models.identity import identity
         def outer(k):
             return lambda x: [k * y for y in (x, lambda: x) if y not in {"a", "b", "c", "d"}]
         print(identity(outer(2)))
@@ -456,3 +459,25 @@ def test_what_a_helper_module_holds_tells_a_function(tmp_path, monkeypatch, befo
     for way in (0, 1):
         assert found[0][way] != found[1][way]
         assert found[0][way] == found[2][way]
+
+
+MIXES = {
+    "sorts": lambda a, b: np.sort(a - b),
+    "adds up": lambda a, b: np.cumsum(a - b),
+    "centres": lambda a, b: (a - b) - np.mean(a - b),
+    "shifts": lambda a, b: np.roll(a - b, 1),
+    "scales": lambda a, b: (a - b) / (1.0 + np.max(np.abs(a - b))),
+    "largest so far": lambda a, b: np.maximum.accumulate(np.abs(a - b)),
+}
+
+
+@pytest.mark.parametrize("function", MIXES.values(), ids=MIXES)
+def test_a_function_that_mixes_its_samples_states_no_rate_of_arrays(function):
+    """All of them say 0 wherever the two sizes are off by as much: such samples tell nothing."""
+    zone = {"plus": 0.1, "minus": -0.1, "unit": "mm", "min": 0.02, "max": 0.5, "cost": 3.0, "nominal": 10.0}
+    errors = ta.Drawing.of_rows([{"id": name, **zone} for name in "ab"]).errors
+    rates = [
+        ta.model(own, inputs=["a", "b"], outputs=("gap [mm]",)).bound(errors, "test").stated_rate
+        for own in (function, lambda a, b: a - b)
+    ]
+    assert rates[0] < rates[1] == ARRAY_RATE

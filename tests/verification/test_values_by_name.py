@@ -12,7 +12,8 @@ import pytest
 
 import tolalloc as ta
 from tests.builders import ZONE_OF_A_LENGTH
-from tolalloc.models.user_function import UserFunction, by_name, identity
+from tolalloc.models.identity import identity
+from tolalloc.models.user_function import UserFunction, by_name
 
 NAMES = ("depth", "width")
 OUTPUTS = ("sum [mm]", "ratio [-]")

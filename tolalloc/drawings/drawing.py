@@ -141,11 +141,6 @@ class Drawing:
         """The correlations between the sources."""
         return self.errors.correlation
 
-    @property
-    def content(self) -> tuple[Any, ...]:
-        """What tells it from other drawings wherever its files stand, for the digest of a study; without the costs."""
-        return (self.sources, self.correlation)
-
     def with_table(self, table: str | Path) -> Drawing:
         """Return the drawing at the zones of another tolerance table, with the same correlations and process costs.
 

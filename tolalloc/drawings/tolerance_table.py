@@ -52,6 +52,8 @@ if TYPE_CHECKING:
 
 _UNITS = {"Cp": "-", "shift": "half zone", "shape": "-"}
 """Field → unit that its header may state."""
+_NO_TEXT, _NO_NAME = r"[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff]", r"[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]"
+"""What no cell may hold, since no file with it is read, and what no name may, since it is written on one line."""
 
 CLOSED_FORMS = tuple(kind for kind in Distribution if kind not in (Distribution.MIXTURE, Distribution.EMPIRICAL))
 
@@ -518,6 +520,7 @@ def sources_of_rows(
         identity = str(row.get("id", "")).strip()
         where = f"{place}, row {number} ({identity or 'no id'})"
         with faults.kept():
+            _require_plain(row, f"{place}, row {number}")
             _require_filled(row, where)
             cells = with_process(typed_cells(ToleranceRow, row, where), processes, where)
             source = validated(ToleranceRow, cells, where).as_source(folder)
@@ -532,6 +535,13 @@ def sources_of_rows(
             sources[source.name] = source
     faults.require_none()
     return tuple(sources.values())
+
+
+def _require_plain(row: Mapping[str, object], where: str) -> None:
+    """Raise if a cell holds what no table can be read back with, or a name what breaks its line."""
+    for field, cell in row.items():
+        if re.search(_NO_NAME if field in ("id", "source", "group") else _NO_TEXT, str(cell)):
+            raise InputError.at(where, field, cell, "text without control characters, a name on one line")
 
 
 def _require_filled(row: Mapping[str, object], where: str) -> None:

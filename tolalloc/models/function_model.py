@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from inspect import signature
 from math import isclose
 from pathlib import Path
 from typing import Any
@@ -17,12 +16,12 @@ from jaxtyping import Float
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import LENGTHS, is_angular
 from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.models.identity import identity
 from tolalloc.models.model import ARRAY_RATE, Evaluation, Model, Observer, SettingDerivatives, unobserved
 from tolalloc.models.settings import Setting, require_settings
 from tolalloc.models.unit_bounds import ScaledUnits, SlopeBounds
-from tolalloc.models.user_function import UserFunction, by_name, identity
+from tolalloc.models.user_function import UserFunction, by_name
 from tolalloc.reading.named_fields import is_number
-from tolalloc.reading.units import MILLIMETRE
 
 
 @dataclass(frozen=True)
@@ -253,18 +252,15 @@ class BoundFunction(Model):
     def stated_rate(self) -> float:
         """Much higher for a function that takes whole columns [1/s]."""
         widths = self.steps / self.source.step
-        arguments = self._arguments(np.linspace(-0.5, 0.5, _ASKED)[:, np.newaxis] * widths)
+        units = np.random.default_rng(0).uniform(-0.5, 0.5, (_ASKED, widths.size))  # no input moves as another one
+        arguments = self._arguments(units * widths)
         function = self._user_function(self.source.callable, self.source.outputs)
         return ARRAY_RATE if function.takes_columns(arguments) else super().stated_rate
 
     @property
     def content(self) -> Any:
-        """Names, settings, and the function's code."""
-        own: tuple[Any, ...] = (identity(self.source.function), identity(self.source.jacobian))
-        own += (self.lengths,) if {*self.lengths} != {MILLIMETRE} else ()
-        if self.source.callable is not self.source.function:
-            own += (tuple(signature(self.source.function).parameters),)  # one code may have them in another order
-        return (self.name, self.source.inputs, self.source.outputs, self.settings, *own)
+        """What its user gave, the function with all that it holds, and where its inputs stand."""
+        return identity((self.source, self.offsets, self.lengths))
 
     def observed(self, observe: Observer) -> BoundFunction:
         """Return the model that tells someone the statuses of each call, those of differences among them."""

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from tolalloc.models.identity import identity
 from tolalloc.models.settings import DrawnAmounts, Setting
 from tolalloc.running.chunks import Mapper
 
@@ -206,8 +207,8 @@ class Model(ABC):
 
     @property
     def content(self) -> Any:
-        """What tells it from other models, for the digest of a study; its ``repr`` counts."""
-        return (self.name, self.columns, self.outputs, self.settings)
+        """What tells it from other models, for the digest of a study: all that it is made of; its ``repr`` counts."""
+        return identity(self)
 
     @property
     def uncertain(self) -> tuple[CorrelatedSource, ...]:

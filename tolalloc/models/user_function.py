@@ -1,26 +1,22 @@
-"""A function that a user gives: called for many samples at once where it can be, and told from other functions."""
+"""A function that a user gives, called for many samples at once where it can be."""
 
 from __future__ import annotations
 
 import inspect
-import pickle
 import re
-import sys
-import sysconfig
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from hashlib import sha256
 from pathlib import Path
-from types import BuiltinFunctionType, CodeType, ModuleType
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from tolalloc.exceptions import InputError, SolveError
+from tolalloc.reading.files import is_users_file
 
 FAILURES = (ArithmeticError, ValueError, RuntimeError)
 """What a function may raise for a sample that has no answer, such as a root finder that does not converge."""
@@ -30,10 +26,6 @@ _LARGEST = 1e100
 """Size beyond which a value is no answer, as its square is none [unit of the output]."""
 _SAME = 1e-9
 """By how much a function of arrays may differ from itself called with numbers, over the largest value [-]."""
-
-
-_LONG = 4096
-"""Length of a value's text from which on its bytes tell it, as texts of large tables leave out their middle [-]."""
 _FEWEST = 30
 """Samples from which on a function that raises for all of them has a fault rather than bad samples [-]."""
 
@@ -286,7 +278,7 @@ def _named(error: BaseException) -> str:
 
 def _line_of(error: BaseException) -> str:
     """Return where in the user's own files something was raised; nothing where that was in none."""
-    frames = [own for own in traceback.extract_tb(error.__traceback__)[1:] if _is_users_file(own.filename)]
+    frames = [own for own in traceback.extract_tb(error.__traceback__)[1:] if is_users_file(own.filename)]
     return f" in {Path(frames[-1].filename).name}, line {frames[-1].lineno}" if frames else ""
 
 
@@ -310,114 +302,3 @@ def _flat(found: Any) -> list[Any]:
     if isinstance(found, np.ndarray) and found.ndim > 2:
         return [row for part in found for row in part]
     return [item for part in found for item in (_flat(part) if isinstance(part, list | tuple) else [part])]
-
-
-def identity(thing: Any, deep: int = 12) -> Any:
-    """Return what tells a function from another one in any process: its code, and the values that it was made with.
-
-    Code and values of the user's own modules count, those of installed libraries do not; of values within values only
-    so many levels.
-    """
-    if deep == 0:
-        return type(thing).__qualname__
-    inside = _inside(thing)
-    if inside is not None:
-        return [identity(item, deep - 1) for item in inside]
-    if isinstance(thing, set | frozenset):
-        return sorted(repr(identity(item, deep - 1)) for item in thing)
-    if isinstance(thing, ModuleType):
-        return (thing.__name__, _source(thing), [identity(own, deep - 1) for own in _modules_of(thing)])
-    if isinstance(thing, Path):
-        return (str(thing), _hashed_file(thing))
-    if isinstance(thing, type):
-        return (thing.__qualname__, _source(sys.modules.get(thing.__module__)))
-    if callable(thing) or hasattr(thing, "__dict__"):
-        own = vars(thing) if hasattr(thing, "__dict__") else {}
-        made = identity(type(thing), deep - 1) if is_users_module(type(thing).__module__) else type(thing).__qualname__
-        return (getattr(thing, "__qualname__", ""), made, identity(own, deep - 1))
-    return _plain(thing)
-
-
-def _plain(thing: Any) -> Any:
-    """Return what tells a value that is one thing: its text, or its bytes where that names a place in memory."""
-    text = repr(thing)
-    if " at 0x" not in text and len(text) < _LONG:
-        return text
-    try:
-        return sha256(pickle.dumps(thing, protocol=4)).hexdigest()
-    except Exception:  # what cannot be pickled raises what it likes
-        return type(thing).__qualname__
-
-
-def _inside(thing: Any) -> Sequence[Any] | None:
-    """Return what a thing is made of in its order; None for what is one thing, or has no order."""
-    if isinstance(thing, partial):
-        return (thing.func, thing.args, thing.keywords)
-    if isinstance(thing, CodeType):
-        return (thing.co_code.hex(), thing.co_names, thing.co_consts)
-    if isinstance(thing, np.ndarray):
-        return (thing.shape, thing.tolist())
-    if isinstance(thing, Mapping):
-        return tuple(thing.items())
-    if isinstance(thing, list | tuple):
-        return thing
-    compiled = getattr(thing, "py_func", None)  # numba's, around the function that a user wrote
-    if compiled is not None:
-        return _made_of(compiled)
-    return _made_of(thing) if hasattr(thing, "__code__") and hasattr(thing, "__globals__") else None
-
-
-def _made_of(function: Any) -> tuple[Any, ...]:
-    """Return the code of a function, what it finds by name, what it encloses and what it was given."""
-    code, known = function.__code__, function.__globals__
-    named = {name: known[name] for name in _names(code) if _tells(known.get(name))}
-    enclosed = [cell.cell_contents for cell in function.__closure__ or ()]
-    given = (function.__defaults__, function.__kwdefaults__, getattr(function, "__self__", None))
-    return (code, named, enclosed, given)
-
-
-def _names(code: CodeType) -> list[str]:
-    """Return the names that a function and those inside it look up."""
-    inside = (const for const in code.co_consts if isinstance(const, CodeType))
-    return [*dict.fromkeys((*code.co_names, *(name for own in inside for name in _names(own))))]
-
-
-def _tells(value: Any) -> bool:
-    """Return whether what a function finds by name tells it from others: anything but what a library defines."""
-    if value is None or isinstance(value, ModuleType):
-        return value is not None and is_users_module(value.__name__)
-    if hasattr(value, "__code__") or isinstance(value, type | BuiltinFunctionType):
-        return is_users_module(str(getattr(value, "__module__", "")))
-    return True
-
-
-def is_users_module(module: str) -> bool:
-    """Return whether a module is a script of the user's, rather than of Python, of this package or a library."""
-    path = getattr(sys.modules.get(module), "__file__", None)
-    return module == "__main__" if path is None else _is_users_file(path)
-
-
-def _is_users_file(path: str) -> bool:
-    """Return whether a file is neither of Python, nor of this package, nor of an installed library."""
-    installed = [sysconfig.get_paths()[kind] for kind in ("stdlib", "platstdlib", "purelib", "platlib")]
-    folders = [Path(__file__).resolve().parents[1], *(Path(folder).resolve() for folder in installed)]
-    return not any(Path(path).resolve().is_relative_to(folder) for folder in folders)
-
-
-def _source(module: ModuleType | None) -> str:
-    """Return the hash of a user's module's file, nothing for a library's."""
-    if module is None or not is_users_module(module.__name__):
-        return ""
-    return _hashed_file(Path(getattr(module, "__file__", None) or ""))
-
-
-def _modules_of(module: ModuleType) -> list[ModuleType]:
-    """Return the user's own modules that one of theirs names."""
-    if not is_users_module(module.__name__):
-        return []
-    found = {name: own for name, own in vars(module).items() if isinstance(own, ModuleType) and own is not module}
-    return [own for _, own in sorted(found.items()) if is_users_module(own.__name__)]
-
-
-def _hashed_file(path: Path) -> str:
-    return sha256(path.read_bytes()).hexdigest() if path.is_file() else ""

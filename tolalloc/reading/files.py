@@ -6,21 +6,19 @@ import json
 import os
 import re
 import sys
+import sysconfig
 import tomllib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Mapping
 from dataclasses import is_dataclass
+from functools import cache
 from pathlib import Path
+from types import FrameType
 from typing import Any, TypeVar, get_args, get_type_hints
 
 import pydantic
 
 from tolalloc.exceptions import Faults, InputError, TolallocError, UnknownNameError, quoted
 from tolalloc.reading.file_content import is_file, read_text
-
-_FOLDER: ContextVar[Path | None] = ContextVar("folder", default=None)
-"""Folder that relative paths are meant from; the current one unless a script is being read."""
 
 Model = TypeVar("Model", bound=pydantic.BaseModel)
 
@@ -51,27 +49,32 @@ def times(unit: float) -> pydantic.AfterValidator:
     return pydantic.AfterValidator(lambda value: value * unit)
 
 
-@contextmanager
-def relative_to(folder: Path) -> Iterator[None]:
-    """Take relative paths as those of a folder, such as that of the script that is being read."""
-    token = _FOLDER.set(folder)
-    try:
-        yield
-    finally:
-        _FOLDER.reset(token)
-
-
 def found_from_here(path: str | Path) -> Path:
-    """Return the user's path, as the folder means it that relative paths are taken from.
+    """Return the user's path, as the file means it that asks for it.
 
-    A script that Python itself runs finds the files beside it too, from wherever it is run.
+    That is beside this file or one that imports it, from wherever they are imported or run; else in the current folder,
+    but not while this package reads a script.
     """
-    folder, own = _FOLDER.get(), Path(path)
-    if folder is not None:
-        return folder / own
-    script = getattr(sys.modules.get("__main__"), "__file__", None)
-    beside = Path(script).parent / own if script else own
-    return own if os.path.exists(own) or not os.path.exists(beside) else beside  # a name too long is no file
+    own, beside = Path(path), None
+    frame: FrameType | None = sys._getframe()
+    while frame:
+        file = frame.f_globals.get("__file__")
+        if file and is_users_file(file):
+            beside = Path(file).resolve().parent / own
+            if os.path.exists(beside):  # a name too long is no file
+                return beside
+        elif beside and frame.f_globals.get("__name__", "").startswith("tolalloc."):
+            return beside
+        frame = frame.f_back
+    return own
+
+
+@cache
+def is_users_file(path: str) -> bool:
+    """Return whether a file is neither of Python, nor of this package, nor of an installed library."""
+    found, package = Path(path).resolve(), Path(__file__).resolve().parents[1]
+    folders = (package, *(Path(sysconfig.get_path(kind)).resolve() for kind in ("stdlib", "platstdlib")))
+    return not {"site-packages", "dist-packages"} & {*found.parts} and not any(map(found.is_relative_to, folders))
 
 
 def read_toml(path: Path) -> dict[str, Any]:

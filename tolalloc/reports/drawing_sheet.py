@@ -95,7 +95,7 @@ class _Pen:
 
     def text(self, text: str, place: tuple[float, float], height: float = _TEXT) -> None:
         """Write one line whose lower left end is at a place."""
-        self.space.add_text(text, height=height, dxfattribs=self.attributes).set_placement(place)
+        self.space.add_text(text.replace("\n", " "), height=height, dxfattribs=self.attributes).set_placement(place)
 
     def paragraph(self, text: str, place: tuple[float, float], width: float) -> None:
         """Write a text that is wrapped, its upper left corner at a place."""

@@ -72,6 +72,17 @@ class _PartCompiler(Compiler):  # type: ignore[misc]
         return pipelines
 
 
+class _Cache(FunctionCache):  # type: ignore[misc]
+    """Files of what is compiled; what cannot be read, such as a file that was cut, is compiled again."""
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        try:
+            return super().load_overload(signature, context)
+        except Exception:  # a damaged file raises what it likes
+            self.flush()
+            return None
+
+
 class _KeptPart(CompileResultCacheImpl):  # type: ignore[misc]
     """How a part is written into a file and read from it."""
 
@@ -96,7 +107,7 @@ class _KeptPart(CompileResultCacheImpl):  # type: ignore[misc]
         )
 
 
-class _PartCache(FunctionCache):  # type: ignore[misc]
+class _PartCache(_Cache):
     _impl_class = _KeptPart
 
 
@@ -121,6 +132,10 @@ class Whole(CPUDispatcher):  # type: ignore[misc]
         super().__init__(function, targetoptions=options | {"nopython": True, "no_cfunc_wrapper": True})
         self.before = before  # is told the module of what is compiled next
         self.part = _Part(function, options)
+
+    def enable_caching(self) -> None:
+        """Keep what is compiled."""
+        self._cache = _Cache(self.py_func)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Return the type of a call from a compiled function."""

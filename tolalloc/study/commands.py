@@ -206,6 +206,8 @@ def run_series(
                 current = () if fresh else (found for own in reversed(earlier) if (found := _finished(study, own)))
                 finished = next(iter(current), None)
                 if finished is None:
+                    if earlier and not fresh and (unknown := Prepared(study=study).unknown):
+                        progress.tell(f"{study.name} is run again: {unknown}.")
                     run(study, own, progress=progress, fresh=fresh, solved_by=solved_by)
             found = finished or read_run(own)
             yield Member(name=study.name, folder=found.folder, found=found)
@@ -218,7 +220,7 @@ def _finished(study: Study, folder: Path) -> FinishedRun | None:
     with suppress(InputError):
         found = read_run(folder)
         manifest, asked = found.manifest, [question.kind for question in study.questions]
-        same = manifest.get("study hash") == Prepared(study=study).digest and manifest.get("questions") == asked
+        same = manifest.get("study hash") == Prepared(study=study).digest != "" and manifest.get("questions") == asked
         if same and manifest.get("quick") == study.quick:
             return found
     return None

@@ -22,6 +22,7 @@ from tolalloc.drawings.compensators import Compensator, all_choices, choice_labe
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.models.identity import UnknownIdentityError
 from tolalloc.models.model import HasCopies, Model
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
@@ -219,7 +220,9 @@ class Prepared:
 
     @cached_property
     def digest(self) -> str:
-        """Digest of the study and of what its files hold, wherever they stand."""
+        """Digest of the study and of what its files hold, wherever they stand; empty where that is not known."""
+        if self.unknown:
+            return ""
         study = self.study
         content = (
             (study.name, study.seed, study.largest_failed_share, study.effort, study.asked),
@@ -231,6 +234,15 @@ class Prepared:
             *((self.assemblies,) if self.study.compensators else ()),
         )
         return hashlib.sha256(repr(content).encode()).hexdigest()
+
+    @cached_property
+    def unknown(self) -> str:
+        """Why nothing tells whether its model is the same as before; nothing where something does."""
+        try:
+            repr(self.study.model and self.model.content)
+        except UnknownIdentityError as reason:
+            return f"whether the model of {self.place} is the same as before is not known: {reason}"
+        return ""
 
     def random_units(self, units: int) -> Float[np.ndarray, "unit column"]:
         """Return the deviations of random units at the zones of the drawing [m, angles rad]."""

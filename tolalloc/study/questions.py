@@ -181,6 +181,9 @@ class Allocation(Question):
             boxes=self.boxes,
             place=prepared.place,
         )
+        if checkpoint and prepared.unknown:
+            record.progress.tell(f"The checkpoint {checkpoint} is neither read nor written: {prepared.unknown}.")
+            checkpoint = None
         asked = AssembledQuestion(question=question, choices=prepared.assemblies)
         found = allocate_assembled(asked, record, study.name, prepared.header.digest, checkpoint)
         answer = _answer(self.kind, prepared.header, record, found)

@@ -56,7 +56,7 @@ def _modules_beside(folder: Path, modules: dict[str, ModuleType]) -> Iterator[No
 
 def _belongs_to(name: str, folder: Path) -> bool:
     """Return whether the folder has the module of this name, wherever the one in memory was read."""
-    from tolalloc.models.user_function import is_users_module
+    from tolalloc.models.identity import is_users_module
 
     top = folder / name.partition(".")[0]
     return name != "__main__" and (top.with_suffix(".py").is_file() or top.is_dir()) and is_users_module(name)
@@ -89,7 +89,6 @@ def load_script(path: Path) -> StudyScript:
     import numpy as np
 
     from tolalloc.reading.file_content import is_file
-    from tolalloc.reading.files import relative_to
     from tolalloc.study.study import Study
 
     if not is_file(path):
@@ -102,7 +101,7 @@ def load_script(path: Path) -> StudyScript:
     modules = {name: module}
     try:
         # A script that tells NumPy to raise at a rounding would stop libraries that mean to go on.
-        with relative_to(folder), _modules_beside(folder, modules), np.errstate():
+        with _modules_beside(folder, modules), np.errstate():
             spec.loader.exec_module(module)
     except TolallocError as error:
         raise InputError(f"{path}: {error}") from None

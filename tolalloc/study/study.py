@@ -211,8 +211,10 @@ class Study(Problem):
 
 
 def _record(prepared: Prepared, question: Question, progress: Progress | None) -> RunRecord:
-    outcomes = portrait_of(prepared.model).outcomes if "model" in question.reads else {}
-    return RunRecord(progress or SILENT, outcomes)
+    if "model" not in question.reads:
+        return RunRecord(progress or SILENT, {})
+    prepared.digest  # noqa: B018  # of before the first call: a function may remember its calls
+    return RunRecord(progress or SILENT, portrait_of(prepared.model).outcomes)
 
 
 def run(

@@ -7,12 +7,15 @@ import os
 import re
 import secrets
 import sys
+import time
 from dataclasses import dataclass, field
 from functools import cached_property
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.resources import files
+from io import BufferedReader
 from pathlib import Path
+from socket import SocketIO
 from threading import BoundedSemaphore
 from typing import Any
 from urllib.parse import parse_qs
@@ -63,7 +66,7 @@ MOST_AT_ONCE = 32
 MOST_CONNECTIONS = 64
 """Connections that are open at the same time; a browser keeps six for a tab [-]."""
 PATIENCE = 10.0
-"""Time that a connection may take to say what it wants [s]."""
+"""Time that a connection may take to say a whole request, and to take its answer [s]."""
 _KINDS = {"js": "text/javascript", "css": "text/css", "html": "text/html"}
 _OWN, _SHARED = (
     (
@@ -92,9 +95,7 @@ class LiveServer:
         InputError
             The port is taken or none.
         """
-        handler = type(
-            "Handler", (_Handler,), {"live": self, "timeout": PATIENCE, "free": BoundedSemaphore(MOST_AT_ONCE)}
-        )
+        handler = type("Handler", (_Handler,), {"live": self, "free": BoundedSemaphore(MOST_AT_ONCE)})
         try:
             server = _BoundedServer(("127.0.0.1", self.port), handler)
         except (OSError, OverflowError) as error:
@@ -150,6 +151,17 @@ class _BoundedServer(ThreadingHTTPServer):
             super().handle_error(request, client_address)
 
 
+class _Sent(SocketIO):
+    """What a connection sends."""
+
+    until = 0.0  # When its request must be complete, however many bytes that are, by the clock of `time.monotonic` [s]
+
+    def readinto(self, buffer: Any) -> int | None:
+        """Read bytes for as long as the request may still take."""
+        self._sock.settimeout(max(self.until - time.monotonic(), 1e-3))  # type: ignore[attr-defined]
+        return super().readinto(buffer)
+
+
 class _Handler(BaseHTTPRequestHandler):
     """One request."""
 
@@ -158,6 +170,17 @@ class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     disable_nagle_algorithm = True  # an answer of two writes would else wait 40 ms for the first to be confirmed
     server_version, sys_version = "tolalloc", ""
+
+    def setup(self) -> None:
+        """Read what the connection sends."""
+        super().setup()
+        self.sent = _Sent(self.connection, "rb")
+        self.rfile = BufferedReader(self.sent)
+
+    def handle_one_request(self) -> None:
+        """Answer a request that is said in time."""
+        self.sent.until = time.monotonic() + PATIENCE
+        super().handle_one_request()
 
     def do_GET(self) -> None:
         """Answer with a page."""
@@ -228,6 +251,7 @@ class _Handler(BaseHTTPRequestHandler):
         self._send(status, json.dumps({"error": sentence}).encode(), "application/json")
 
     def _send(self, status: HTTPStatus, content: bytes, kind: str) -> None:
+        self.connection.settimeout(PATIENCE)
         self.send_response(status)
         for name, value in (
             ("Content-Type", kind),

@@ -283,7 +283,9 @@ def _table_comments(result: AllocationResult, header: Header, notes: Sequence[st
     """
     paid = sum(result.process_changes.values())
     once = _say("table_once", paid=paid) if paid else ""
-    said = [_say("table_study", name=result.name, digest=header.digest[:12], cost=result.cost, once=once)]
+    said = [
+        _say("table_study", name=result.name, digest=header.digest[:12] or "not known", cost=result.cost, once=once)
+    ]
     if header.title_block:
         fields = (f"{label} {text}" for label, text in header.title_block.items())
         said.append(_say("table_block", fields="; ".join(fields)))

@@ -112,7 +112,7 @@ def _title_block(result: AllocationResult, header: Header, today: date) -> tuple
     return (
         (portrait_of(result.model).kind, header.model),
         ("study", header.name),
-        ("study hash", header.digest[:12]),
+        ("study hash", header.digest[:12] or "not known"),
         ("drawing number", stated.get("drawing number", "")),
         ("revision", stated.get("revision", "")),
         ("author", stated.get("author", "")),
