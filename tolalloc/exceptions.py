@@ -5,7 +5,8 @@ TolallocError                 one sentence for a person; the command line prints
 ├── UnknownNameError          a name that nothing here carries; the nearest known names are offered
 ├── RunFolderError            the run folder cannot be used without losing what is in it
 ├── SolveError                too many samples of a batch failed to be trusted
-│   └── FailedUnitsError      the same of the random units of one drawing, beside which a search may try others
+│   ├── FailedUnitsError      the same of the random units of one drawing, beside which a search may try others
+│   └── ConstantOutputError   nothing varies, so nothing can be ranked
 └── StoppedError              a person stopped the work; exit code 130
 """
 
@@ -114,6 +115,10 @@ _MOST_FAULTS = 20
 
 class FailedUnitsError(SolveError):
     """Too many random units of one drawing have no answer."""
+
+
+class ConstantOutputError(SolveError):
+    """No output varies."""
 
 
 class Faults:

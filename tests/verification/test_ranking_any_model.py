@@ -119,7 +119,7 @@ def test_the_answer_speaks_of_the_outputs_by_name_and_unit(answer):
 def test_the_ranking_is_that_of_the_closed_form(answer):
     assert answer.result.indices.sources == ("a", "b")
     np.testing.assert_allclose(answer.result.indices.total, [0.9, 0.1], atol=0.05)
-    np.testing.assert_allclose(answer.result.local.at_nominal, [3e-3, -1e-3], rtol=1e-6)
+    np.testing.assert_allclose(answer.result.local.slope, [3e-3, -1e-3], rtol=1e-6)
     assert answer.result.choice.chosen is not None
     assert [frame["requirement"] for frame in answer.summary["requirements"]] == ["gap", "play"]
 

@@ -50,7 +50,7 @@ from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import KeptLimits
 from tolalloc.drawings.compensators import Compensator, assembly_cost, choice_label
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.exceptions import InputError, SolveError
+from tolalloc.exceptions import ConstantOutputError, InputError, SolveError
 from tolalloc.models.checkpoint import CachedResponse, Checkpoint
 from tolalloc.models.model import Model, is_fast
 from tolalloc.running.chunks import one_blas_thread
@@ -345,8 +345,10 @@ class DrawingQuestion:
             return None
         return best_yield(lambda target: cost_at_yield(space, free, target), price, self.effort.yields)
 
-    def shares(self, space: DesignSpace, design: Float[np.ndarray, " variable"]) -> tuple[SobolIndices, SobolIndices]:
-        """Return the indices of the leading output at the zones and the settings of a design.
+    def shares(
+        self, space: DesignSpace, design: Float[np.ndarray, " variable"]
+    ) -> tuple[SobolIndices, SobolIndices] | tuple[None, None]:
+        """Return the indices of the leading output at the zones and the settings of a design, none if it is constant.
 
         By source, and by dimension of the drawing.
         """
@@ -354,7 +356,10 @@ class DrawingQuestion:
         response = self.model.at(space.settings_of(design)).reading((leading,))
         experiment = Experiment(response, errors, space.zones(design), self.seeds("shares"), self.largest_failed_share)
         cheap = learnt(experiment, blocks)
-        found = sobol_indices(experiment, SobolEffort(start=blocks, limit=blocks), cheap=cheap)
+        try:
+            found = sobol_indices(experiment, SobolEffort(start=blocks, limit=blocks), cheap=cheap)
+        except ConstantOutputError:
+            return None, None
         return found.of(leading), regrouped(experiment, found, errors.dimension_of_column, cheap)
 
     def examined(self, design: VerifiedDesign) -> Mapping[str, float]:

@@ -18,9 +18,11 @@ from tolalloc.allocation.search.proven_bound import ProvenBound
 from tolalloc.allocation.search.zone_allocation import ModelRange, ZoneAllocation, model_range
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.joint_yield import JointRequirement
+from tolalloc.allocation.space.output_sample import LimitedSample
 from tolalloc.allocation.space.problem import OneSidedConstraint, Solution
 from tolalloc.allocation.space.requirement import AtYield, Check, Requirement
 from tolalloc.allocation.verify.verification import VerifiedDesign
+from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import KeptLimits, Yield
 from tolalloc.drawings.compensators import Compensator
 from tolalloc.drawings.drawing import Drawing
@@ -96,9 +98,10 @@ class AllocationResult:
     fixed: ZoneAllocation | None
     free: ZoneAllocation  # The allocation of tolerances and settings together
     graded: GradedAllocation | None  # The same on ladders of zones, if the question asks for it
-    shares: SobolIndices  # Sobol indices of the leading output at the zones of the drawing
+    # Sobol indices of the leading output at the zones of the drawing, none where it is the same for all units
+    shares: SobolIndices | None
     # The same of the dimensions of the drawing: all members of a group exchanged together
-    shares_of_dimensions: SobolIndices
+    shares_of_dimensions: SobolIndices | None
     trade: SettingTrade | None  # Cost of the cheapest zones over the settings, if asked for
     fronts: Fronts | None  # What can be had at which cost, if asked for
     robustness: Robustness | None  # Answers under changed assumptions, if asked for
@@ -331,7 +334,7 @@ def limit_price(side: OneSidedConstraint, price: float) -> tuple[float, str]:
     return price * step, unit if step == 1 else f"{step:g} {unit}"
 
 
-def unit_quantile(design: VerifiedDesign, check: Check) -> float:
+def unit_quantile(design: VerifiedDesign, check: Check, side: OneSidedConstraint) -> float:
     """Return the limit that just the target share of a design's units keeps [unit of the output].
 
     Parameters
@@ -340,11 +343,13 @@ def unit_quantile(design: VerifiedDesign, check: Check) -> float:
         The verified design.
     check
         How it stands against a requirement.
+    side
+        One of its limits: of two, half of the units beyond are left to it, or as many as lie there if these are more.
 
     Returns
     -------
     float
-        Not a number unless the requirement is a yield with one limit; two share the units beyond.
+        Not a number unless the requirement is a yield.
 
     Notes
     -----
@@ -358,17 +363,22 @@ def unit_quantile(design: VerifiedDesign, check: Check) -> float:
     >>> from tolalloc.allocation.verify.verification import verifier_of_sum
     >>> verifier = verifier_of_sum(6.0, 6.0, limit=5.0, guarantee=AtYield(target=0.9))
     >>> design = verifier.verify(verifier.space.uniform(1.0), "as drawn")
-    >>> round(unit_quantile(design, design.checks[0]), 1)
+    >>> round(unit_quantile(design, design.checks[0], *design.checks[0].constraints), 1)
     1.8
     """
-    guarantee = check.requirement.guarantee
-    if not isinstance(guarantee, AtYield) or len(check.constraints) > 1:
+    asked, guarantee, tested = check.requirement, check.requirement.guarantee, design.independent
+    if not isinstance(guarantee, AtYield):
         return float("nan")
-    side, independent = check.constraints[0], design.independent
-    if independent and not independent.units.near.all():
-        excess = side.sign * (check.requirement.read(independent.outputs) - side.limit)
-        beyond = independent.units.kept_excess(np.where(np.isfinite(excess), excess, np.inf), guarantee.target, 0.5)
-        return float(side.limit + side.sign * beyond)
-    sign, values = side.sign, check.requirement.read(design.outputs)
-    turned = np.sort(np.where(np.isnan(values), np.inf, sign * values))
-    return float(sign * turned[int(np.ceil(guarantee.target * turned.size)) - 1])
+    units = tested.units if tested and not tested.units.near.all() else None
+    values = asked.read(tested.outputs if tested and units else design.outputs)
+
+    def beyond(limits: Limits, target: float) -> float:
+        excess = LimitedSample.all_of(values, limits).excess
+        if units:
+            return units.kept_excess(excess, target, 0.5)
+        return float(np.sort(excess)[int(np.ceil(target * excess.size)) - 1])
+
+    found = beyond(asked.limits, guarantee.target)
+    if asked.limits.width is not None:
+        found = min(found, beyond(asked.limits.side(side.sign), (1 + guarantee.target) / 2))
+    return float(side.limit + side.sign * found)

@@ -38,6 +38,10 @@ class Limits:
         lower: tuple[tuple[Literal[1, -1], float], ...] = () if self.lower is None else ((-1, self.lower),)
         return (*upper, *lower)
 
+    def side(self, sign: int) -> Limits:
+        """Return the limit of one side, the upper one for 1."""
+        return Limits(upper=self.upper) if sign > 0 else Limits(lower=self.lower)
+
     def kept_by(self, sample: Float[np.ndarray, " unit"]) -> Bool[np.ndarray, " unit"]:
         """Return which values keep the limits; one that is not a number does not."""
         return np.asarray((sample >= self._low) & (sample <= self._high))

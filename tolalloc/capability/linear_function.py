@@ -177,6 +177,14 @@ class LinearLaw:
         )
         return float(found)
 
+    def parts(self, limits: Limits, by: float) -> list[float]:
+        """Return by which part of its own change each limit moves an excess, the upper one first [-].
+
+        ∂e/∂limit = f(limit + e)/Σ f with the density f there: of two limits all for the one near which units lie.
+        """
+        densities = [self._at(limit + sign * by)[0] for sign, limit in limits.turned]
+        return [density / max(sum(densities), np.finfo(float).tiny) for density in densities]
+
     def excess_by_zone(self, limits: Limits, by: float) -> Float[np.ndarray, " source"]:
         """Return the derivative of `excess` by the zones at a share that it has [unit of the output per m].
 

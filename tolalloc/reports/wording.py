@@ -152,8 +152,8 @@ GLOSSARY = {
     "turns, but warm, worn early and without lost motion.",
     "quantile": "Value that a stated share of the units keeps.",
     "kept value per zone": "Change of what is compared with the limit per micrometre of the zone.",
-    "Sens": "Change of the output per micrometre of deviation: with its sign for a single dimension, root mean square "
-    "for a position or a wave, whose direction is random.",
+    "Sens": "Change of the output per micrometre of deviation, mean over the units of the drawing, with its sign; root "
+    "mean square for a position or a wave, whose direction is random, and where signs cancel.",
     "simulated": "Said of a unit whose errors are drawn at random from the tolerance table and solved by the model.",
     "surrogate": "Fast approximation of the model, used only with its error stated.",
     "total-effect index": "Share of the variance in which an error takes part, alone or with others (Sobol's ST).",

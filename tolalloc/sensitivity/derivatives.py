@@ -27,11 +27,7 @@ class LocalDerivatives:
     """What a micrometre of each source does to the output."""
 
     sources: tuple[str, ...]  # Names of the sources that a drawing limits, in the order of all arrays
-    nominal: float  # Output in the middle of all zones [output]
-    # Derivative there: with its sign for a source of one column, the length of the gradient for any other [output/µm]
-    at_nominal: Float[np.ndarray, " source"]
-    # Direction of the gradient of a source of two columns, x or the cosine at 0; NaN for any other [rad]
-    direction: Float[np.ndarray, " source"]
+    slope: Float[np.ndarray, " source"]  # `mean_slope` over random units, “Sens” on every page [output/µm]
     # Root mean square of the gradient's length over random units [output/µm]
     root_mean_square: Float[np.ndarray, " source"]
     # Root mean square change of the output, to first order, by the errors that a source's zone lets through [output]
@@ -52,21 +48,19 @@ class LocalDerivatives:
         >>> one, two = np.ones(2), np.array([3.0, 4.0])
         >>> own = LocalDerivatives(
         ...     sources=("a", "b"),
-        ...     nominal=0.0,
-        ...     at_nominal=np.array([-1.0, 1.0]),
-        ...     direction=one,
+        ...     slope=np.array([-1.0, 1.0]),
         ...     root_mean_square=one,
         ...     by_zone=two,
         ...     per_micrometre=two,
         ...     units=1,
         ...     failed=0,
         ... )
-        >>> own.of_line(("a", "b")).by_zone, own.of_line(("a",)).at_nominal
+        >>> own.of_line(("a", "b")).by_zone, own.of_line(("a",)).slope
         (5.0, (-1.0, -1.0))
         """
         at = [self.sources.index(name) for name in members]
         return LineDerivatives(
-            at_nominal=(float(self.at_nominal[at].min()), float(self.at_nominal[at].max())),
+            slope=(float(self.slope[at].min()), float(self.slope[at].max())),
             per_micrometre=float(np.linalg.norm(self.per_micrometre[at])),
             by_zone=float(np.linalg.norm(self.by_zone[at])),
         )
@@ -76,7 +70,7 @@ class LocalDerivatives:
 class LineDerivatives:
     """What the places of one line of a drawing do to the output."""
 
-    at_nominal: tuple[float, float]  # Smallest and largest derivative of its places, as of `LocalDerivatives`
+    slope: tuple[float, float]  # Smallest and largest of its places, as of `LocalDerivatives`
     per_micrometre: float  # Root mean square change by a micrometre in every place [output/µm]
     by_zone: float  # The same by what the zones let through [output]
 
@@ -102,23 +96,42 @@ class DerivativeMeasures:
         return percentile_interval(self.bound_resamples, unseen=self.unseen)
 
 
+_CANCELLED = 0.1
+"""Mean of slopes over their root mean square, below which their signs cancel [-]."""
+
+
+def mean_slope(slopes: Float[np.ndarray, "unit column"]) -> float:
+    """Return what a deviation of one source does to an output over units of a drawing [unit of the output per length].
+
+    The mean for a source of one column, with its sign. The root mean square length √(Σ (∂y/∂xᵢ)²) of the gradient (own
+    derivation) where the direction is random, as of a position, or where signs cancel: at a mean below a tenth of it.
+
+    Examples
+    --------
+    >>> [mean_slope(np.array(slopes)) for slopes in ([[-2.0], [-4.0]], [[-2.0], [2.0]], [[3.0, 4.0]])]
+    [-3.0, 2.0, 5.0]
+    """
+    length = float(np.sqrt((slopes**2).sum(axis=1).mean()))
+    mean = float(slopes.mean())
+    return mean if slopes.shape[1] == 1 and abs(mean) >= _CANCELLED * length else length
+
+
 def local_derivatives(experiment: Experiment[ResponseWithDerivatives], units: int = 1024) -> LocalDerivatives:
-    """Return the derivatives by each source at the nominal and over random units; joint sources are no lengths.
+    """Return the derivatives by each source over random units; joint sources are no lengths.
 
     Raises
     ------
     SolveError
-        The nominal failed, or more of the random units.
+        More of the random units failed.
 
     Notes
     -----
     A peak-to-peak has a kink wherever two angles share its maximum or minimum, and symmetry makes the nominal such a
-    place: the derivative there is one of several one-sided ones. The root mean square does not depend on it.
+    place: the derivative there is one of several one-sided ones, so none is told.
 
-    The length of a gradient is √(Σ (∂y/∂xᵢ)²) over a source's columns [output/µm] (own derivation); in the middle, and
-    as root mean square over units. An error has no steepest direction but its own: by a source's zone the output
-    changes by √(Σ E[(∂y/∂xᵢ)²]·σᵢ²), and divided by √(Σ σᵢ²) by a micrometre of one of its features, which is
-    the distance from the true position, or the amplitude of a wave.
+    An error has no steepest direction but its own: by a source's zone the output changes by √(Σ E[(∂y/∂xᵢ)²]·σᵢ²), and
+    divided by √(Σ σᵢ²) by a micrometre of one of its features, which is the distance from the true position, or the
+    amplitude of a wave.
 
     Examples
     --------
@@ -129,26 +142,19 @@ def local_derivatives(experiment: Experiment[ResponseWithDerivatives], units: in
     [1e-06, 1e-06]
     """
     errors = experiment.errors
-    middle = experiment.response.with_derivatives(experiment.deviations(np.zeros((1, len(errors.columns)))))
-    if not middle.evaluation.good.all():
-        raise SolveError("Local derivatives: the nominal has no usable answer.")
     sample, by_column, _ = _sampled(experiment, units)
-    where, length, direction, random = np.array(errors.source_of_column), [], [], []
+    where, slope, random = np.array(errors.source_of_column), [], []
     variance, mean_square = sample.x[sample.evaluation.good].var(axis=0), (by_column**2).mean(axis=0)
     by_zone, per_micrometre = [], []
     for source in errors.active:
         own, per_length = where == source.name, MICROMETRE / source.lever
-        gradient = middle.by_column[0, own] * per_length
-        length.append(float(gradient[0]) if gradient.size == 1 else float(np.linalg.norm(gradient)))
-        direction.append(float(np.arctan2(gradient[1], gradient[0])) if gradient.size == 2 else np.nan)
+        slope.append(mean_slope(by_column[:, own] * per_length))
         random.append(float(np.sqrt(((by_column[:, own] * per_length) ** 2).sum(axis=1).mean())))
         by_zone.append(float(np.sqrt(mean_square[own] @ variance[own])))
         per_micrometre.append(by_zone[-1] / float(np.sqrt(variance[own].sum())) * per_length)
     return LocalDerivatives(
         sources=tuple(source.name for source in errors.active),
-        nominal=float(middle.evaluation.values[0, 0]),
-        at_nominal=np.array(length),
-        direction=np.array(direction),
+        slope=np.array(slope),
         root_mean_square=np.array(random),
         by_zone=np.array(by_zone),
         per_micrometre=np.array(per_micrometre),

@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float
 
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.exceptions import InputError, SolveError, UnknownNameError
+from tolalloc.exceptions import ConstantOutputError, InputError, UnknownNameError
 from tolalloc.models.model import Evaluation, Response
 from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.ranking import (
@@ -178,7 +178,7 @@ def _indices_of(
         The output is the same for all samples.
     """
     if not found.varies[at]:
-        raise SolveError(f"Sobol indices: {output} is the same for all samples; no source can be ranked.")
+        raise ConstantOutputError(f"Sobol indices: {output} is the same for all samples; no source can be ranked.")
     return SobolIndices(
         sources=sources,
         first=found.first[at],
@@ -207,7 +207,9 @@ def _overall_ranking(
     """
     varying = np.flatnonzero(indices.varies & np.isin(outputs, ranked))
     if not varying.size:
-        raise SolveError("Sobol indices: every output is the same for all samples, so no source can be ranked.")
+        raise ConstantOutputError(
+            "Sobol indices: every output is the same for all samples, so no source can be ranked."
+        )
     total = indices.total[varying]
     return SourceRanking(
         sources=sources,

@@ -15,6 +15,7 @@ from tolalloc.allocation.search.lower_bound import LowerBound, lower_bound
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import SearchEffort
 from tolalloc.allocation.space.problem import Solution, Stack
+from tolalloc.allocation.space.requirement import AtYield
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, cheapest_met
 from tolalloc.exceptions import FailedUnitsError, InputError, SolveError
 
@@ -126,6 +127,7 @@ def scale_in_proportion(verifier: Verifier, steps: int) -> tuple[VerifiedDesign,
     [[1.0, 1.0], [0.5, 0.5]]
     """
     space, scale, factor = verifier.space, 1.0, 1.0
+    widest = float(space.upper[: len(space.groups)].max())  # beyond it no zone lies inside its range
     tried: list[VerifiedDesign] = []
     for step in range(steps):
         try:  # the stream of random units keeps the name that it had
@@ -137,7 +139,7 @@ def scale_in_proportion(verifier: Verifier, steps: int) -> tuple[VerifiedDesign,
             scale /= factor
             continue
         tried.append(verified)
-        factor = _factor(verified)
+        factor = min(_factor(verified), widest / scale)
         if verified.met and factor < 1 + SETTLED:
             break
         scale *= factor
@@ -486,6 +488,14 @@ class ZoneAllocation:
         found: dict[str, float] = {}
         for constraint, price in zip(self.chosen.constraints, self.optimum.prices, strict=True):
             found[constraint.stack.name] = found.get(constraint.stack.name, 0.0) + float(price)
+        for check in self.chosen.checks:
+            # Two limits of a law move by one excess: which of them takes its price is known of its density alone.
+            sides, asked = check.steering, check.requirement
+            if isinstance(asked.guarantee, AtYield) and len(sides) > 1 and sides[0].law:
+                names = [side.stack.name for side in sides]
+                parts = sides[0].law.parts(asked.limits, sides[0].excess)
+                price = sum(found[name] for name in names)
+                found |= {name: price * part for name, part in zip(names, parts, strict=True)}
         return found
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -21,6 +21,7 @@ from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError
 from tolalloc.models.differences import derived
 from tolalloc.models.model import Evaluation, Model, ResponseWithDerivatives, SettingDerivatives, is_fast
+from tolalloc.sensitivity.derivatives import mean_slope
 
 _EVEN_ODDS, _TENTH = 0.5, 0.1
 _FURTHER, _SURELY = 4, 200
@@ -164,6 +165,11 @@ class LimitedSample:
         """Return plain random units, all of which were solved."""
         units = SolvedUnits.all_of(values.size)
         return cls(values=values, units=units, limits=limits, law=law, controls=controls, doubt=doubt)
+
+    def side(self, sign: int) -> LimitedSample:
+        """Return the units with the limit of one side."""
+        limits = self.limits.side(sign)
+        return replace(self, limits=limits, controls=tuple(replace(own, limits=limits) for own in self.controls))
 
     def controlled_excess(self, share: float, confidence: float) -> tuple[float, float]:
         """Return how far beyond the limits a share of units lies at most, and its standard error [unit of the excess].
@@ -350,16 +356,12 @@ class DesignSample:
     def sensitivity(self, output: str) -> Float[np.ndarray, " source"]:
         """Return the change of an output with a deviation of each source; one of `exact` [unit of the output per m].
 
-        Of a source of one column the mean over the units, with its sign; of any other the root mean square length of
-        the gradient, as its direction is random. An angle counts as the length that its zone limits.
+        By `mean_slope` over the units. An angle counts as the length that its zone limits.
         """
         found, errors = self.exact[output], self.space.errors
-        by_column, slopes = found.by_column[found.evaluation.good], []
-        for source, own in zip(errors.active, errors.columns_of_source, strict=False):
-            part = by_column[:, own] / source.lever
-            alone = part.shape[1] == 1
-            slopes.append(float(part.mean()) if alone else float(np.sqrt((part**2).sum(axis=1).mean())))
-        return np.array(slopes)
+        by_column = found.by_column[found.evaluation.good]
+        columns = zip(errors.active, errors.columns_of_source, strict=False)
+        return np.array([mean_slope(by_column[:, own] / source.lever) for source, own in columns])
 
     def by_zone(self, output: str) -> Float[np.ndarray, "good source"]:
         """Return the derivative of every good unit's output by the zones; one of `exact` [unit of the output per m].

@@ -122,7 +122,8 @@ class AllocationProblem:
         zones = np.array([max(made.maximum for made in feature.processes) for feature in self.features])
         reach = np.maximum(np.abs(self.shared.lower), np.abs(self.shared.upper))
         loads = [float(stack.load(zones, np.zeros(reach.size)) + np.abs(stack.slopes) @ reach) for stack in self.stacks]
-        return np.maximum(np.abs([stack.budget for stack in self.stacks]), 1e-3 * np.array(loads))
+        found = np.maximum(np.abs([stack.budget for stack in self.stacks]), 1e-3 * np.array(loads))
+        return np.where(found > 0, found, 1.0)  # of what neither zones nor settings move
 
     def cost(self, zones: Float[np.ndarray, " feature"], processes: Int[np.ndarray, " feature"]) -> float:
         """Return the cost of zones made by the processes at the given positions [cost units]."""
@@ -255,6 +256,18 @@ class OneSidedConstraint:
     # Derivative of the excess by every variable, by batches of units that tell its error; none where it has no error
     batches: Float[np.ndarray, "batch variable"] | None = None
     law: LinearLaw | None = None  # Law of the output, where it is linear: the model's derivatives are its own
+    # By how much the side's own quantile lies further inside than what decides, where two limits share the failures
+    inside: float = 0.0  # [unit of the output]
+
+    @property
+    def own(self) -> float:
+        """What of this side alone is told beside the limit: its own quantile [unit of the output]."""
+        return self.value - self.sign * self.inside
+
+    @property
+    def slack(self) -> float:
+        """What is left from that to the limit, negative beyond it [unit of the output]."""
+        return self.inside - self.excess
 
     @property
     def excess(self) -> float:

@@ -39,6 +39,7 @@ class QuantileBound:
     limit: float  # The limit [unit of the output]
     value: float  # What is compared with the limit, infinite where too few units answered [unit of the output]
     standard_error: float  # Standard error of the value [unit of the output]
+    inside: float = 0.0  # `OneSidedConstraint.inside` [unit of the output]
 
     def further(self, by: float) -> QuantileBound:
         """Return the bound with a value that lies further out [unit of the output]."""
@@ -232,6 +233,9 @@ class AtYield(NamedFields):
     parts were measured, the values lie further out by what keeps the target with 95 % of the processes that these
     leave possible (`tolalloc.capability.monte_carlo.ProcessDoubt`).
 
+    Two limits are kept by so many units together, one excess beyond either deciding. What is told of a side is its own
+    quantile: that of half of the failures, or of as many as lie there where these are more.
+
     Examples
     --------
     Of 1,000 equally spaced units up to 1, one may be rejected for 99.5 % with 95 % confidence:
@@ -282,11 +286,17 @@ class AtYield(NamedFields):
 
     def bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what units show of every limit, or what its law does where they keep to it."""
-        found = self._counted_bounds(sample, confidence)
-        if sample.doubt is None:
+        margin = sample.doubt.margin(sample.limits, 1 - self.target) if sample.doubt else 0.0
+        found = tuple(bound.further(margin) for bound in self._counted_bounds(sample, confidence))
+        if len(found) == 1:
             return found
-        margin = sample.doubt.margin(sample.limits, 1 - self.target)
-        return tuple(bound.further(margin) for bound in found)
+        half = AtYield((1 + self.target) / 2)
+        alone = [half.bounds(sample.side(own.sign), confidence)[0].excess for own in found]
+        inside = (
+            own.excess - min(own.excess, by) if np.isfinite(own.excess) else 0.0
+            for own, by in zip(found, alone, strict=True)
+        )
+        return tuple(replace(own, inside=by) for own, by in zip(found, inside, strict=True))
 
     def _counted_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what units show of processes that are as their measured parts say."""
@@ -361,7 +371,8 @@ class AtCpk(NamedFields):
 
     def constraints(self, sample: OutputSample, limits: Limits) -> tuple[OneSidedConstraint, ...]:
         """Return every one-sided constraint, the upper one first."""
-        return spread_constraints(sample, self.bounds(sample.limited(limits), sample.confidence), limits)
+        bounds = self.bounds(sample.limited(limits), sample.confidence)
+        return tuple(_spread_constraint(sample, own, limits.side(own.sign)) for own in bounds)
 
     def bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what units show of every limit."""
@@ -382,7 +393,7 @@ class AtCpk(NamedFields):
         self, values: Float[np.ndarray, " good"], sign: Literal[1, -1], limit: float, confidence: float
     ) -> QuantileBound:
         turned = sign * values
-        needed, error = self._needed(turned, confidence)
+        needed, error = self._needed(turned, confidence) if np.ptp(turned) > 0 else (self.target, 0.0)
         deviation = float(turned.std(ddof=1))
         value = float(turned.mean()) + 3 * needed * deviation
         return QuantileBound(sign=sign, limit=limit, value=sign * value, standard_error=3 * error * deviation)
@@ -414,7 +425,8 @@ def spread_constraints(
 
 def _spread_constraint(sample: OutputSample, bound: QuantileBound, limits: Limits) -> OneSidedConstraint:
     value, groups = bound.turned(sample.values), sample.groups
-    excess, weights, derivative = value - bound.sign * bound.limit, *_weights(sample, bound.sign, value)
+    excess, (known, derivative) = value - bound.sign * bound.limit, sample.derived()
+    weights = bound.sign * spread_weights(bound.sign * sample.values, bound.sign * known, value)
     gradient, batches = weights @ derivative / weights.size, _batches(weights, derivative)
     if sample.law:
         gradient[:groups] = sample.units.space.by_scale(sample.law.excess_by_zone(limits, excess))
@@ -424,6 +436,7 @@ def _spread_constraint(sample: OutputSample, bound: QuantileBound, limits: Limit
         limit=bound.limit,
         value=bound.value,
         standard_error=bound.standard_error,
+        inside=bound.inside,
         scale=_scale_of(sample, bound.limit),
         stack=root_sum_square_stack(_name_of(sample, bound.sign), sample.design, excess, gradient, groups),
         batches=batches,
@@ -431,17 +444,15 @@ def _spread_constraint(sample: OutputSample, bound: QuantileBound, limits: Limit
     )
 
 
-def _weights(
-    sample: OutputSample, sign: int, value: float
-) -> tuple[Float[np.ndarray, " known"], Float[np.ndarray, "known variable"]]:
-    """Return derivatives of units, and by what each counts in that of mean + spread·σ, the turned value.
+def spread_weights(
+    values: Float[np.ndarray, " unit"], known: Float[np.ndarray, " known"], value: float
+) -> Float[np.ndarray, " known"]:
+    """Return by what the derivatives of known units count in that of mean + spread·σ of all units, a value.
 
-    Theory page, equation (24).
+    Theory page, equation (24); all alike where nothing varies.
     """
-    turned, (known, derivative) = sign * sample.values, sample.derived()
-    spread = (value - turned.mean()) / turned.std() if turned.std() > 0 else 0.0
-    standard = (sign * known - (sign * known).mean()) / known.std() if known.std() > 0 else np.zeros(known.size)
-    return sign * (1.0 + spread * standard), derivative
+    spread = (value - values.mean()) / values.std() if values.std() > 0 else 0.0
+    return np.asarray(1.0 + spread * (known - known.mean()) / (known.std() or 1.0))
 
 
 def _batches(

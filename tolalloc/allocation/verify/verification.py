@@ -13,7 +13,14 @@ from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.joint_yield import JointCheck, divided, limited_by, tightened
 from tolalloc.allocation.space.output_sample import DesignSample
 from tolalloc.allocation.space.problem import OneSidedConstraint
-from tolalloc.allocation.space.requirement import Check, Guarantee, Requirement, RootSumSquare, spread_constraints
+from tolalloc.allocation.space.requirement import (
+    Check,
+    Guarantee,
+    Requirement,
+    RootSumSquare,
+    spread_constraints,
+    spread_weights,
+)
 from tolalloc.allocation.verify.independent_sample import IndependentSample
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.capability.indices import Limits
@@ -87,15 +94,16 @@ class VerifiedDesign:
         """Whether every requirement is met, as far as these units tell."""
         return all(check.met for check in self.checks)
 
-    def yield_of(self, requirement: Requirement) -> Yield:
-        """Return the share of units that keep the limits of a requirement; one without an answer keeps none."""
+    def yield_of(self, requirement: Requirement, sign: int | None = None) -> Yield:
+        """Return the share of units that keep the limits of a requirement, or one; one without an answer keeps none."""
+        limits = requirement.limits.side(sign) if sign else requirement.limits
         outputs = self.independent.outputs if self.independent else self.outputs
-        outside = np.logical_not(requirement.limits.kept_by(requirement.read(outputs)))
+        outside = np.logical_not(limits.kept_by(requirement.read(outputs)))
         if self.independent:
             found = self.independent.units.yield_of(outside)
         else:
             found = proportion(outside.size, int(np.count_nonzero(outside)))
-        return found.doubted(self.doubts.get(requirement.output), requirement.limits)
+        return found.doubted(self.doubts.get(requirement.output), limits)
 
     @property
     def constraints(self) -> tuple[OneSidedConstraint, ...]:
@@ -136,7 +144,7 @@ class VerifiedDesign:
     @property
     def quantile_bound(self) -> float:
         """What of the leading output is compared with its limit: at a yield, the smallest limit that is kept."""
-        return self.checks[0].constraints[0].value
+        return self.checks[0].constraints[0].own
 
     def shown_at(self, target: float) -> float:
         """Return the smallest upper limit of the leading output that the units show kept at another yield.
@@ -298,9 +306,8 @@ def _by_zone(sample: DesignSample, quantile: float) -> Float[np.ndarray, " sourc
         return None
     exact, values = sample.exact[leading].evaluation, sample.samples[0].values
     known = exact.values[exact.good, 0]
-    standard = (known - known.mean()) / known.std()
-    spread = (min(quantile, float(values.max())) - values.mean()) / values.std()
-    return np.asarray((1.0 + spread * standard) @ sample.by_zone(leading) / known.size)
+    weights = spread_weights(values, known, min(quantile, float(values.max())))
+    return np.asarray(weights @ sample.by_zone(leading) / known.size)
 
 
 def cheapest_met(tried: tuple[VerifiedDesign, ...]) -> VerifiedDesign:

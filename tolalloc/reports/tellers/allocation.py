@@ -107,7 +107,7 @@ class AllocationTeller(Teller[AllocationResult]):
             ),
             Section(
                 heading=_say("heading_shares", output=leading),
-                tables=(("shares", sobol_table(result.shares)),),
+                tables=(("shares", sobol_table(result.shares)),) if result.shares else (),
                 folded=True,
             ),
             self._requirements.behind_heading,
@@ -118,7 +118,7 @@ class AllocationTeller(Teller[AllocationResult]):
                 heading=_say("heading_work"),
                 paragraphs=(f"{', '.join(counts)}.",),
                 tables=(
-                    ("verified designs", tables.verified_table(result).frame(unit)),
+                    ("tried designs", tables.tried_table(result).frame(unit)),
                     ("tolerances", tolerances_frame(result, unit)),
                     ("work", tables.work_frame(self.header)),
                 ),

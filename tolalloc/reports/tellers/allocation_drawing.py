@@ -152,7 +152,8 @@ def _zones(members: Iterable[Source], unit: str) -> float | str:
 
 def _parts(result: AllocationResult) -> dict[str, float]:
     """Return the total index of every dimension, correlated ones under each of their names [%]."""
-    found = result.shares_of_dimensions
+    if (found := result.shares_of_dimensions) is None:
+        return {}
     return {
         name: float(total) * 100.0
         for joined, total in zip(found.sources, found.total, strict=True)
@@ -174,8 +175,11 @@ def _by_source(result: AllocationResult, derivatives: Float[np.ndarray, " source
 
 def _shares(result: AllocationResult) -> dict[str, float]:
     """Return the share of every source in the sum of the total indices [%]."""
-    total = result.shares.total / result.shares.total.sum() * 100
-    return {name: float(share) for name, share in zip(result.shares.sources, total, strict=True)}
+    if (found := result.shares) is None:
+        return {}
+    return {
+        name: float(share) for name, share in zip(found.sources, found.total / found.total.sum() * 100, strict=True)
+    }
 
 
 def tolerances_frame(result: AllocationResult, cost_unit: str = COST_UNITS) -> pd.DataFrame:

@@ -117,7 +117,7 @@ def _verdict(result: AllocationResult) -> str:
         said = {}
     return _say(
         key,
-        verdict=_say(_verdict_key(result)),
+        verdict=_verdict_word(result, check.requirement.guarantee, achieved),
         share=achieved.estimate,
         units=achieved.units,
         simulated=portrait_of(result.model).simulated,
@@ -128,10 +128,15 @@ def _verdict(result: AllocationResult) -> str:
     )
 
 
-def _verdict_key(result: AllocationResult) -> str:
+def _verdict_word(result: AllocationResult, guarantee: Guarantee, achieved: Yield) -> str:
+    """Return whether the limits are kept; of units of which too few keep them, what shows it nevertheless."""
     if not result.met:
-        return "verdict_missed"
-    return "verdict_met_quick" if result.error >= _EVEN_ODDS else "verdict_met"
+        return _say("verdict_missed")
+    is_quick = result.error >= _EVEN_ODDS
+    if not isinstance(guarantee, AtYield) or achieved.estimate >= guarantee.target:
+        return _say("verdict_met_quick" if is_quick else "verdict_met")
+    has_laws = len(result.chosen.laws) == len(result.yields)
+    return _say("verdict_open" if is_quick and not has_laws else "verdict_known", target=guarantee.target)
 
 
 def zones_changed(result: AllocationResult) -> tuple[str, ...]:
@@ -529,7 +534,8 @@ def quantiles(result: AllocationResult) -> tuple[str, ...]:
     """Return how much safer than asked the drawing is, since its units are few."""
     chosen, said = result.chosen, []
     for check in chosen.checks:
-        kept, side, asked = unit_quantile(chosen, check), check.constraints[0], check.requirement
+        side, asked = check.constraints[0], check.requirement
+        kept = unit_quantile(chosen, check, side) if asked.limits.width is None else np.nan
         if isinstance(asked.guarantee, AtYield) and np.isfinite(kept) and np.isfinite(side.value):
             key = "quantile_upper" if side.sign > 0 else "quantile_lower"
             gaps = {

@@ -40,7 +40,7 @@ def requirements_table(result: AllocationResult) -> Table[_Limited]:
 
     def kept(label: str, design: VerifiedDesign) -> Column[_Limited]:
         header = f"kept: {label} [{unit}]"
-        return Column(header=header, value=lambda row: design.limited_sides[row[0]][1].value)
+        return Column(header=header, value=lambda row: design.limited_sides[row[0]][1].own)
 
     unit = " or ".join(dict.fromkeys(unit_of(own.output) for own in result.requirements))
     columns: list[Column[_Limited]] = [
@@ -49,15 +49,18 @@ def requirements_table(result: AllocationResult) -> Table[_Limited]:
         Column(header="shown for", value=lambda row: row[2].requirement.guarantee.words),
         Column(
             header=f"quantile of the units [{unit}]",
-            value=lambda row: unit_quantile(result.chosen, row[2]),
+            value=lambda row: unit_quantile(result.chosen, row[2], row[1]),
         ),
-        Column(header="units within [%]", value=lambda row: 100 * result.chosen.yield_of(row[2].requirement).estimate),
+        Column(
+            header="units within [%]",
+            value=lambda row: 100 * result.chosen.yield_of(row[2].requirement, row[1].sign).estimate,
+        ),
         *(kept(label, design) for label, design in designs(result).items()),
-        Column(header=f"slack [{unit}]", value=lambda row: -row[1].excess),
+        Column(header=f"slack [{unit}]", value=lambda row: row[1].slack),
         Column(header=f"standard error of it [{unit}]", value=lambda row: row[1].standard_error),
         Column(header="marginal price of the limit [{cost}]", value=lambda row: price(row)[0]),
         Column(header="for each", value=lambda row: price(row)[1]),
-        Column(header="OK", value=lambda row: "yes" if row[1].excess <= 0 else "no"),
+        Column(header="OK", value=lambda row: "yes" if row[1].slack >= 0 else "no"),
     ]
     rows = [(number, side, check) for number, (check, side) in enumerate(result.chosen.limited_sides)]
     return Table(name="requirements", columns=columns, rows=rows)
@@ -99,7 +102,7 @@ def today_table(result: AllocationResult, cost_unit: str) -> Table[_Compared]:
         asked = own.requirement
         if isinstance(asked, JointRequirement):
             continue
-        price, share = result.free.prices.get(drawn.stack.name, 0.0), after.yield_of(asked).estimate
+        price, share = result.free.prices.get(drawn.stack.name, 0.0), after.yield_of(asked, drawn.sign).estimate
         # Of limits that are kept at once, one that no unit misses leaves all that may be missed to the others.
         uses = price * drawn.scale > _BINDS * after.cost and not (after.jointly and share == 1.0)
         rows.append(
@@ -107,15 +110,16 @@ def today_table(result: AllocationResult, cost_unit: str) -> Table[_Compared]:
                 name=f"{portrait.display_name(asked.output)} [{unit_of(asked.output)}]",
                 shown="" if after.jointly else asked.guarantee.words,
                 limit=f"{'≤' if drawn.sign > 0 else '≥'} {drawn.limit:.4g}",
-                before=side.value,
-                after=drawn.value,
-                kept_before=100 * before.yield_of(check.requirement).estimate,
+                before=side.own,
+                after=drawn.own,
+                kept_before=100 * before.yield_of(check.requirement, side.sign).estimate,
                 kept_after=100 * share,
                 binds="yes" if uses else "",
             )
         )
-    if len(result.requirements) > 1:
-        asked_of_all = after.checks[-1].requirement.guarantee if after.jointly else None
+    if len(after.alone) > 1:
+        together = after.jointly or len(after.checks) == 1
+        asked_of_all = after.checks[-1].requirement.guarantee if together else None
         rows.append(
             _Compared(
                 name="all limits at once",
@@ -168,8 +172,8 @@ def designs_table(result: AllocationResult) -> Table[_Named]:
     return Table(name="designs", columns=columns, rows=list(designs(result).items()))
 
 
-def verified_table(result: AllocationResult) -> Table[_Named]:
-    """Return all designs that were judged on units of their own, in order, each with the search that found it."""
+def tried_table(result: AllocationResult) -> Table[_Named]:
+    """Return all designs that were tried, in order, each with the search that found it and the units that judged it."""
     tried = {label: search.tried for label, search in searches(result).items()}
     if result.graded:
         tried[GRADES] = result.graded.tried
@@ -181,10 +185,13 @@ def verified_table(result: AllocationResult) -> Table[_Named]:
         Column(header=kept, value=lambda row: row[1].quantile_bound),
         Column(header="yield [%]", value=lambda row: row[1].achieved.estimate * 100),
         Column(header="nearest limit", value=lambda row: row[1].blocking.requirement.output),
+        Column(
+            header="judged on", value=lambda row: "independent sample" if row[1].independent else "units of its search"
+        ),
         Column(header="met", value=lambda row: "yes" if row[1].met else "no"),
     ]
     rows = [(search, design) for search, designs in tried.items() for design in designs]
-    return Table(name="verified designs", columns=columns, rows=rows)
+    return Table(name="tried designs", columns=columns, rows=rows)
 
 
 def work_frame(header: Header) -> pd.DataFrame:

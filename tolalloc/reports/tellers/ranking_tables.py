@@ -85,7 +85,7 @@ def ranking_table(result: RankingResult) -> pd.DataFrame:
     place = {local.sources[at]: rank for rank, at in enumerate(largest_first(local.per_micrometre), start=1)}
     columns = {
         f"zone [{zone}]": {source.name: zone_in(source, zone) for source in result.errors.active},
-        f"Sens [{unit}/µm]": dict(zip(local.sources, local.at_nominal, strict=True)),
+        f"Sens [{unit}/µm]": dict(zip(local.sources, local.slope, strict=True)),
         f"rms change per µm [{unit}/µm]": dict(zip(local.sources, local.per_micrometre, strict=True)),
         "rank per µm [-]": place,
         f"rms change by its zone [{unit}]": dict(zip(local.sources, local.by_zone, strict=True)),
@@ -133,7 +133,7 @@ def dimensions_table(result: RankingResult, found: SobolIndices) -> pd.DataFrame
             "low 5 % [%]": low,
             "high 95 % [%]": high,
             "alone (first-order index) [%]": np.maximum(found.first, 0.0) * 100,
-            f"Sens [{unit}/µm]": lambda at: span(*own.at_nominal) if (own := lines[at]) else np.nan,
+            f"Sens [{unit}/µm]": lambda at: span(*own.slope) if (own := lines[at]) else np.nan,
             f"rms change per µm in every place [{unit}/µm]": per_micrometre,
             "rank per µm [-]": lambda at: place.get(at, np.nan),
             f"rms change by its zone [{unit}]": [own.by_zone if own else np.nan for own in lines],
@@ -412,8 +412,8 @@ def measures_table(result: RankingResult) -> pd.DataFrame:
         "delta [-]": (moments.sources, moments.delta),
         "delta low 5 % [-]": (moments.sources, distance[0]),
         "delta high 95 % [-]": (moments.sources, distance[1]),
-        f"Sens at nominal [{unit}/µm]": (local.sources, local.at_nominal),
-        f"Sens, root mean square [{unit}/µm]": (local.sources, local.root_mean_square),
+        f"Sens [{unit}/µm]": (local.sources, local.slope),
+        f"length of the gradient, root mean square [{unit}/µm]": (local.sources, local.root_mean_square),
         f"alone at its limit [{unit}]": (result.classical.sources, result.classical.alone),
     }
     if result.errors.compensators:  # a choice makes the output jump, and the inequality of the bound needs none

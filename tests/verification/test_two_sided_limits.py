@@ -1,0 +1,256 @@
+"""Limits on two sides: together they decide, and each is told its own quantile, share of units, slack and price."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.stats import norm
+
+import tolalloc as ta
+from tolalloc.allocation.result import unit_quantile
+from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier
+from tolalloc.capability.monte_carlo import proportion
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.reports.tellers.allocation_sentences import headline
+from tolalloc.reports.tellers.allocation_tables import requirements_table, today_table, tried_table
+from tolalloc.study.prepared import Prepared
+
+TARGET = 0.9973
+SHARE = 1 - TARGET
+GAP = "gap [mm]"
+ROW = {"unit": "mm", "min": 0.01, "max": 0.4, "cost": 1}
+STACK = [
+    {"id": "housing", "nominal": 50, "plus": 0.1, "minus": -0.1, **ROW},
+    {"id": "bearing", "nominal": 15, "plus": 0, "minus": -0.12, **ROW},
+    {"id": "spacer", "nominal": 33, "plus": 0.1, "minus": -0.1, **ROW},
+    {"id": "ring", "nominal": 1.5, "plus": 0.05, "minus": -0.05, **ROW},
+]
+MEAN = 50 - 15 + 0.06 - 33 - 1.5  # the bearing lies in the middle of +0/−0.12
+DEVIATION = np.sqrt(0.1**2 + 0.06**2 + 0.1**2 + 0.05**2) / 3
+
+
+def gap(housing, bearing, spacer, ring):
+    return housing - bearing - spacer - ring
+
+
+def study(function=gap, rows=STACK, outputs=(GAP,), limits=None, **changed) -> ta.Study:
+    """Return a study of own sizes, normal ones inside ±3σ unless their rows say otherwise."""
+    inputs = tuple(row["id"] for row in rows)
+    return ta.Study(
+        ta.model(function, inputs=inputs, outputs=outputs),
+        ta.Drawing.of_rows(rows),
+        limits=limits or {GAP: ta.Limit(lower=0.3, upper=0.7)},
+        **{"questions": [ta.Allocation(front=False, what_if=False)], "name": "two sides", **changed},
+    )
+
+
+def as_drawn(made: ta.Study, units: int = 2**18, confidence: float = 0.5) -> VerifiedDesign:
+    """Return the drawing as it is, with what units say of it."""
+    own = Prepared(study=made)
+    verifier = Verifier(
+        space=own.space,
+        model=own.model,
+        requirements=own.requirements,
+        seeds=SeedTree(1),
+        units=units,
+        confidence=confidence,
+    )
+    return verifier.verify(own.space.uniform(1.0), "table")
+
+
+def told(design: VerifiedDesign) -> dict[str, dict[int, float]]:
+    """Return output → side → what is told beside the limit, which the units' own quantile is too."""
+    found: dict[str, dict[int, float]] = {}
+    for check, side in design.limited_sides:
+        found.setdefault(check.requirement.output, {})[side.sign] = side.own
+        spread = np.ptp(np.quantile(design.outputs[check.requirement.output], [0.001, 0.999]))
+        assert unit_quantile(design, check, side) == pytest.approx(side.own, abs=0.02 * spread)
+        assert side.slack == pytest.approx(side.sign * (side.limit - side.own))
+    return found
+
+
+def joint_excess(distribution, lower: float, upper: float) -> float:
+    """Return how far just 0.27 % of a distribution lie beyond one of two limits, by its own root."""
+    return brentq(lambda by: distribution.sf(upper + by) + distribution.cdf(lower - by) - SHARE, -upper, upper)
+
+
+def test_the_side_that_nearly_no_unit_reaches_is_told_its_own_quantile():
+    """0.135 % of the units lie below 0.398 mm; 0.2901 is the mirror of what the upper side reaches."""
+    distribution = norm(MEAN, DEVIATION)
+    design = as_drawn(study())
+    found = told(design)[GAP]
+    assert found[-1] == pytest.approx(distribution.ppf(SHARE / 2), abs=1e-4)
+    assert found[-1] == pytest.approx(0.398, abs=5e-4)
+    assert found[1] == pytest.approx(0.7 + joint_excess(distribution, 0.3, 0.7), abs=1e-4)
+    [check] = design.checks
+    assert not check.met, "both sides together decide, as one of them misses its limit"
+    assert check.slack == pytest.approx(0.7 - found[1])
+
+
+def test_each_side_has_the_share_of_units_that_keep_it():
+    design = as_drawn(study())
+    [check] = design.checks
+    beyond = norm.sf(0.7, MEAN, DEVIATION)
+    assert design.yield_of(check.requirement, 1).estimate == pytest.approx(1 - beyond, abs=4e-4)
+    assert design.yield_of(check.requirement, -1).estimate == pytest.approx(1.0, abs=1e-5)
+    assert design.yield_of(check.requirement).estimate == pytest.approx(1 - beyond, abs=4e-4)
+
+
+def test_turned_over_the_sides_change_places():
+    turned = study(lambda *sizes: -gap(*sizes), limits={GAP: ta.Limit(lower=-0.7, upper=-0.3)})
+    assert told(as_drawn(turned))[GAP][1] == pytest.approx(-norm.ppf(SHARE / 2, MEAN, DEVIATION), abs=1e-4)
+
+
+def test_limits_about_the_mean_leave_half_of_the_failures_to_each():
+    found = told(as_drawn(study(limits={GAP: ta.Limit(lower=MEAN - 0.2, upper=MEAN + 0.2)})))[GAP]
+    for sign in (1, -1):
+        assert found[sign] == pytest.approx(MEAN - sign * norm.ppf(SHARE / 2) * DEVIATION, abs=1e-4)
+
+
+def test_the_side_with_more_than_half_of_the_failures_decides_and_the_other_has_half():
+    """Beyond the upper limit lie some three times as many as beyond the lower one."""
+    distribution, lower, upper = norm(MEAN, DEVIATION), MEAN - 0.17, MEAN + 0.15
+    found = told(as_drawn(study(limits={GAP: ta.Limit(lower=lower, upper=upper)})))[GAP]
+    assert found[1] == pytest.approx(upper + joint_excess(distribution, lower, upper), abs=1e-4)
+    assert found[-1] == pytest.approx(distribution.ppf(SHARE / 2), abs=1e-4)
+
+
+@pytest.mark.parametrize(("limits", "sign"), [(ta.Limit(lower=0.4), -1), (ta.Limit(upper=0.7), 1)])
+def test_one_side_alone_has_all_failures(limits, sign):
+    found = told(as_drawn(study(limits={GAP: limits})))[GAP]
+    assert found == {sign: pytest.approx(MEAN - sign * norm.ppf(SHARE) * DEVIATION, abs=1e-4)}
+
+
+def test_a_uniform_size_beside_its_nominal():
+    """+0.3/−0.1 in one size: 0.27 % and 0.135 % of a width of 0.4."""
+    rows = [{"id": "ring", "nominal": 1.0, "plus": 0.3, "minus": -0.1, "distribution": "uniform", **ROW}]
+    made = study(lambda ring: 1.0 * ring, rows, limits={GAP: ta.Limit(lower=0.5, upper=1.2)})
+    found = told(as_drawn(made))[GAP]
+    assert found[1] == pytest.approx(1.3 - 0.4 * SHARE, abs=2e-4)
+    assert found[-1] == pytest.approx(0.9 + 0.4 * SHARE / 2, abs=2e-4)
+
+
+def test_a_skewed_output_of_no_law():
+    """y = exp(x), x ± 0.9: σ = 0.3, lognormal quantiles; units tell them."""
+    rows = [{"id": "x", "nominal": 1.0, "plus": 0.9, "minus": -0.9, **ROW, "max": 2.0}]
+    made = study(lambda x: np.exp(x - 1.0), rows, limits={GAP: ta.Limit(lower=0.2, upper=2.1)})
+    design = as_drawn(made)
+    found = told(design)[GAP]
+    assert found[1] == pytest.approx(np.exp(-0.3 * norm.ppf(SHARE)), rel=0.01)
+    assert found[-1] == pytest.approx(np.exp(0.3 * norm.ppf(SHARE / 2)), rel=0.01)
+    # Turned, the lower side is what misses.
+    turned = study(lambda x: 3 - np.exp(x - 1.0), rows, limits={GAP: ta.Limit(lower=0.9, upper=2.8)})
+    found = told(as_drawn(turned))[GAP]
+    assert found[-1] == pytest.approx(3 - np.exp(-0.3 * norm.ppf(SHARE)), rel=0.01)
+    assert found[1] == pytest.approx(3 - np.exp(0.3 * norm.ppf(SHARE / 2)), rel=0.01)
+
+
+def test_of_two_outputs_each_side_is_told_its_own():
+    outputs = (GAP, "reach [mm]")
+    limits = {GAP: ta.Limit(lower=0.3, upper=0.7), "reach [mm]": ta.Limit(lower=50.0 - 0.1, upper=51.0)}
+    made = study(lambda a, b, c, d: (a - b - c - d, 1.0 * a), STACK, outputs, limits)
+    found = told(as_drawn(made))
+    assert found[GAP][-1] == pytest.approx(norm.ppf(SHARE / 2, MEAN, DEVIATION), abs=1e-4)
+    assert found["reach [mm]"][1] == pytest.approx(norm.ppf(1 - SHARE / 2, 50.0, 0.1 / 3), abs=1e-4)
+    assert found["reach [mm]"][-1] == pytest.approx(norm.ppf(SHARE, 50.0, 0.1 / 3), abs=1e-4)
+
+
+def test_an_index_is_that_of_each_side():
+    """Mean ± 3·1.33·σ, whatever the other limit is."""
+    limit = ta.Limit(lower=0.3, upper=0.7, show=ta.AtCpk(1.33))
+    [check] = as_drawn(study(limits={GAP: limit})).checks
+    for side in check.constraints:
+        assert side.own == side.value == pytest.approx(MEAN + side.sign * 3 * 1.33 * DEVIATION, abs=2e-3)
+        # No other limit's units: the slope by a common scale of all zones is 3·1.33·σ.
+        scale = side.stack.zone_slopes(np.ones(4)) @ np.ones(4)
+        assert scale == pytest.approx(3 * 1.33 * DEVIATION, rel=0.02)
+
+
+@pytest.fixture(scope="module")
+def answer() -> ta.Answer:
+    return study(effort="quick").allocate()
+
+
+@pytest.mark.slow
+def test_the_first_page_tells_each_side(answer):
+    rows = {row.limit: row for row in today_table(answer.result, "cost units").rows if row.limit}
+    upper, lower = rows["≤ 0.7"], rows["≥ 0.3"]
+    assert lower.before == pytest.approx(0.398, abs=1e-3)
+    assert 0.4 < lower.after < 0.42, "the zones of the gap became smaller"
+    assert (upper.binds, lower.binds) == ("yes", "")
+    assert lower.kept_before == lower.kept_after == 100
+    assert upper.kept_before < 99.73
+    assert rows["≥ 99.73 %"].kept_before == upper.kept_before
+    table = requirements_table(answer.result).frame().set_index("limit")
+    low, high = table.loc["at least 0.3 mm"], table.loc["at most 0.7 mm"]
+    assert low["slack [mm]"] == pytest.approx(low["kept: tolerances [mm]"] - 0.3)
+    assert low["quantile of the units [mm]"] == pytest.approx(low["kept: tolerances [mm]"], abs=0.01)
+    price = "marginal price of the limit [cost units]"
+    assert low[price] < 1e-3
+    assert high[price] > 0.2
+
+
+@pytest.mark.slow
+def test_the_price_of_a_limit_is_what_moving_that_limit_alone_costs():
+    def found(lower: float, upper: float):
+        limits = {GAP: ta.Limit(lower=lower, upper=upper)}
+        return study(limits=limits, effort="quick").allocate().result
+
+    lower, upper, step = MEAN - 0.16, MEAN + 0.15, 0.004
+    prices = found(lower, upper).free.prices
+    for name, moves in (("lower", (step, 0.0)), ("upper", (0.0, step))):
+        tight, wide = (found(lower + by * moves[0], upper - by * moves[1]).cost for by in (1, -1))
+        [price] = [own for side, own in prices.items() if name in side]
+        assert price == pytest.approx((tight - wide) / (2 * step), rel=0.15)
+
+
+def told_first(answer: ta.Answer, rejected: int, *, error: float, law: bool, accepted: bool = True) -> str:
+    """Return the first sentence of an answer of which so many of 10,000 units miss a limit."""
+    result, chosen = answer.result, answer.result.chosen
+    checks = chosen.checks
+    if not law:
+        [check] = checks
+        checks = (replace(check, constraints=tuple(replace(own, law=None) for own in check.constraints)),)
+    changed = replace(chosen, achieved=proportion(10_000, rejected), checks=checks, accepted=accepted)
+    free = replace(result.free, chosen=changed, tried=(changed,))
+    return headline(replace(result, error=error, free=free), "cost units")[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("rejected", "error", "law", "begins"),
+    [
+        (26, 0.05, True, "Met: 99.74 %"),
+        (27, 0.05, True, "Met: 99.73 %"),
+        (28, 0.05, True, "99.73 % kept, by the laws of the outputs beside the units: 99.72 %"),
+        (28, 0.05, False, "99.73 % kept, by the laws of the outputs beside the units: 99.72 %"),
+        (26, 0.5, False, "Met, by a quick run: 99.74 %"),
+        (28, 0.5, False, "Not decided by a quick run: 99.72 %"),
+        (28, 0.5, True, "99.73 % kept, by the laws of the outputs beside the units: 99.72 %"),
+    ],
+)
+def test_met_is_not_the_first_word_where_fewer_units_than_required_keep_the_limits(
+    answer, rejected, error, law, begins
+):
+    sentence = told_first(answer, rejected, error=error, law=law)
+    assert sentence.startswith(begins)
+    assert sentence.endswith("and lies inside this interval." if rejected > 27 else "99.73 % was required.")
+
+
+@pytest.mark.slow
+def test_what_is_not_accepted_is_not_met(answer):
+    assert told_first(answer, 20, error=0.05, law=True, accepted=False).startswith("NOT met: ")
+
+
+@pytest.mark.slow
+def test_every_design_tried_says_which_units_judged_it(answer):
+    """A design that its search alone judged is not called verified by one page and not verified by another."""
+    table = tried_table(answer.result).frame()
+    last = table.iloc[-1]
+    assert last["judged on"] == "independent sample"
+    assert last["cost [cost units]"] == answer.result.cost
+    of_search = table[table["judged on"] == "units of its search"]
+    assert len(of_search) == len(table) - 1 > 0
