@@ -214,8 +214,8 @@ def build(quick: bool, progress: Progress) -> Document:
                 f"{flank_angle(STAGE) / DEGREE:.1f}°, where the gap formula closes; the formula reads "
                 f"{clearance.formula.min() / MICROMETRE:.1f} µm at worst. Asked to keep it from going negative, the "
                 f"best amounts are {allowed.amounts[0] / MILLIMETRE:.5f} and {allowed.amounts[1] / MILLIMETRE:.5f} mm "
-                f"({allowed.objective / MILLIMETRE:.6f} mm), backlash "
-                f"{without.clearance.backlash / ARCMINUTE:.1f} arcmin.",
+                f"({allowed.objective / MILLIMETRE:.6f} mm), free rotation of the disc "
+                f"{without.clearance.free_rotation / ARCMINUTE:.1f} arcmin.",
             ),
             figures=(replace(clearance_figure(without), name="clearance_without_interference"),),
         ),

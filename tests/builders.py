@@ -41,6 +41,9 @@ from tolalloc.reports.document import Section
 from tolalloc.reports.wording import Spoken, number
 from tolalloc.study.prepared import Prepared
 
+LINEAR_STAGE = Path(__file__).with_name("cd29_linear.reducer.toml")
+"""A single stage of linear contact with wide holes, which closed forms hold for."""
+
 
 def prepared(
     *,

@@ -31,7 +31,7 @@ def test_rv40e_with_15_micrometres():
 
 def test_rv40e_backlash_and_place_of_first_contact():
     clearance = clearance_of(ToothProfile(stage=RV40E, modification=closed_form(RV40E, J)), exact=False)
-    assert clearance.backlash / ARCMINUTE == pytest.approx(3.220, abs=5.1e-4)
+    assert clearance.free_rotation / ARCMINUTE == pytest.approx(3.220, abs=5.1e-4)
     assert clearance.radial == pytest.approx(J, rel=1e-12)
     assert clearance.first_contact == pytest.approx(flank_angle(RV40E), abs=0.01)
     assert clearance.formula_error < 1e-12

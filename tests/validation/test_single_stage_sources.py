@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.builders import LINEAR_STAGE
 from tolalloc.reading.units import ARCMINUTE, DEGREE
 from tolalloc.reducers.cycloid.loaded_contact import peak_pressure
 from tolalloc.reducers.equivalent.hysteresis import hysteresis_loop
@@ -37,7 +38,7 @@ HOLE_FORCE = 2 * TORQUE * np.cos(2 * np.pi / 8) / (np.pi * 0.040)
 
 def with_stage(**stage: float) -> Reducer:
     """Return the preset's drive with another stage, bearings and output pins that do not yield, and exact teeth."""
-    drive = load_reducer("cd29")
+    drive = load_reducer(LINEAR_STAGE)
     stiff = dict.fromkeys(("shaft_support", "eccentric_bearing", "carrier_bearing"), RIGID)
     return replace(
         drive,
@@ -107,13 +108,13 @@ def test_the_largest_stress_is_below_the_printed_form_which_takes_the_sharpest_l
 
 
 def test_readings_of_a_printed_drive_are_what_one_micrometre_on_the_flank_leaves():
-    """0.25′ in the mean, a step of its dial; the preset of the same stage has 2.66′ with 5 µm on flank and in holes.
+    """0.25′ in the mean, a step of its dial; the stage with 5 µm on flank and in holes has 2.66′.
 
     One micrometre all round is 0.24′, so readings under friction without a torque are no measure of clearance.
     """
     landed = -1e-2 * np.array([[5, 6, 6, 5, 5, 5, 5, 6, 6, 6], [4, 5, 4, 4, 4, 4, 4, 5, 5, 5]])  # mm on 150 mm
     measured = np.abs(np.diff(landed, axis=0)).mean() / 150 / ARCMINUTE
-    drive = load_reducer("cd29")
+    drive = load_reducer(LINEAR_STAGE)
     stage = drive.cycloid_stage
     assert (stage.pin_count, stage.pin_circle_radius, stage.pin_radius, stage.eccentricity) == (30, 0.04, 0.0025, 0.001)
     exact = with_stage()

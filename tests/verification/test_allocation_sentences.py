@@ -338,3 +338,24 @@ def test_amounts_that_are_not_those_of_today_are_said_with_the_zones_on_the_firs
     assert answer_of(results).sentences.index(sentence) < 4, "the first page has four sentences of the answer"
     (first, *_) = section(results, "dimensions").paragraphs
     assert says(first, "allocation.convention", convention=results.model.drawn_amounts.convention)
+
+
+@pytest.mark.parametrize(("middle", "names"), [(0.0, ()), (-3e-6, ("pin.diameter",))])
+def test_a_grade_off_the_nominal_size_is_said_to_be_no_letter(results, middle, names):
+    """Zones climb grades about the middle of the table: 0/−6 becomes −1.75/−4.25, which is IT3 wide but no h3."""
+    graded = on_grades(results, middle)
+    drawn = {own.dimension for own in graded.drawn_sources if own.grade and own.middle}
+    assert drawn == set(names)
+    sentences = answer_of(graded).sentences
+    assert says(sentences, "allocation.graded_letters") == bool(names)
+    assert all(any(name in own and "no letter" in own.replace("\n", " ") for own in sentences) for name in names)
+
+
+def on_grades(results: AllocationResult, middle: float) -> AllocationResult:
+    """Return the answer on grades, with the pins' zone about another middle [m]."""
+    sources = (
+        replace(own, middle=middle) if own.name == "pin.diameter" else own for own in results.space.errors.sources
+    )
+    space = replace(results.space, errors=replace(results.space.errors, sources=tuple(sources)))
+    graded = replace(results.free, chosen=results.graded.chosen)
+    return replace(results, space=space, free=graded)

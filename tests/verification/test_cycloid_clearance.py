@@ -229,7 +229,7 @@ def test_backlash_of_turned_flanks_alone():
     """Every pin of a flank touches when the disc has turned by δ, but for those without lever at root and tip."""
     stage, turned = load_reducer("rv40e_xi2015").cycloid_stage, 1e-4
     profile = ToothProfile(stage=stage, modification=Modification(equidistant=0.0, shift=0.0, rotation=turned))
-    assert clearance_of(profile, exact=False).backlash == pytest.approx(2 * turned, rel=1e-9)
+    assert clearance_of(profile, exact=False).free_rotation == pytest.approx(2 * turned, rel=1e-9)
 
 
 @pytest.mark.parametrize("exact", [False, True])
@@ -238,7 +238,7 @@ def test_backlash_of_turned_flanks_with_clearance_at_the_root(exact):
     stage = load_reducer("rv40e_xi2015").cycloid_stage
     amounts = Modification(equidistant=10e-6, shift=0.0, rotation=200e-6 / stage.disc_pitch_radius)
     found = clearance_of(ToothProfile(stage=stage, modification=amounts), exact=exact)
-    assert found.backlash * stage.disc_pitch_radius == pytest.approx(420e-6, abs=0.1e-6)
+    assert found.free_rotation * stage.disc_pitch_radius == pytest.approx(420e-6, abs=0.1e-6)
     around = np.concatenate([[found.first_contact], found.pin_angle])
     if exact:
         after = searched_between(stage, amounts, around, found.rotation)
@@ -282,7 +282,7 @@ def test_first_contact_of_the_linear_clearance(seed):
         found = clearance_of(ToothProfile(stage=stage, modification=amounts), exact=False)
         closing = k1 * np.sqrt(equidistant**2 - shift**2) / lever if elsewhere else (equidistant - shift * q) / lever
         assert found.rotation == pytest.approx(closing, rel=1e-9)
-        assert found.backlash == pytest.approx(2 * closing, rel=1e-9)
+        assert found.free_rotation == pytest.approx(2 * closing, rel=1e-9)
         assert found.radial == equidistant - shift
         assert found.exact is False
         cosine = shift / equidistant if elsewhere else q
@@ -349,7 +349,7 @@ def test_rv40e_by_formula_and_exactly():
     profile = ToothProfile(stage=stage, modification=reducer.modification)
     found, linear = clearance_of(profile, exact=True), clearance_of(profile)
     assert not linear.exact
-    assert linear.backlash == pytest.approx(2 * (-2e-6 + 8e-6 * np.sqrt(1 - 0.8125**2)) / (1.3e-3 * 39), rel=1e-12)
+    assert linear.free_rotation == pytest.approx(2 * (-2e-6 + 8e-6 * np.sqrt(1 - 0.8125**2)) / (1.3e-3 * 39), rel=1e-12)
     assert linear.first_contact == pytest.approx(np.arccos(0.8125), abs=1e-6)
     # Closed at φ0, as the formula does, the exact distances differ from it by this much.
     fine = np.radians(np.arange(0, 180.05, 0.1))
@@ -383,5 +383,5 @@ def test_modifications_above_50_um_are_large(amount, sign):
 def test_a_profile_without_modification_has_no_clearance():
     for exact in (False, True):
         found = clearance_of(ToothProfile(stage=SONG2019), exact=exact)
-        assert found.rotation == found.backlash == found.radial == 0.0
+        assert found.rotation == found.free_rotation == found.radial == 0.0
         assert np.abs(found.after).max() < 1e-15

@@ -101,7 +101,7 @@ def test_clearance_and_contact_take_a_free_profile_like_the_amounts(reducer):
     free = replace(reducer, modification=NONE, form=Form(designed=sampled(reducer, AMOUNTS)))
     given = assess(replace(reducer, modification=AMOUNTS), -167.0, phases=6)
     found = assess(free, -167.0, phases=6)
-    assert found.clearance.backlash == pytest.approx(given.clearance.backlash, rel=1e-4)
+    assert found.clearance.free_rotation == pytest.approx(given.clearance.free_rotation, rel=1e-4)
     assert found.clearance.radial == pytest.approx(AMOUNTS.radial_clearance, abs=1e-12)
     assert found.together.force.max() == pytest.approx(given.together.force.max(), rel=1e-4)
     assert found.profile.flank_clearance == pytest.approx(given.profile.flank_clearance, abs=1e-10)

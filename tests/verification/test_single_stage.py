@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import root
 
-from tests.builders import reducer_file, refusal, unit_with
+from tests.builders import LINEAR_STAGE, reducer_file, refusal, unit_with
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.cycloid.tooth_profile import normals
@@ -22,7 +22,7 @@ RIGID = 1e11
 
 @pytest.fixture(scope="module")
 def drive() -> Reducer:
-    return load_reducer("cd29")
+    return load_reducer(LINEAR_STAGE)
 
 
 @pytest.fixture(scope="module")
@@ -245,8 +245,8 @@ def test_what_every_source_adds_sums_to_the_curve(model):
 @pytest.mark.parametrize(
     ("line", "wrong", "says"),
     [
-        ("hole_radius_mm = 5.005", "hole_radius_mm = 4.9", "hole_radius_mm is 4.9; allowed is pin_radius_mm plus"),
-        ("hole_radius_mm = 5.005", "hole_radius_mm = 6", "hole_radius_mm is 6; allowed is pin_radius_mm plus"),
+        ("hole_radius_mm = 5.0005", "hole_radius_mm = 4.9", "hole_radius_mm is 4.9; allowed is pin_radius_mm plus"),
+        ("hole_radius_mm = 5.0005", "hole_radius_mm = 6", "hole_radius_mm is 6; allowed is pin_radius_mm plus"),
         ("count = 8", "count = 16", "where holes meet each other or the teeth"),
         ("count = 8", "count = 2", "count"),
         ("shaft_support = 5e7", "sun_support = 5e7", "sun_support"),

@@ -228,13 +228,12 @@ def note(sentence: str, *, dim: bool = False) -> None:
     typer.secho(_broken(sentence, sys.stderr), dim=dim or None, err=True)
 
 
-def announce_compilation(room: str = "equivalent") -> None:
-    """Say what the next minute is spent on where a room of this version has not run on this machine before."""
+def announce_compilation() -> None:
+    """Say what the next minute is spent on where the kernel of this version has not run on this machine before."""
     from tolalloc.running.compiled import is_kept
 
-    module, lasts = {"equivalent": ("turn", "some twenty seconds"), "cycloid": ("pins", "some seconds")}[room]
-    if not is_kept(module):
-        note(f"Compiling the kernel for this machine: {lasts}, once.", dim=True)
+    if not is_kept("turn"):
+        note("Compiling the kernel for this machine: some twenty seconds, once.", dim=True)
 
 
 def announce_kernel(model: object) -> None:

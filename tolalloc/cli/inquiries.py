@@ -26,8 +26,8 @@ def inquiry_command(name: str) -> Callable[..., None]:
         asked.apart_from(out)
         require_usable(out)
         prepared = asked.prepare()
-        if room := asked.room(prepared):
-            announce_compilation(room)
+        if asked.room(prepared):
+            announce_compilation()
         with shown_progress(inquiry.counted) as progress:
             progress.begin(inquiry.word)
             answer = asked.solve(prepared, progress)

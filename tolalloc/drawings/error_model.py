@@ -219,13 +219,13 @@ class ErrorModel:
         """
         if not any(own.arranges for own in self.compensators):
             return standard
-        return np.asarray((self._arranged(standard, zones) - self._middle) / np.repeat(zones, self._counts))
+        return np.asarray((self._arranged(standard, zones) - self.middles) / np.repeat(zones, self._counts))
 
     def _arranged(
         self, standard: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]
     ) -> Float[np.ndarray, "sample column"]:
         """Return the columns that the standard values give before sizes are chosen [m, rad]."""
-        found = np.asarray(standard * np.repeat(zones, self._counts) + self._middle)
+        found = np.asarray(standard * np.repeat(zones, self._counts) + self.middles)
         of_sources = {own.name: float(zone) for own, zone in zip(self.active, zones, strict=False)}
         for own in self.compensators:
             own.arranged(found, of_sources, self._known)
@@ -236,7 +236,7 @@ class ErrorModel:
         return [len(source.columns) for source in self._varying]
 
     @property
-    def _middle(self) -> Float[np.ndarray, " column"]:
+    def middles(self) -> Float[np.ndarray, " column"]:
         """Where the columns stand without what is random [m, rad]."""
         return np.concatenate(
             [*(source.middles for source in self.active), *(np.zeros(len(source.columns)) for source in self.joint), []]

@@ -234,6 +234,7 @@ class ReducerChoice:
         turned, flank, radial = ((own[0] * MICROMETRE, own[1] * MICROMETRE) if own else None for own in self._ranges)
         return ReducerModel(
             kernel=kernel.at_disc_temperature(self.disc_temperature),
+            middles=tuple(errors.middles.tolist()),
             load_cases=self.load_cases,
             flank=flank,
             radial=radial,

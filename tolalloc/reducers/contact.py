@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from tolalloc.reducers.cycloid.loaded_contact import Assessment, assess, pin_moment
+from tolalloc.reducers.equivalent.hysteresis import HysteresisLoop
 from tolalloc.reducers.equivalent.outputs import Solved, load_share, peak_line_load, unit_pressure
-from tolalloc.reducers.equivalent.perfect import perfect_reducer
+from tolalloc.reducers.equivalent.perfect import exact_loop, perfect_reducer
 from tolalloc.reducers.reducer.design import Reducer
 
 
@@ -31,6 +33,12 @@ class ContactResult:
     torque: float  # Torque on the carrier; negative resists the rotation [N·m]
     # The same reducer, its bearings yielding, as `te` and `run` solve it; none where distances must be exact
     yielding: YieldingContact | None
+    reducer: Reducer  # The reducer with its own contact law
+
+    @cached_property
+    def loop(self) -> HysteresisLoop:
+        """Torque against twist of the whole reducer, its gaps linear whatever the modification."""
+        return exact_loop(self.reducer)
 
 
 def contact_of(
@@ -69,7 +77,7 @@ def contact_of(
     """
     found = assess(reducer, torque, law=law, exact=exact, phases=phases)
     yielding = None if found.clearance.exact else _yielding(perfect_reducer(found.reducer, torque))
-    return ContactResult(assessment=found, torque=torque, yielding=yielding)
+    return ContactResult(assessment=found, torque=torque, yielding=yielding, reducer=reducer)
 
 
 def _yielding(solved: Solved) -> YieldingContact:

@@ -18,8 +18,9 @@ from tolalloc.models.unit_bounds import ScaledUnits
 from tolalloc.reading.units import MICROMETRE, MILLIMETRE
 from tolalloc.reducers import DISC_TEMPERATURE, FRICTION_TORQUE, PEAK_TO_PEAK, PRELOAD, RADIAL_CLEARANCE, TORQUE
 from tolalloc.reducers.cycloid.solvers import LINEAR
-from tolalloc.reducers.equivalent.hysteresis import HysteresisLoop
-from tolalloc.reducers.equivalent.perfect import exact_loop, preload, rated_pin_force
+from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
+from tolalloc.reducers.equivalent.interfaces import pin_terms
+from tolalloc.reducers.equivalent.perfect import preload, rated_pin_force
 from tolalloc.reducers.equivalent.wear import wear_of
 from tolalloc.reducers.families.known import family_of
 from tolalloc.reducers.load_case import Combined, LoadCase, at, combined_outputs
@@ -83,6 +84,7 @@ class ReducerModel(Model):
     clearances: tuple[float, ...] | None = None
     unit: BuiltUnit | None = None  # Built unit whose curve is shown beside others, if any
     left_out: tuple[str, ...] = ()  # What binding the drawing to the reducer assumed
+    middles: tuple[float, ...] = ()  # Where the kernel's columns stand in mean parts, 0 unless given [m, angles rad]
     mismatches: tuple[str, ...] = ()  # Where sizes of the drawing are not those of the reducer, in sentences
 
     @property
@@ -92,8 +94,19 @@ class ReducerModel(Model):
 
     @property
     def reducer_in_force(self) -> Reducer:
-        """The same with the modification that leaves the clearances in force, and as warm discs shift it."""
-        return self._chosen.with_warmer_discs(self.kernel.disc_temperature)
+        """The same with a modification that leaves on nominal pins in nominal grooves the gaps of the mean unit.
+
+        It holds the clearances in force, what warm discs shift, and pins or grooves of a fit.
+        """
+        errors = dict(zip(self.kernel.model.columns, self.mean_unit[0].tolist(), strict=True))
+        pins = np.zeros(3 * self.reducer.cycloid_stage.pin_count)
+        for name, terms in pin_terms(self.reducer, self.kernel.model.orders).items():
+            for entry, share in terms:
+                pins[entry] += share * errors[name]
+        first, *_ = all_pins = pins.reshape(3, -1).T
+        radial, _, radius = (first + (all_pins - first).mean(axis=0)).tolist()  # equal ones keep every bit
+        amounts = Modification(equidistant=-radius, shift=-radial, rotation=errors["modification.rotation"])
+        return replace(self.reducer, modification=amounts)
 
     @property
     def _chosen(self) -> Reducer:
@@ -329,8 +342,13 @@ class ReducerModel(Model):
 
     @cached_property
     def exact_loop_in_force(self) -> HysteresisLoop:
-        """Torque against twist of the unit whose parts are exact and whose teeth have the modification in force."""
-        return exact_loop(self.reducer_in_force)
+        """Torque against twist of the unit of mean parts whose teeth have the modification in force."""
+        return hysteresis_loop(self.kernel.model, self.mean_unit, TURN_ANGLES)
+
+    @property
+    def mean_unit(self) -> Float[np.ndarray, "1 all_columns"]:
+        """Errors of the unit whose parts lie in the middle of their zones [m, angles rad]."""
+        return self.kernel.errors(np.array([self.middles or np.zeros(len(self.columns))]))
 
     @property
     def drawn_amounts(self) -> DrawnAmounts:

@@ -15,7 +15,6 @@ from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.contact import ContactResult, contact_of
 from tolalloc.reducers.cycloid.clearance import LARGE, formula_gap
 from tolalloc.reducers.cycloid.tooth_profile import Amounts, ToothProfile, nearest_angles, path_of
-from tolalloc.reducers.equivalent.perfect import exact_loop
 from tolalloc.reducers.reducer.design import CycloidStage, Modification, Reducer
 
 _ROUNDING = 1e-17  # violation that counts as none [m]
@@ -470,7 +469,6 @@ class ModificationResult:
     problem: ModificationProblem  # What was minimised, and what had to be kept
     best: Optimum  # The sure optimum
     contact: ContactResult  # What it does on the reducer
-    lost_motion: float | None  # Of exact parts with these amounts; none without a catalogue to compare with [rad]
 
     @property
     def allowed_lost_motion(self) -> float:
@@ -480,9 +478,7 @@ class ModificationResult:
     @property
     def exceeds_catalogue(self) -> bool:
         """Whether exact parts with these amounts have more play than the catalogue allows."""
-        if self.lost_motion is None:
-            return False
-        return max(self.lost_motion, self.contact.assessment.clearance.backlash) > self.allowed_lost_motion
+        return bool(self.contact.loop.lost_motion[0] > self.allowed_lost_motion)
 
     @property
     def delivered_flank(self) -> float:
@@ -558,7 +554,6 @@ def choose(request: ModificationRequest, reducer: Reducer, torque: float) -> Mod
         problem=problem,
         best=best,
         contact=contact_of(modified, torque),
-        lost_motion=float(exact_loop(modified).lost_motion[-1]) if modified.catalogue else None,
     )
     if found.off > _MOST_OFF:
         amounts = " and ".join(f"{amount / MICROMETRE:.4g}" for amount in best.amounts)

@@ -82,6 +82,7 @@ def check(study: Study | str | Path, *, timed: bool = False, script: str = "") -
             notes=prepared.notes,
             examined=model.examined(prepared.random_units(_CHECKED)),
             times=_times(prepared) if timed else (),
+            missed=prepared.missed,
             kept=prepared.kept_limits(_JUDGED) if timed else None,
         )
     return Answer(kind="check", header=header, result=result)

@@ -85,7 +85,7 @@ class Inquiry(NamedFields, ABC, Generic[Prepared]):
     """Its command and the function of ``ta``."""
     counted: ClassVar[str] = "units"
     """What its progress counts."""
-    kernel: ClassVar[Literal["", "equivalent", "cycloid"]] = ""
+    kernel: ClassVar[Literal["", "equivalent"]] = ""
     """Compiled room that it solves with, announced where it has not run on a machine; empty for none."""
     written: ClassVar[tuple[str, ...]] = ()
     """Fields that name files which it writes, for which the reducer must be named."""

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from jaxtyping import Float
@@ -26,6 +27,7 @@ from tolalloc.models.identity import UnknownIdentityError
 from tolalloc.models.model import HasCopies, Model
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
+from tolalloc.reports.tellers.check import missed_sentence
 from tolalloc.running.chunks import Mapper
 from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.effort import RankingEffort
@@ -34,6 +36,10 @@ from tolalloc.study.problem import COMMON, Limit, Problem
 _ASSEMBLED = "Units are judged as they are assembled, by an allocation with its own choice, else with {label}."
 _SHARED = "Rows without a group are one line where identical parts have the same zone, limits and price: {lines}."
 """What is said of the lines that `Prepared.errors` made, with the number of rows of each."""
+
+
+_TRIED = 5
+"""Values over the range of each setting at which parts in the middle of their zones are tried [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -243,6 +249,25 @@ class Prepared:
         except UnknownIdentityError as reason:
             return f"whether the model of {self.place} is the same as before is not known: {reason}"
         return ""
+
+    @cached_property
+    def missed(self) -> tuple[str, ...]:
+        """On stated limits that parts in the middle of their zones miss in force and at a grid over the settings."""
+        settings, said = {own.name: own for own in self.model.settings}, []
+        ranges = ({*np.linspace(own.lower, own.upper, _TRIED).tolist()} for own in settings.values())
+        tried = [tuple(own.value for own in settings.values()), *product(*ranges)]
+        for output, limit in ((own.output, own.limits) for own in self.requirements if own.output in self.study.limits):
+            best = (-np.inf, np.nan, tried[0])
+            for values in tried:
+                model = self.model.at(np.array(values)) if values else self.model
+                value = float(model.reading((output,))(self.errors.middles[np.newaxis]).values[0, 0])
+                best = max(best, (np.nan_to_num(limit.distance(value), nan=-np.inf), value, values))
+                if best[0] >= 0.0:
+                    break
+            if -np.inf < best[0] < 0.0:
+                _, end = max(limit.turned, key=lambda own: own[0] * (best[1] - own[1]))
+                said.append(missed_sentence(output, best[1], end, dict(zip(settings, best[2], strict=True))))
+        return tuple(said)
 
     def random_units(self, units: int) -> Float[np.ndarray, "unit column"]:
         """Return the deviations of random units at the zones of the drawing [m, angles rad]."""

@@ -250,8 +250,8 @@ def run(
         if progress:
             progress.begin("report")
         document = _document(prepared, answers)
-        if fault:
-            document = replace(document, warnings=(str(fault), *document.warnings))
+        missed = prepared.missed if any("limits" in own.reads for own in asked) else ()
+        document = replace(document, warnings=(*([str(fault)] if fault else []), *missed, *document.warnings))
         if study.model is not None:
             prepared.model.release()  # drawing the figures takes as much memory
         for answer in answers.values():
@@ -286,6 +286,8 @@ def _answers(
 def _tell_today(prepared: Prepared, progress: Progress) -> None:
     """Say how the drawing stands as it is, some seconds after the start; what is asked takes minutes."""
     progress.begin("the drawing as it is", _JUDGED)
+    for sentence in prepared.missed:
+        progress.tell(sentence)
     kept = prepared.kept_limits(_JUDGED)
     progress.advance(kept.joint.units)
     progress.tell(today_sentence(kept))

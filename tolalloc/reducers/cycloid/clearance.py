@@ -192,8 +192,8 @@ class Clearance:
     exact: bool  # Whether the distances are exact
 
     @property
-    def backlash(self) -> float:
-        """Free rotation from one side to the other [rad]."""
+    def free_rotation(self) -> float:
+        """Of the disc on its pins alone, from one side to the other [rad]."""
         return 2 * self.rotation
 
     @property
@@ -235,7 +235,7 @@ def clearance_of(profile: ToothProfile, exact: bool | None = None) -> Clearance:
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> design = load_reducer("rv40e_xi2015")
     >>> found = clearance_of(ToothProfile(stage=design.cycloid_stage, modification=design.modification))
-    >>> round(1e6 * found.radial, 3), round(float(np.degrees(found.backlash)) * 60, 4)  # [µm, arcmin]
+    >>> round(1e6 * found.radial, 3), round(float(np.degrees(found.free_rotation)) * 60, 4)  # [µm, arcmin]
     (6.0, 0.3612)
     """
     from scipy.optimize import brentq

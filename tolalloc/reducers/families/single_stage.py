@@ -123,7 +123,7 @@ def output_pins(at: Positions) -> SpringGroup:
     >>> design = load_reducer("cd29")
     >>> group = output_pins(Positions(design, np.zeros(1)))
     >>> round(1e6 * (group.clearance - group.constants["output.offset"]), 6)  # gap towards the wall [µm]
-    5.0
+    0.5
     """
     reducer, coordinates, angles = at.reducer, at.coordinates, at.carrier_angle.size
     pins, discs, carrier = reducer.holes, reducer.disc_count, coordinates.carrier
@@ -269,7 +269,7 @@ SINGLE_STAGE = ReducerFamily(
         discs=(1, 2, 3),
         table="cd29_drawing",
         diameter=80.0,
-        lost_motion=3.0,
+        lost_motion=2.0,
         samples=("costs", "processes", "cmm", "bench", "curve", "cycle", "lot"),
         priced=("disc?.hole.position", "shaft.journal?.eccentricity", "pin.diameter"),
         schema="single-stage",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -277,7 +277,8 @@ def twist_table(reducer: Reducer) -> pd.DataFrame:
 def _examination(portrait: ReducerPortrait, figures: Mapping[str, float]) -> Examination:
     """Return what is said of the nominal clearances, of the counted random units and of the catalogue."""
     model, count, solved = portrait.model, int(figures["units [-]"]), int(figures["units in equilibrium [-]"])
-    stage, (*_, flank, radial) = model.reducer.cycloid_stage, model.present_clearances
+    _, *mean = model.reducer_in_force.modification.clearances(model.reducer.cycloid_stage)
+    loop, (flank, radial) = model.exact_loop_in_force, (own / MICROMETRE for own in mean)
     if not solved:
         none = f"None of {count:,} simulated reducers has an equilibrium without torque."
         but = f"none of its units has an equilibrium: {_advice(model)}"
@@ -289,8 +290,9 @@ def _examination(portrait: ReducerPortrait, figures: Mapping[str, float]) -> Exa
     half, least = figures["median pin force without torque [N]"], figures["least radial clearance [µm]"]
     sentences = (
         *model.mismatches,
-        f"Nominal clearance {number(flank, '.3g')} µm on the flank and {number(radial, '.3g')} µm at tip and root, "
-        f"which leave {number(2 * flank * MICROMETRE / stage.disc_pitch_radius / ARCMINUTE, '.2g')}′ of free rotation.",
+        f"Parts in the middle of their zones have {number(flank, '.3g')} µm of clearance on the flank and "
+        f"{number(radial, '.3g')} µm at tip and root; the whole reducer has "
+        f"{loop.backlash[0] / ARCMINUTE:.2f}′ of backlash and {loop.lost_motion[0] / ARCMINUTE:.2f}′ of lost motion.",
         f"Of {count:,} simulated reducers {number(figures['share preloaded [-]'], '.1%')} are preloaded"
         f"{unsolved}: without torque their pins press with more than "
         f"the {model.rated_pin_force:,.0f} N of the rated torque; half of all press with "
@@ -487,15 +489,16 @@ def _contact_table(model: ReducerModel, units: Units) -> pd.DataFrame:
 
     columns: dict[str, dict[str, float]] = {}
     for label, (settings, _) in units.items():
-        amounts = model.modification(settings)
+        amounts, own = model.modification(settings), model.at(settings)
+        mean, stage = own.reducer_in_force.modification, model.reducer.cycloid_stage
         columns[label] = {
             "equidistant Δr_rp [µm]": amounts.equidistant / MICROMETRE,
             "shift Δr_p [µm]": amounts.shift / MICROMETRE,
             **({"rotation δ [µrad]": amounts.rotation / MICRORADIAN} if amounts.rotation else {}),
-            "flank clearance, smallest nominal gap [µm]": amounts.flank_clearance(model.reducer.cycloid_stage)
-            / MICROMETRE,
-            "radial clearance at tip and root [µm]": amounts.radial_clearance / MICROMETRE,
-            **_carried(replace(model.reducer, modification=amounts)),
+            "flank clearance of mean parts [µm]": mean.flank_clearance(stage) / MICROMETRE,
+            "radial clearance of mean parts at tip and root [µm]": mean.radial_clearance / MICROMETRE,
+            "backlash of mean parts at the output [arcmin]": own.exact_loop_in_force.backlash[0] / ARCMINUTE,
+            **_carried(own.reducer_in_force),
         }
     shown = {label: f"{label.removeprefix('median unit ')} [unit of the amount]" for label in columns}
     frame = pd.DataFrame(columns).rename(columns=shown)
@@ -503,7 +506,6 @@ def _contact_table(model: ReducerModel, units: Units) -> pd.DataFrame:
 
 
 _CARRIED = (
-    "backlash of teeth and pins [arcmin]",
     "fewest pins in contact on a disc at rated torque [-]",
     "largest pin force at rated torque [N]",
     "peak pressure at rated torque [MPa]",
@@ -516,8 +518,7 @@ def _carried(reducer: Reducer) -> dict[str, float]:
     with suppress(InputError):
         found = contact_of(reducer, torque, law=reducer.stiffness.pin_contact_law)
         if own := found.yielding:
-            backlash = found.assessment.clearance.backlash / ARCMINUTE
-            values = [backlash, own.pins_in_contact[0], own.largest_force, own.pressure / MEGAPASCAL]
+            values = [own.pins_in_contact[0], own.largest_force, own.pressure / MEGAPASCAL]
     return dict(zip(_CARRIED, values, strict=True))
 
 

@@ -381,9 +381,12 @@ def _graded(result: AllocationResult) -> tuple[str, ...]:
         return ()
     compared = _say("graded_compared", against=_against(graded.chosen.cost, free.cost)) if free.met else ""
     said = _say("graded", cost=graded.chosen.cost, compared=compared)
+    pairs = zip(result.space.errors.sources, result.drawn_sources, strict=True)
+    off = dict.fromkeys(new.dimension for old, new in pairs if new.grade and new.middle and new.zone != old.zone)
+    letters = (_say("graded_letters", names=enumerated(off)),) if off else ()
     if not graded.chosen.met:
-        return (_say("graded_missed", graded=said),)
-    return (_say("graded_bound", graded=said, bound=graded.bound),)
+        return (_say("graded_missed", graded=said), *letters)
+    return (_say("graded_bound", graded=said, bound=graded.bound), *letters)
 
 
 def _modification(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:

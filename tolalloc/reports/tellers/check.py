@@ -20,7 +20,7 @@ from tolalloc.reports.finished_run import told_yields
 from tolalloc.reports.portrait import Examination, Portrait, portrait_of
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.templates import Sentences
-from tolalloc.reports.wording import short
+from tolalloc.reports.wording import short, with_unit
 
 _say = Sentences("check")
 
@@ -49,6 +49,7 @@ class Checked:
     notes: tuple[str, ...] = ()  # What the drawing says beside its rows
     examined: Mapping[str, float] = field(default_factory=dict)  # Counted of some random units, units in the names
     times: tuple[CheckedTime, ...] = ()  # How long the questions take; none unless asked for
+    missed: tuple[str, ...] = ()  # On limits that no settings let parts in the middle of their zones keep
     kept: KeptLimits | None = None  # Shares of some random units that keep the limits; none where none were solved
 
 
@@ -62,8 +63,9 @@ class CheckTeller(Teller[Checked]):
         if self.result.model is None:
             return _say("in_order_asks", study=self.header.name, kinds=kinds)
         doubted = _say("doubted_row" if self._doubted == 1 else "doubted_rows", count=self._doubted)
-        but = "; ".join(own for own in (doubted if self._doubted else "", self._examination.but) if own)
-        state = _say("can_be_run" if self._examination.fault else "in_order")
+        missed = _say("missed_limits") if self.result.missed else ""
+        but = "; ".join(own for own in (doubted if self._doubted else "", missed, self._examination.but) if own)
+        state = _say("can_be_run" if self._examination.fault or missed else "in_order")
         return _say("verdict_but" if but else "verdict", study=self.header.name, state=state, but=but)
 
     @cached_property
@@ -74,7 +76,7 @@ class CheckTeller(Teller[Checked]):
             lines = [*self._read, *_zones(result.errors.active)]
             lines += [f"  {own}" for own in result.errors.correlation.mappings(result.errors.sources)]
             lines += [f"  {setting.sentence}" for setting in result.model.settings]
-            lines += [*self._costs, *self._neglected, *result.notes, *self._examination.sentences]
+            lines += [*self._costs, *self._neglected, *result.notes, *self._examination.sentences, *result.missed]
             lines += [today_sentence(result.kept)] if result.kept else []
             quick = _say("quick")
             lines += [f"{f'{quick} ' if own.effort == 'quick' else ''}{own.sentence}" for own in result.times]
@@ -166,6 +168,13 @@ class CheckTeller(Teller[Checked]):
     @cached_property
     def _doubted(self) -> int:
         return len(doubts(self.result.errors.sources, self.result.errors.table))
+
+
+def missed_sentence(output: str, value: float, limit: float, settings: Mapping[str, float]) -> str:
+    """Return how near parts in the middle of their zones come to a limit that they miss [unit of the output]."""
+    at = ", ".join(f"{name} = {own:.3g}" for name, own in settings.items())
+    reached, end = (with_unit(f"{own:.4g}", output) for own in (value, limit))
+    return _say("missed", output=short(output), limit=end, value=reached, settings=f" ({at})" if at else "")
 
 
 def today_sentence(kept: KeptLimits) -> str:

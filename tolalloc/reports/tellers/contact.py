@@ -59,7 +59,8 @@ class ContactTeller(Teller[ContactResult]):
         said = [
             _say(
                 "clearance",
-                backlash=clearance.backlash / ARCMINUTE,
+                **self.play,
+                free=clearance.free_rotation / ARCMINUTE,
                 radial=clearance.radial / MICROMETRE,
                 first_contact=clearance.first_contact / DEGREE,
             ),
@@ -79,6 +80,12 @@ class ContactTeller(Teller[ContactResult]):
             torque, force = self.result.torque, yielding.largest_force
             said.insert(1, _say("yielding", torque=torque, law=law, pins=carry, force=force, pressure=pressure))
         return tuple(said)
+
+    @property
+    def play(self) -> dict[str, float]:
+        """Backlash and lost motion of the whole reducer at its output [arcmin]."""
+        loop = self.result.loop
+        return {"backlash": loop.backlash[0] / ARCMINUTE, "lost_motion": loop.lost_motion[0] / ARCMINUTE}
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -118,6 +125,7 @@ class ContactTeller(Teller[ContactResult]):
             "torque on the more loaded disc [N·m]": found.share * found.torque,
             "face width [mm]": found.reducer.cycloid_stage.face_width / MILLIMETRE,
             "phases [-]": int(found.single.phase.size),
+            **{f"{name.replace('_', ' ')} [arcmin]": value for name, value in self.play.items()},
             "profile": _profile_summary(found),
             "linear": _contact_summary(found.linear),
             "per tooth": _contact_summary(found.single),
@@ -228,9 +236,8 @@ def _profile_summary(found: Assessment) -> dict[str, float | str | None]:
         "radial clearance at tip and root [µm]": clearance.radial / MICROMETRE,
         "clearance on the flank [µm]": profile.flank_clearance / MICROMETRE,
         "first contact at [deg]": clearance.first_contact / DEGREE,
-        "free rotation to one side [arcmin]": clearance.rotation / ARCMINUTE,
-        "backlash [arcmin]": clearance.backlash / ARCMINUTE,
-        "backlash by exact distances [arcmin]": found.exact_clearance.backlash / ARCMINUTE,
+        "free rotation of a disc on its pins [arcmin]": clearance.free_rotation / ARCMINUTE,
+        "the same by exact distances [arcmin]": found.exact_clearance.free_rotation / ARCMINUTE,
         "largest clearance after the first contact [µm]": float(clearance.after.max()) / MICROMETRE,
         "formula off by at most [µm]": found.exact_clearance.formula_error / MICROMETRE,
         "distances": "exact" if clearance.exact else "linear formula",

@@ -73,11 +73,10 @@ class ModificationTeller(Teller[ModificationResult]):
         found = self.result
         if not self._wanted or found.exceeds_catalogue:
             return ()
-        backlash = found.contact.assessment.clearance.backlash / ARCMINUTE
-        if found.lost_motion is None:
-            return (_say("backlash", backlash=backlash),)
-        allowed, lost = found.allowed_lost_motion / ARCMINUTE, found.lost_motion / ARCMINUTE
-        return (_say("play", backlash=backlash, lost_motion=lost, model=self.header.model, allowed=allowed),)
+        if not found.reducer.catalogue:
+            return (_say("backlash", **self._contact.play),)
+        allowed = found.allowed_lost_motion / ARCMINUTE
+        return (_say("play", **self._contact.play, model=self.header.model, allowed=allowed),)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -85,16 +84,10 @@ class ModificationTeller(Teller[ModificationResult]):
         found, request, said = self.result, self.result.request, []
         if found.turns_far:
             said.append(_say("turns_far", rotation=request.rotation, play=request.rotation / ARCMINUTE))
-        if found.exceeds_catalogue and found.lost_motion is not None:
-            said.append(
-                _say(
-                    "wanted_exceeds_catalogue" if self._wanted else "exceeds_catalogue",
-                    backlash=found.contact.assessment.clearance.backlash / ARCMINUTE,
-                    lost_motion=found.lost_motion / ARCMINUTE,
-                    model=self.header.model,
-                    allowed=found.allowed_lost_motion / ARCMINUTE,
-                )
-            )
+        if found.exceeds_catalogue:
+            key = "wanted_exceeds_catalogue" if self._wanted else "exceeds_catalogue"
+            allowed = found.allowed_lost_motion / ARCMINUTE
+            said.append(_say(key, **self._contact.play, model=self.header.model, allowed=allowed))
         if found.off > _OFF:
             flank, radial = found.delivered_flank / MICROMETRE, found.delivered_radial / MICROMETRE
             said.append(_say("not_delivered", flank=flank, radial=radial, description=found.problem.description))
@@ -150,7 +143,6 @@ class ModificationTeller(Teller[ModificationResult]):
             "objective [µm]": best.objective / MICROMETRE,
             "status": best.status,
             "violation [µm]": best.violation / MICROMETRE,
-            "backlash [arcmin]": self.result.contact.assessment.clearance.backlash / ARCMINUTE,
             "contact": self._contact.summary,
             "warnings": list(self.warnings),
             "assumptions": list(self._unprinted),

@@ -30,7 +30,7 @@ class Contact(Inquiry["tuple[Reducer, float]"]):
     """Clearance, backlash, pins in contact, forces and pressure of exact parts."""
 
     word: ClassVar[str] = "contact"
-    kernel: ClassVar[Literal["", "equivalent", "cycloid"]] = "cycloid"
+    kernel: ClassVar[Literal["", "equivalent"]] = "equivalent"
     written: ClassVar[tuple[str, ...]] = ("profile",)
 
     reducer: ReducerName = None

@@ -22,7 +22,7 @@ class Diagnose(Inquiry["DiagnosisRequest"]):
     word: ClassVar[str] = "diagnose"
     by_position: ClassVar[int] = 1
     counted: ClassVar[str] = "curves"
-    kernel: ClassVar[Literal["", "equivalent", "cycloid"]] = "equivalent"
+    kernel: ClassVar[Literal["", "equivalent"]] = "equivalent"
 
     curve: Annotated[Path, Word("CSV: columns 'angle [deg]', 'transmission error [arcsec]'.")]
     reducer: ReducerName = None

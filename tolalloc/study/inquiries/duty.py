@@ -24,7 +24,7 @@ class Duty(Inquiry["tuple[Reducer, tuple[LoadCase, ...]]"]):
 
     word: ClassVar[str] = "duty"
     by_position: ClassVar[int] = 1
-    kernel: ClassVar[Literal["", "equivalent", "cycloid"]] = "equivalent"
+    kernel: ClassVar[Literal["", "equivalent"]] = "equivalent"
 
     cycle: Annotated[Path, Word("CSV: columns case, torque [N·m], speed [rpm], share [%].")]
     reducer: ReducerName = None

@@ -35,7 +35,7 @@ class Identify(Inquiry["tuple[Reducer, IdentificationRequest | None, Measurement
 
     word: ClassVar[str] = "identify"
     by_position: ClassVar[int] = 1
-    kernel: ClassVar[Literal["", "equivalent", "cycloid"]] = "equivalent"
+    kernel: ClassVar[Literal["", "equivalent"]] = "equivalent"
     written: ClassVar[tuple[str, ...]] = ("write_to",)
 
     data: Annotated[Path | None, Word("Measurement file (TOML): units and their readings; none with --catalogue.")] = (

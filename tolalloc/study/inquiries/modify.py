@@ -25,7 +25,7 @@ class Modify(Inquiry["tuple[ModificationRequest, Reducer, float]"]):
 
     word: ClassVar[str] = "modify"
     by_position: ClassVar[int] = 1
-    kernel: ClassVar[Literal["", "equivalent", "cycloid"]] = "cycloid"
+    kernel: ClassVar[Literal["", "equivalent"]] = "equivalent"
     written: ClassVar[tuple[str, ...]] = ("profile", "write_to")
 
     method: Annotated[

@@ -21,7 +21,7 @@ class Mount(Inquiry["MountingRequest"]):
 
     word: ClassVar[str] = "mount"
     by_position: ClassVar[int] = 1
-    kernel: ClassVar[Literal["", "equivalent", "cycloid"]] = "equivalent"
+    kernel: ClassVar[Literal["", "equivalent"]] = "equivalent"
 
     parts: Annotated[Path, Word("CSV: columns part, kind, error, value, unit (µm or arcsec).")]
     reducer: ReducerName = None

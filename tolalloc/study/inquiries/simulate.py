@@ -21,7 +21,7 @@ class Simulate(Inquiry["PreparedSimulation"]):
 
     word: ClassVar[str] = "simulate"
     counted: ClassVar[str] = "ms"
-    kernel: ClassVar[Literal["", "equivalent", "cycloid"]] = "equivalent"
+    kernel: ClassVar[Literal["", "equivalent"]] = "equivalent"
 
     reducer: ReducerName = None
     unit: UnitName = "exact"

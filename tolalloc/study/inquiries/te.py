@@ -21,7 +21,7 @@ class TransmissionError(Inquiry["tuple[Reducer, BuiltUnit, float]"]):
     """Transmission error of one built unit over one output turn."""
 
     word: ClassVar[str] = "te"
-    kernel: ClassVar[Literal["", "equivalent", "cycloid"]] = "equivalent"
+    kernel: ClassVar[Literal["", "equivalent"]] = "equivalent"
 
     reducer: ReducerName = None
     unit: UnitName = "exact"
