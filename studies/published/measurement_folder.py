@@ -13,7 +13,7 @@ from tolalloc.bench.measurements import Measurements
 from tolalloc.exceptions import InputError
 from tolalloc.reading.files import as_toml, require_new, write_new
 from tolalloc.reading.units import ARCSECOND, DEGREE
-from tolalloc.reducers.unit_file import write_table, write_units
+from tolalloc.reducers.unit_file import table_text, units_text
 
 
 def write_measurements(measurements: Measurements, folder: str | Path) -> Path:
@@ -57,9 +57,9 @@ def write_measurements(measurements: Measurements, folder: str | Path) -> Path:
     main = folder / "measurement.toml"
     for path in (main, folder / "units.csv", *(folder / table.file for table in tables)):
         require_new(path)  # all of them, before the first is written
-    write_units(measurements.units, folder / "units.csv")
+    write_new(folder / "units.csv", units_text(measurements.units, folder / "units.csv"))
     for table in tables:
-        write_table(folder / table.file, table.headers, table.rows, table.comments)
+        write_new(folder / table.file, table_text(table.headers, table.rows, table.comments))
     write_new(main, "\n".join(lines) + "\n")
     return main
 

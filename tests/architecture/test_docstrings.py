@@ -40,8 +40,6 @@ COMPUTES_NOTHING = {
     "reducers.unit_file.table_text": "reads",
     "reducers.unit_file.unit_names": "reads",
     "reducers.unit_file.units_text": "reads",
-    "reducers.unit_file.write_table": "reads",
-    "reducers.unit_file.write_units": "reads",
     "allocation.cost.points.currency_of_prices": "reads",
     "allocation.cost.points.load_shop_points": "reads",
     "allocation.cost.points.points_of": "reads",

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from studies.published.measurement_folder import write_measurements
+from tests.builders import written
 from tolalloc.bench.measurements import (
     MeasuredCurve,
     MeasuredLoop,
@@ -19,7 +20,7 @@ from tolalloc.bench.measurements import (
 from tolalloc.bench.readings import FULL, READINGS, RawReadings, clean_curve, clean_loop, resampled
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE
-from tolalloc.reducers.unit_file import BuiltUnit, load_units, write_units
+from tolalloc.reducers.unit_file import BuiltUnit, load_units, units_text
 
 TURN = 2 * np.pi
 ORDERS = (1, 2, 39, 78, 80)
@@ -332,19 +333,20 @@ def test_nothing_is_overwritten(tmp_path, generator):
     with pytest.raises(InputError, match=r"loop1\.csv: the file exists; name a new one, nothing is overwritten"):
         write_measurements(data, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["loop1.csv"]
-    write_units(data.units, tmp_path / "units.csv")
+    written(tmp_path / "units.csv", "mine")
+    (tmp_path / "loop1.csv").unlink()
     with pytest.raises(InputError, match=r"units\.csv: the file exists"):
-        write_units(data.units, tmp_path / "units.csv")
+        write_measurements(data, tmp_path)
 
 
 def test_units_of_a_table_meet_the_model(tmp_path, rv20e, table4):
     nominal = dict(zip(rv20e.columns, table4[0].tolist(), strict=True))
     units = tuple(BuiltUnit(name=name, source="table4", deviations=nominal) for name in ("1", "2"))
-    write_units(units, tmp_path / "units.csv")
+    written(tmp_path / "units.csv", units_text(units, tmp_path))
     for unit in load_units(tmp_path / "units.csv"):
         np.testing.assert_allclose(unit.errors(rv20e.columns), table4, rtol=1e-14)
     short = {column: value for column, value in nominal.items() if not column.startswith("sun.")}
-    write_units([BuiltUnit(name="1", source="table4", deviations=short)], tmp_path / "short.csv")
+    written(tmp_path / "short.csv", units_text([BuiltUnit(name="1", source="table4", deviations=short)], tmp_path))
     with pytest.raises(InputError, match="unit 1: sun"):
         load_units(tmp_path / "short.csv")[0].errors(rv20e.columns)
     assert load_units(tmp_path / "short.csv", neglected=("sun.*",))[0].errors(rv20e.columns).shape == table4.shape

@@ -96,9 +96,31 @@ def hidden(sheet) -> None:
     sheet.column_dimensions["F"].hidden = True
 
 
-def struck(sheet) -> None:
-    for cell in sheet[4]:
+def struck(sheet, *rows) -> None:
+    for cell in (cell for row in rows or (4,) for cell in sheet[row]):
         cell.font = Font(strike=True)
+
+
+def struck_rows(sheet) -> None:
+    struck(sheet, 3, 4)
+
+
+def struck_cell(sheet) -> None:
+    sheet["C3"].font = Font(strike=True)
+
+
+def struck_title(sheet) -> None:
+    sheet["A1"] = "Rev. A"
+    sheet["A1"].font = Font(strike=True)
+
+
+def struck_comment(sheet) -> None:
+    sheet.append(["# ring", None, 0.5])
+    struck(sheet, sheet.max_row)
+
+
+def struck_blanks(sheet) -> None:
+    sheet["Z3"].font = Font(strike=True)
 
 
 def merged_title(sheet) -> None:
@@ -294,7 +316,12 @@ FILES = [
     OfficeFile("formula without its value", book(cells(C2="=0.04/2")), suffix=".xlsx", refused="cell C2 is '=0.04/2'"),
     OfficeFile("error of a formula", book(cells(C2="#DIV/0!")), suffix=".xlsx", refused="#DIV/0!"),
     OfficeFile("hidden row and column", book(hidden), suffix=".xlsx", notes=("hidden rows", "hidden columns")),
-    OfficeFile("row that is struck out", book(struck), suffix=".xlsx", notes=("struck out .*: 4",)),
+    OfficeFile("row that is struck out", book(struck), suffix=".xlsx", refused="row 4 is struck out; delete"),
+    OfficeFile("one cell that is struck out", book(struck_cell), suffix=".xlsx", refused="row 3 is struck out; delete"),
+    OfficeFile("rows that are struck out", book(struck_rows), suffix=".xlsx", refused="rows 3, 4 are struck out"),
+    OfficeFile("title that is struck out", book(struck_title, top=2), suffix=".xlsx", notes=("left out",)),
+    OfficeFile("comment that is struck out", book(struck_comment), suffix=".xlsx"),
+    OfficeFile("empty cells that are struck out", book(struck_blanks), suffix=".xlsx"),
     OfficeFile(
         "number turned into a date",
         book(cells(C2=datetime.date(2026, 5, 1))),

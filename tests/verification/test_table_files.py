@@ -18,7 +18,17 @@ from tolalloc.exceptions import InputError, TolallocError
 
 ROWS = (
     {"id": "a", "nominal": 55.29, "plus": 0.1, "minus": -0.05, "min": 0.02, "max": 0.5, "cost": 3.25, "Cp": 1.1},
-    {"id": "b", "plus": 12.5, "minus": -12.5, "unit": "µm", "min": 2, "max": 50, "cost": 1200, "note": 'Ø 5"; "x", #2'},
+    {
+        "id": "b",
+        "places": "1x",
+        "plus": 12.5,
+        "minus": -12.5,
+        "unit": "µm",
+        "min": 2,
+        "max": 50,
+        "cost": 1200,
+        "note": 'Ø 5"; "x", #2',
+    },
     {"id": "c", "distribution": "mixture", "batches": "0.7:-0.3:0.8 0.3:0.5:0.6", "note": "one\nor two"},
     {"id": "d", "feature": "pitch", "minus": 0, "spectrum": "1:9.2 2:4.3", "locked": "yes"},
 )

@@ -124,17 +124,17 @@ def difference(
     """
     errors = space.errors
     wanted = named_zones(errors, zones)
-    changed = repriced(space, wanted)
+    present, changed = repriced(space, {}), repriced(space, wanted)
     outputs = tuple(dict.fromkeys(own.output for own in requirements))
-    drawings = [np.array([source.zone for source in own]) for own in (errors.active, changed)]
+    drawings = [np.array([source.zone for source in own]) for own in (present, changed)]
     with record.stage("difference", 2 * units):
         values = _solved(model.observed(record.observe).reading(outputs), errors, drawings, units, seeds)
-    pairs = [(old, new) for old, new in zip(errors.active, changed, strict=True) if old.name in wanted]
+    pairs = [(old, new) for old, new in zip(present, changed, strict=True) if old.name in wanted]
     return DifferenceResult(
         requirements=requirements,
         before=tuple(old for old, _ in pairs),
         after=tuple(new for _, new in pairs),
-        whole_cost=sum(own.cost for own in errors.active),
+        whole_cost=sum(own.cost for own in present),
         outputs=outputs,
         values=values,
         seeds=seeds.child("resamples"),

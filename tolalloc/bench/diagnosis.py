@@ -222,6 +222,7 @@ class DiagnosisRequest:
     angle_offset_deg: float = 0.0  # Added to every angle of the bench [deg]
     level: float = 0.97  # Probability that the named sources must have of containing the dominant one [-]
     seed: int = 1  # Seed of every random number [-]
+    neglected: tuple[str, ...] = ()  # Sources that the drawings may leave out, beside those that they may anyway
     repair: Repair | None = None  # What may be done with it, at which prices; None if nothing is to be decided
     effort: DiagnosisEffort = field(default_factory=DiagnosisEffort)  # How much may be computed
 
@@ -271,7 +272,7 @@ def diagnose_unit(request: DiagnosisRequest, record: RunRecord) -> DiagnosisResu
     SolveError
         Too many curves failed.
     """
-    kernel, assumed = bind(request.reducer, request.errors, request.torque_nm, PLACE)
+    kernel, assumed = bind(request.reducer, request.errors, request.torque_nm, PLACE, request.neglected)
     require_torque(request.curve, kernel.torque)
     cleaned = clean_curve(load_readings(request.curve, ANGLE, TRANSMISSION_ERROR), request.angle_offset_deg * DEGREE)
     kernel, errors = replace(kernel, observe=record.observe), request.errors

@@ -241,10 +241,26 @@ def prepare_lot(
     if next_parts is not None and not 2 <= next_parts <= MOST_NEXT:
         raise InputError.of_argument("lot", "next_parts", next_parts, f"2 to {MOST_NEXT}")
     require_seed("lot", seed)
+    drawing = drawing.with_sources(_measured_places(path, drawing.sources))
     columns = load_lot(path, drawing.sources)
     return LotRequest(
         path=path, drawing=drawing, columns=columns, level=level, next_parts=next_parts, seed=seed, curves=curves
     )
+
+
+def _measured_places(path: Path, sources: Sequence[Source]) -> list[Source]:
+    """Return a row for each place that a file has readings of, and those for several without these."""
+    heads = [split_header(header)[0] for header in _table(path).headers]
+    names = {name for head in heads for name in (head, head.rpartition(".")[0])} - {own.name for own in sources}
+    found = list[Source]()
+    for row in sources:
+        own = row.at_places(sorted(names))
+        if len(own) == row.places:
+            found += own
+        elif own:
+            found.append(replace(row, places=max(row.places - len(own), 0)))
+            found += (one.alone for one in own)
+    return found
 
 
 def load_lot(path: Path, sources: Sequence[Source]) -> tuple[GaugedColumn, ...]:

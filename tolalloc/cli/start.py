@@ -20,12 +20,12 @@ from tolalloc.bench.measurements import CurveRecord, LoopRecord, MeasurementReco
 from tolalloc.cli.samples import Samples
 from tolalloc.drawings.distributions import Distribution
 from tolalloc.drawings.drawing import load_drawing
-from tolalloc.drawings.fields import COLUMNS, HEADERS
+from tolalloc.drawings.fields import COLUMNS, headers_in
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_rows, table_text
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.reading.units import ARCSECOND, MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import ARCSECOND, COST_UNITS, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.sources import ErrorSource
@@ -308,12 +308,12 @@ def table_workbook(sources: Sequence[Source]) -> bytes:
 
     book, rows = Book(), table_rows(sources)
     sheet = book.sheet("tolerances")
-    for at, (name, column) in enumerate(COLUMNS.items(), start=1):
-        cells = [HEADERS[name], *(row[at - 1] for row in rows)]
+    for at, (name, head) in enumerate(headers_in(COST_UNITS, sources).items(), start=1):
+        cells = [head, *(row[at - 1] for row in rows)]
         for row, value in enumerate(cells, start=1):
             sheet.cell(row, at, value)
         sheet.cell(1, at, bold=True, bg_color="#DDE6F0")
-        sheet.inner.write_comment(0, at - 1, column.meaning, {"author": "tolalloc"})
+        sheet.inner.write_comment(0, at - 1, COLUMNS[name].meaning, {"author": "tolalloc"})
         sheet.width(at, min(max(len(str(value or "")) for value in cells), 40) + 3)
         if name in _CHOICES:
             allowed = {

@@ -151,18 +151,18 @@ class Drawing:
         InputError, UnknownNameError
             The file, row, field and value that are not allowed.
         """
-        path = found_from_here(table)
-        notes, currency = _read_beside(path, "", {})
-        sources, called = load_tolerance_table(path), heads_of(path).called
-        notes, changed = (*notes, *doubts(sources, path.name)), self.with_sources(sources, str(table))
-        changed = replace(changed, errors=replace(changed.errors, called=called))
-        settings = {**self.settings, **_settings_of(path)}
-        return replace(changed, notes=notes, currency=currency or self.currency, settings=settings)
+        read = load_drawing(found_from_here(table))
+        changed = self.with_sources(read.sources, str(table))
+        errors, settings = replace(changed.errors, called=read.errors.called), {**self.settings, **read.settings}
+        currency = read.currency or self.currency
+        return replace(changed, errors=errors, notes=read.notes, currency=currency, settings=settings)
 
     def with_sources(self, changed: Iterable[Source], name: str = "") -> Drawing:
         """Return the drawing with some of its sources changed, with the same correlations and process costs."""
-        known = {source.name: source for source in self.sources}
-        sources = tuple((known | {source.name: source for source in changed}).values())
+        others = {source.name: source for source in changed}
+        rows = {source.row for source in others.values()}  # whose places are among them
+        known = {source.name: source for source in self.sources if source.name not in rows}
+        sources = tuple((known | others).values())
         errors = replace(self.errors, sources=sources, table=name or self.name)
         return replace(self, name=name or self.name, errors=errors)
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,7 +13,7 @@ from tolalloc.drawings.compensators import Compensator, Standing, sorted_togethe
 from tolalloc.drawings.correlation import CorrelatedSource, Correlation
 from tolalloc.drawings.distributions import ABOVE_ZERO, BELOW_ONE, ndtr, ndtri
 from tolalloc.drawings.sources import Source
-from tolalloc.exceptions import InputError
+from tolalloc.exceptions import InputError, UnknownNameError
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,35 @@ class ErrorModel:
             for name in own.independent:
                 if name in correlated:
                     raise InputError.at(own.called, "source", name, "one that is correlated with no other")
+
+    def at_places(self, names: Sequence[str]) -> ErrorModel:
+        """Return the model with, of a row for several like places, each of these names without a row of its own.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            A row for no place, or for another number of them than it says.
+        """
+        found: dict[str, tuple[Source, ...]] = {own.name: (own,) for own in self.sources}
+        for row in (own for own in self.sources if own.is_of_places):
+            place = f"tolerance table {self.table} ({row.own_id or row.name})"
+            taken = {own.name for name, members in found.items() for own in members if name != row.name}
+            if not (like := row.at_places(names)):
+                raise UnknownNameError.among(place, "source", row.name, names)
+            left = [own for own in like if own.name not in taken]
+            if not left or row.places not in (0, len(left)):
+                which = ", ".join(own.name for own in left) or "none"
+                allowed = f"{len(left)}, as many as {row.name} means that have no other row: {which}"
+                raise InputError.at(place, "places", row.places or "not stated", allowed)
+            found[row.name] = tuple(replace(own, places=len(left)) for own in left)
+        pairs = tuple(
+            replace(pair, one=one.name, other=other.name)
+            for pair in self.correlation.pairs
+            for one in found[pair.one]
+            for other in found[pair.other]
+        )
+        sources = tuple(own for members in found.values() for own in members)
+        return replace(self, sources=sources, correlation=replace(self.correlation, pairs=pairs))
 
     @cached_property
     def active(self) -> tuple[Source, ...]:

@@ -18,7 +18,7 @@ from tolalloc.drawings.measured_parts import (
     load_measured_parts,
     named_file,
 )
-from tolalloc.drawings.sources import INCHES, LENGTHS, PERCENT, Source, is_angular
+from tolalloc.drawings.sources import INCHES, LENGTHS, PERCENT, Source, is_angular, like_places
 from tolalloc.drawings.zones import Feature, parsed_spectrum, parsed_systematic, spectrum_text, systematic_text
 from tolalloc.reading.files import Record
 from tolalloc.reading.units import COST_UNITS, MICROMETRE, usual_signs
@@ -360,12 +360,28 @@ class ToleranceRow(Record):
             write=lambda source: source.name if source.own_id else "",
         ),
     ] = ""
+    places: Annotated[
+        int,
+        Field(ge=0, le=1000),
+        Column(
+            "like places that the row stands for, `6` or `6x`, which may also stand before its name: `source` is then "
+            "a pattern such as `crank*.journal*.eccentricity`, or the name without its numbers; zone and cost are "
+            "those of each",
+            "-",
+            write=lambda source: source.places or None,
+        ),
+    ] = 0
     note: Annotated[str, Column("carried through", attribute="note")] = ""
 
     @property
     def name(self) -> str:
-        """Name of the source that the row is about."""
-        return self.source or self.id
+        """Name of the source that the row is about, or what it calls several."""
+        return like_places(self.source or self.id)[1]
+
+    @property
+    def _places(self) -> int:
+        """Like places that the row stands for, by what its name or, for a pattern, its id says too; 0 if nothing."""
+        return self.places or like_places(self.source or self.id)[0] or ("*" in self.source and like_places(self.id)[0])
 
     @property
     def length_unit(self) -> str:
@@ -386,6 +402,8 @@ class ToleranceRow(Record):
     def _unit_makes_sense(self) -> ToleranceRow:
         if self.unit == PERCENT and not self.nominal:
             raise ValueError("unit is %, which is of the nominal size; allowed is a nominal size other than 0")
+        if self.places and (named := like_places(self.source or self.id)[0]) not in (0, self.places):
+            raise ValueError(f"places is {self.places}, and the name of its source says {named}; allowed is one number")
         return self
 
     @model_validator(mode="after")
@@ -512,6 +530,7 @@ class ToleranceRow(Record):
             **stated | {"part": self.part or self.name},
             name=self.name,
             own_id=self.id if self.name != self.id else "",
+            places=self._places,
             zone=self.zone * factor,
             middle=middle,
             minimum=self.min * factor,
@@ -555,14 +574,16 @@ def headers_in(
     cost_unit
         What costs are in.
     sources
-        The rows: nominal sizes are in inches where all of them are, and state no unit where some are.
+        The rows: nominal sizes are in inches where all of them are, and state no unit where some are; like places are
+        counted where one does.
     called
         Head as the user's table writes it → field.
     """
     lengths = {own.length_name for own in sources} or {"mm"}
     said = {COST_UNITS: cost_unit, "mm": lengths.pop() if len(lengths) == 1 else ""}
     heads = {name: head for head, name in reversed(tuple(called.items()))}  # the first of several
-    units = {name: said.get(own.unit, own.unit) for name, own in COLUMNS.items()}
+    counted = not sources or any(own.places for own in sources)
+    units = {name: said.get(own.unit, own.unit) for name, own in COLUMNS.items() if counted or name != "places"}
     return {
         name: f"{heads.get(name, name)} [{unit}]" if unit else heads.get(name, name) for name, unit in units.items()
     }

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
+from itertools import groupby
 from math import degrees
 
 import numpy as np
@@ -103,9 +106,39 @@ def meant(pattern: str, sources: Iterable[Source]) -> list[str]:
 
 
 def known_as(sources: Iterable[Source]) -> list[str]:
-    """Return what a file may call the sources: their names, then the user's own ids."""
+    """Return what a file may call the sources: their names, then the user's own ids that mean one alone."""
     known = tuple(sources)
-    return [*(own.name for own in known), *(own.own_id for own in known if own.own_id)]
+    ids = Counter(own.own_id for own in known if own.own_id)
+    return [*(own.name for own in known), *(own_id for own_id, places in ids.items() if places == 1)]
+
+
+_TIMES = re.compile(r"(?:(\d+)[x×] +)?(.*?)(?: +\(?(\d+)[x×]\)?)?", re.DOTALL)
+
+
+def like_places(text: str) -> tuple[int, str]:
+    """Return for how many like places a name stands, 0 where it does not say, and the name alone.
+
+    >>> like_places("6× crank*.journal*.eccentricity"), like_places("pin (3x)"), like_places("shaft")
+    ((6, 'crank*.journal*.eccentricity'), (3, 'pin'), (0, 'shaft'))
+    """
+    before, name, after = _TIMES.fullmatch(text).groups()  # type: ignore[union-attr]  # it matches any text
+    return int(before or after or 0), name
+
+
+def by_row(sources: Iterable[Source]) -> list[tuple[Source, tuple[Source, ...]]]:
+    """Return what a table writes in every row and the sources that it stands for; places that differ stand apart."""
+    found = list[tuple[Source, tuple[Source, ...]]]()
+    for row, members in groupby(sources, key=lambda own: own.row or own.name):
+        first, *others = own = tuple(members)
+        alike = all(replace(one, name=first.name, part=first.part) == first for one in others)
+        if not first.row:
+            found.append((first, own))
+        elif alike and first.places == len(own):
+            part = row if first.part == first.name else first.part
+            found.append((replace(first, name=row, part=part, row=""), own))
+        else:
+            found += [(one.alone, (one,)) for one in own]
+    return found
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,6 +189,29 @@ class Source:
     # Unit in which the user's table states its zone: µm, mm, in, or % of the nominal size. It changes nothing that is
     # computed but the inputs of an own function, which knows it
     unit: str = field(default="µm", repr=False)
+    # Like places that its row stands for, 0 where it does not say; and what the row calls all of them together, of a
+    # source that is one of them
+    places: int = field(default=0, repr=False)
+    row: str = field(default="", repr=False)
+
+    @property
+    def is_of_places(self) -> bool:
+        """Whether it stands for several like places, whose names a model knows."""
+        return not self.row and (self.places > 1 or "*" in self.name)
+
+    @property
+    def alone(self) -> Source:
+        """The same with a row of its own, whose id cannot be that of the row for several."""
+        return replace(self, row="", places=0, own_id="", label=self.label or self.own_id)
+
+    def at_places(self, names: Iterable[str]) -> tuple[Source, ...]:
+        """Return the source of each of these names that its pattern means, or its name if they lose their numbers."""
+        own = replace(self, row=self.name, group=self.group or self.own_id or self.name)
+        return tuple(
+            replace(own, name=name, part=name if self.part == self.name else self.part)
+            for name in names
+            if self.is_of_places and (fnmatchcase(name, self.name) or re.sub(r"\d+", "", name) == self.name)
+        )
 
     @property
     def length_name(self) -> str:

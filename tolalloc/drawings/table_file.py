@@ -80,7 +80,8 @@ def sheet_texts(path: Path, sheet: str, heads: Heads) -> list[tuple[str, ...]]:
         values, formulas = (_loaded(path, content, data_only, sheet) for data_only in (True, False))
         texts = [_blank_if_comment(row) for row in _texts(path, values, formulas)]
         heads.require_in(path, texts)
-        _require_single(path, values, 1 + heads.row_in(texts))
+        _require_single(path, values, first := 1 + heads.row_in(texts))
+        _require_none_struck(path, values, first, texts)
     except InputError:
         raise
     except Exception as error:  # whatever the libraries raise on a damaged file: of zlib, XML, types, indices
@@ -93,7 +94,7 @@ def sheet_texts(path: Path, sheet: str, heads: Heads) -> list[tuple[str, ...]]:
 
 
 def hidden_cells(path: Path, sheet: str = "") -> tuple[str, ...]:
-    """Return a sentence each for hidden rows, hidden columns and rows that are struck out, which are read too."""
+    """Return a sentence each for hidden rows and hidden columns, which are read too."""
     from openpyxl.utils import get_column_letter
 
     loaded = _loaded(path, read_bytes(path, "a workbook (XLSX)"), data_only=True, sheet=sheet)
@@ -103,10 +104,9 @@ def hidden_cells(path: Path, sheet: str = "") -> tuple[str, ...]:
         for at, column in loaded.column_dimensions.items()
         if column.hidden
     ]
-    struck = [str(row[0].row) for row in loaded.iter_rows() if any(cell.font.strike for cell in row if cell.value)]
     return tuple(
         f"{path.name}: {what} of the sheet are read like the others: {', '.join(found)}"
-        for what, found in (("hidden rows", rows), ("hidden columns", columns), ("rows that are struck out", struck))
+        for what, found in (("hidden rows", rows), ("hidden columns", columns))
         if found
     )
 
@@ -179,6 +179,14 @@ def _require_single(path: Path, values: Any, first: int) -> None:
         if where.max_row >= first:
             place = f"{path}, sheet {values.title!r}"
             raise InputError(f"{place}: the cells {where} are merged; allowed is one value in each cell.")
+
+
+def _require_none_struck(path: Path, values: Any, first: int, texts: Sequence[tuple[str, ...]]) -> None:
+    """Raise if a row of the table has cells that are struck out, unless it is a comment."""
+    cells = (cell for row in values.iter_rows(min_row=first) if any(texts[row[0].row - 1]) for cell in row)
+    if struck := list(dict.fromkeys(cell.row for cell in cells if cell.value is not None and cell.font.strike)):
+        said = f"rows {', '.join(map(str, struck))} are" if len(struck) > 1 else f"row {struck[0]} is"
+        raise InputError(f"{path}, {said} struck out; delete what does not count, or remove the strike from what does.")
 
 
 def _text(path: Path, cell: Any, written: Any) -> str:
@@ -618,9 +626,10 @@ def usual_word(text: str) -> str:
 def _typed(annotation: object, header: str, value: str, place: str) -> object:
     """Return the text of a cell as the type of its field."""
     if annotation is int:
-        if not (value.isascii() and value.isdecimal() and len(value) < 10):
+        number = value.rstrip("x× ")
+        if not (number.isascii() and number.isdecimal() and len(number) < 10):
             raise InputError.at(place, header, value, "a whole number, 1 or more")
-        return int(value)
+        return int(number)
     if annotation is bool:
         answers = {"yes": True, "no": False, "true": True, "false": False, "ja": True, "nein": False}
         answers |= {"wahr": True, "falsch": False}

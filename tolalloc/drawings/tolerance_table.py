@@ -30,7 +30,7 @@ from tolalloc.drawings.fields import (
 from tolalloc.drawings.heads import Heads, split_header
 from tolalloc.drawings.ladder import RADII, fit_deviations, is_fit
 from tolalloc.drawings.measured_parts import MeasuredParts
-from tolalloc.drawings.sources import INCHES, LENGTHS, PERCENT, Source, known_as
+from tolalloc.drawings.sources import INCHES, LENGTHS, PERCENT, Source, by_row, known_as
 from tolalloc.drawings.table_file import (
     DATA,
     plain_number,
@@ -436,7 +436,8 @@ def _both_ways(row: dict[str, str], place: str) -> dict[str, str]:
         size = plus[sign.end() :].replace(",", ".")
         return {**row, "plus": size, "minus": f"-{size}"}
     nominal, feature = row.get("nominal", ""), usual_word(row.get("feature", "")) or Feature.SIZE
-    if feature != Feature.SIZE or row["id"].rsplit(".", 1)[-1] in RADII or not nominal:
+    name = row.get("source") or row["id"]
+    if feature != Feature.SIZE or name.rsplit(".", 1)[-1] in RADII or not nominal:
         allowed = "plus and minus, since a fit is that of a diameter or width with its nominal size"
         raise InputError.at(place, "plus", plus, allowed)
     unit, inch = usual_unit(row.get("unit", "")), usual_unit(row.get("unit", "")) == INCHES
@@ -561,12 +562,13 @@ def table_rows(sources: Sequence[Source], folder: Path | None = None) -> list[li
     are found from everywhere.
     """
     own = own_heads_of(sources)
+    columns = [COLUMNS[name] for name in headers_in(COST_UNITS, sources)]
     return [
         [
-            *(_written(column.cell(source), folder) for column in COLUMNS.values()),
+            *(_written(column.cell(source), folder) for column in columns),
             *(dict(source.own_cells).get(head, "") for head in own),
         ]
-        for source in sources
+        for source, _ in by_row(sources)
     ]
 
 
@@ -598,28 +600,6 @@ def table_frame(
 
     heads = [*headers_in(cost_unit, sources, called).values(), *own_heads_of(sources)]
     return pd.DataFrame(table_rows(sources, folder), columns=heads)
-
-
-def with_own_words(frame: pd.DataFrame, named: str, members: Mapping[str, Sequence[Source]]) -> pd.DataFrame:
-    """Return a table with own id, drawing and label of its rows behind their names, where the drawing states any.
-
-    Parameters
-    ----------
-    frame
-        A table.
-    named
-        Header of its column of names.
-    members
-        Name → its sources.
-    """
-    for field, header in {"label": "label", "drawing": "drawing", "own_id": "own id"}.items():
-        said = [
-            ", ".join(dict.fromkeys(filter(None, (getattr(own, field) for own in members.get(name, ())))))
-            for name in frame[named]
-        ]
-        if any(said):
-            frame.insert(list(frame.columns).index(named) + 1, header, said)
-    return frame
 
 
 def table_text(

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.sources import LENGTHS, is_angular
+from tolalloc.drawings.sources import LENGTHS, is_angular, neglected_columns
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.identity import identity
 from tolalloc.models.model import ARRAY_RATE, Evaluation, Model, Observer, SettingDerivatives, unobserved
@@ -22,6 +22,7 @@ from tolalloc.models.settings import Setting, require_settings
 from tolalloc.models.unit_bounds import ScaledUnits, SlopeBounds
 from tolalloc.models.user_function import UserFunction, by_name
 from tolalloc.reading.named_fields import is_number
+from tolalloc.reading.units import MILLIMETRE
 
 
 @dataclass(frozen=True)
@@ -112,6 +113,7 @@ class FunctionModel:
     # Input → its nominal size where the row of the drawing states none [mm, or in where its row is in inches, of angles
     # rad]
     nominals: Mapping[str, float] = field(default_factory=dict)
+    neglected: tuple[str, ...] = ()  # Patterns of inputs that a drawing may leave out, at their nominal size
     name: str = "own model"  # What a report calls the model
 
     def __post_init__(self) -> None:
@@ -164,6 +166,15 @@ class FunctionModel:
         changed = (replace(own, value=settings.get(own.name, own.value)) for own in self.settings)
         return replace(self, settings=tuple(changed))
 
+    @property
+    def source_names(self) -> tuple[str, ...]:
+        """Names of the sources that the inputs are, or coordinates of."""
+        return tuple(dict.fromkeys(re.sub(r"\.[xy]$", "", name) for name in self.inputs))
+
+    def leaving_out(self, patterns: Sequence[str]) -> FunctionModel:
+        """Return the function with inputs that a drawing may leave out, which then are of their nominal size."""
+        return replace(self, neglected=(*self.neglected, *patterns))
+
     def bound(self, errors: ErrorModel, place: str) -> BoundFunction:
         """Return the model at the sources of a drawing.
 
@@ -177,11 +188,12 @@ class FunctionModel:
             if column not in self.inputs:
                 raise UnknownNameError.among(f"{place}, model {self.name}", "source", column, self.inputs)
         given = {*errors.columns, *errors.fixed}
-        missing = [name for name in self.inputs if name not in given]
+        left_out = neglected_columns(self.neglected, [*self.nominals]) - given
+        missing = [name for name in self.inputs if name not in given and name not in left_out]
         if missing:
             raise InputError(
                 f"{place}, model {self.name}: the input {missing[0]!r} has no row in the drawing; give it one, with "
-                "zone 0 if it does not vary."
+                "zone 0 if it does not vary, or a nominal size in inputs and name it under neglected in the study."
             )
         return BoundFunction(
             source=self,
@@ -189,13 +201,15 @@ class FunctionModel:
             steps=self.step * np.repeat(errors.zones, [len(source.columns) for source in errors.active]),
             offsets=np.array([self._nominal(name, errors, lengths, place) for name in self.inputs]),
             values=tuple(setting.value for setting in self.settings),
-            lengths=tuple(lengths[name] for name in self.inputs),
+            lengths=tuple(lengths.get(name, MILLIMETRE) for name in self.inputs),
+            left_out=(f"not in the tolerance table and taken as exact: {', '.join(sorted(left_out))}",)
+            * bool(left_out),
         )
 
     def _nominal(self, name: str, errors: ErrorModel, lengths: Mapping[str, float], place: str) -> float:
         """Return where an input stands without its deviation: the nominal size of its row, or else of the model [m]."""
         drawn = {source.name: source.nominal for source in errors.sources}.get(name, 0.0)
-        stated = self.nominals.get(name, 0.0) * (1.0 if is_angular(name) else lengths[name])
+        stated = self.nominals.get(name, 0.0) * (1.0 if is_angular(name) else lengths.get(name, MILLIMETRE))
         if drawn and stated and not isclose(drawn, stated, rel_tol=1e-9):
             raise InputError(
                 f"{place}, model {self.name}: the nominal size of {name!r} is {self.nominals[name]:g} in inputs and "
@@ -217,6 +231,7 @@ class BoundFunction(Model):
     values: tuple[float, ...] = ()  # Values of the settings in force [units of their names]
     asked: tuple[str, ...] = ()  # Names of the outputs that a call returns; all unless given
     observe: Observer = unobserved  # Told the statuses of each call
+    left_out: tuple[str, ...] = ()  # What binding the drawing to the function assumed
 
     @property
     def name(self) -> str:

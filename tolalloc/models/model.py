@@ -299,6 +299,15 @@ class ModelSource(Protocol):
         """What a report calls the model."""
         ...
 
+    @property
+    def source_names(self) -> Sequence[str]:
+        """Names of all sources that it knows, of which a row for several like places means some."""
+        ...
+
+    def leaving_out(self, patterns: Sequence[str]) -> ModelSource:
+        """Return the same that takes as exact what a drawing leaves out of the sources that patterns name, too."""
+        ...
+
     def bound(self, errors: ErrorModel, place: str) -> Model:
         """Return the model at the sources of a drawing; nothing is solved.
 

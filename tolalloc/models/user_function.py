@@ -153,7 +153,7 @@ class UserFunction:
         """Return what the function returns for numbers; for arrays of one, where only these have what it asks for."""
         try:
             return self.function(*sample.tolist())
-        except (AttributeError, TypeError, IndexError):
+        except (AttributeError, TypeError, IndexError, ValueError):
             with suppress(Exception, SystemExit):
                 return self.function(*sample[:, np.newaxis].copy())
             raise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -48,7 +49,7 @@ def bind(
     errors: ErrorModel,
     torque: float | None,
     place: str,
-    neglected: Sequence[str] = NEGLECTED,
+    neglected: Sequence[str] = (),
     unit: BuiltUnit | None = None,
 ) -> tuple[KernelResponse, tuple[str, ...]]:
     """Return the equivalent model at the sources of a drawing, and what the binding assumes; nothing is solved.
@@ -67,10 +68,10 @@ def bind(
     # The next question of the same reducer finds the tables as they are.
     model = cached_model(at_torque(reducer, carried), AngleSearch(), orders or HARMONICS)
     listed = {*errors.columns, *errors.fixed, *reducer.modification.deviations}
-    patterns = dict.fromkeys((*neglected, _NOMINAL))
-    left_out = {pattern: neglected_columns((pattern,), model.columns) - listed for pattern in patterns}
+    rest = [name for name in model.columns if name not in listed]
+    own, usual = neglected_columns(neglected, rest), dict.fromkeys((*NEGLECTED, _NOMINAL))
     fixed: Mapping[str, float] = {
-        **dict.fromkeys((column for columns in left_out.values() for column in columns), 0.0),
+        **dict.fromkeys(neglected_columns((*neglected, *usual), rest), 0.0),
         **dict.fromkeys(_absent_orders(errors, model, place), 0.0),
         **errors.fixed,
         **reducer.modification.deviations,
@@ -85,8 +86,16 @@ def bind(
     if unit:
         unit.require_no_form(place)
         unit.errors(model.columns, reducer.modification.deviations)
-    exact = ", ".join(pattern for pattern, columns in left_out.items() if columns)
+    taken = [_taken(pattern, rest) for pattern in dict.fromkeys(neglected)]
+    exact = ", ".join([*taken, *(pattern for pattern in usual if neglected_columns((pattern,), rest) - own)])
     return kernel, ((f"not in the tolerance table and taken as exact: {exact}",) if exact else ())
+
+
+def _taken(pattern: str, columns: Sequence[str]) -> str:
+    """Return a pattern of a user's own with the sources that it took, those that differ by their numbers as one."""
+    taken = neglected_columns((pattern,), columns)
+    names = ", ".join(dict.fromkeys(re.sub("[0-9]+", "*", source_name(own)) for own in columns if own in taken))
+    return pattern if names == pattern else f"{pattern} ({names or 'which takes none'})"
 
 
 def _absent_orders(errors: ErrorModel, model: EquivalentModel, place: str) -> list[str]:
@@ -168,7 +177,7 @@ class ReducerChoice:
     # As there [K]
     disc_temperature: float = 0.0
     load_cases: tuple[LoadCase, ...] = ()
-    neglected: tuple[str, ...] = NEGLECTED
+    neglected: tuple[str, ...] = ()  # Beside `NEGLECTED`
     unit: BuiltUnit | None = None  # Built unit whose curve is shown, if any
 
     def __repr__(self) -> str:
@@ -180,6 +189,15 @@ class ReducerChoice:
     def name(self) -> str:
         """The reducer's."""
         return self.reducer.name
+
+    @property
+    def source_names(self) -> tuple[str, ...]:
+        """Names of all sources that the reducer has."""
+        return tuple(dict.fromkeys(map(source_name, EquivalentModel(self.reducer).columns)))
+
+    def leaving_out(self, patterns: Sequence[str]) -> ReducerChoice:
+        """Return the reducer with other sources that a drawing may leave out, patterns of them, beside its own."""
+        return replace(self, neglected=(*self.neglected, *patterns))
 
     @property
     def _ranges(self) -> tuple[tuple[float, float] | None, ...]:
@@ -256,7 +274,7 @@ def reducer(
     rotation_clearance: tuple[float, float] | None = None,
     disc_temperature: float = 0.0,
     load_cases: Sequence[LoadCase] | str | Path = (),
-    neglected: tuple[str, ...] = NEGLECTED,
+    neglected: Sequence[str] = (),
     unit: str | Path = "",
 ) -> ReducerChoice:
     """Return a reducer for a study, from a preset or a TOML file.
@@ -282,8 +300,9 @@ def reducer(
         `tolalloc.mean` make, such as ``ta.at(ta.LOST_MOTION, cold)`` with
         ``cold = ta.LoadCase("cold", disc_temperature=-5)``; or a duty cycle's file of them.
     neglected
-        Sources that a drawing may leave out, taken as zero; ``*`` stands for anything. A bearing's or a mesh's
-        clearance may always be left out: it is then the nominal one of the reducer file.
+        Sources that a drawing may leave out, taken as zero, beside those of the first stage, phases, tilts, single pins
+        and teeth; ``*`` stands for anything. A bearing's or a mesh's clearance may always be left out: it is then the
+        nominal one of the reducer file.
     unit
         Built unit whose curve is shown, by shipped name or path.
 

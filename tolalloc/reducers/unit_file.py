@@ -22,7 +22,7 @@ from tolalloc.drawings.heads import split_header
 from tolalloc.drawings.sources import Source, is_angular, neglected_columns
 from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
-from tolalloc.reading.files import Record, no_formula, read_toml, shipped_or_path, validated, write_new
+from tolalloc.reading.files import Record, no_formula, read_toml, shipped_or_path, validated
 from tolalloc.reading.units import MICROMETRE, MICRORADIAN
 from tolalloc.reducers.cycloid.measured_profile import MeasuredProfile
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
@@ -338,30 +338,6 @@ def table_text(headers: Sequence[str], rows: Iterable[Sequence[object]], comment
     writer = csv.writer(text, quoting=csv.QUOTE_NONNUMERIC, lineterminator="\n")
     writer.writerows(map(no_formula, row) for row in (headers, *rows))
     return text.getvalue()
-
-
-def write_table(
-    path: Path, headers: Sequence[str], rows: Iterable[Sequence[object]], comments: Sequence[str] = ()
-) -> None:
-    """Write what `table_text` returns.
-
-    Raises
-    ------
-    InputError
-        The file exists or cannot be written.
-    """
-    write_new(path, table_text(headers, rows, comments))
-
-
-def write_units(units: Sequence[BuiltUnit], path: str | Path) -> None:
-    """Write what `units_text` returns.
-
-    Raises
-    ------
-    InputError
-        There is no unit, units state different columns, or the file exists or cannot be written.
-    """
-    write_new(Path(path), units_text(units, path))
 
 
 def units_text(units: Sequence[BuiltUnit], path: str | Path, comments: Sequence[str] = ()) -> str:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tolalloc.capability.monte_carlo import Yield
+from tolalloc.drawings.tolerance_table import heads_of
 from tolalloc.exceptions import InputError
 from tolalloc.reading.file_content import is_file, read_text
 from tolalloc.reading.units import in_cost_units, unit_of
@@ -199,7 +200,7 @@ def _read_table(path: Path, columns: tuple[str, ...]) -> pd.DataFrame:
 
     text = "".join(line for line in StringIO(_text(path, "a table in CSV")) if not line.startswith("#"))
     try:
-        found = pd.read_csv(StringIO(text)).rename(columns=_with_cost_units)
+        found = pd.read_csv(StringIO(text)).rename(columns=heads_of(path).meant).rename(columns=_with_cost_units)
     except ValueError as error:
         raise InputError(f"{path}: cannot be read as a table ({' '.join(str(error).split())}).") from None
     _with(dict.fromkeys(found.columns), columns, path)

@@ -93,7 +93,7 @@ class Portrait(Generic[Own]):
     @property
     def assumptions(self) -> tuple[str, ...]:
         """What no source of the model states."""
-        return self._said("assumptions", ())
+        return self._said("assumptions", self.left_out)
 
     @property
     def left_out(self) -> tuple[str, ...]:

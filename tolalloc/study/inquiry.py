@@ -48,6 +48,14 @@ RatedTorque = Annotated[
 ]
 
 
+Neglected = Annotated[
+    list[str] | None,
+    Word("Sources that the table may leave out, a pattern such as '*', beside those that it may anyway; repeatable."),
+]
+
+ProcessesName = Annotated[str, Word("Process capability library that rows of the table may name: shipped name or CSV.")]
+
+
 def named_reducer(reducer: str | None, *written: Path | None, argument: str = "reducer") -> str:
     """Return the reducer that was asked for, the default one unless given.
 

@@ -56,10 +56,12 @@ class Prepared:
 
     @cached_property
     def _stated(self) -> ErrorModel:
-        """The sources of the drawing as its table states them."""
+        """The sources of the drawing as its table states them, each place of a row for several."""
         if self.study.drawing is None:
             raise InputError(f"{self.place}: drawing is missing; give ta.drawing(...), the tolerance table.")
-        return self.study.drawing.errors
+        errors, model = self.study.drawing.errors, self.study.model
+        counts = model and any(own.is_of_places for own in errors.sources)
+        return errors.at_places(model.source_names) if model and counts else errors
 
     @cached_property
     def errors(self) -> ErrorModel:
@@ -107,6 +109,8 @@ class Prepared:
             raise InputError(f"{self.place}: model is missing; give ta.reducer(...) or ta.model(...).")
         settings = self.study.drawing.settings if self.study.drawing else {}
         source = self.study.model
+        if self.study.neglected:
+            source = source.leaving_out(self.study.neglected)
         if settings:
             try:
                 source = source.set_to(settings)

@@ -14,7 +14,7 @@ from tolalloc.capability.indices import Limits
 from tolalloc.drawings.compensators import Compensator
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.model import is_fast
-from tolalloc.reading.named_fields import NamedFields, Rule, a, mapped, number, or_none, whole
+from tolalloc.reading.named_fields import NamedFields, Rule, a, each, mapped, number, or_none, whole
 from tolalloc.sensitivity.effort import QUICK_RANKING, RankingEffort
 
 if TYPE_CHECKING:
@@ -218,6 +218,10 @@ class Problem(NamedFields):
             f"a dictionary of texts up to {_LONGEST_TEXT} characters under {', '.join(_TITLE_BLOCK)}", _is_title_block
         ),
     ] = field(default_factory=dict)
+    neglected: Annotated[
+        Sequence[str],
+        each("a list of names in quotation marks, such as ['disc*.tilt']", a(str)),
+    ] = ()
     compensators: Annotated[
         "Sequence[Compensator]",
         Rule("several of ta.Sorting(...), ta.Shim(...) and ta.Indexing(...)", _are_compensators),

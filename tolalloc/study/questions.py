@@ -37,7 +37,7 @@ class Question(NamedFields, ABC):
 
     kind: ClassVar[str]
     reads: ClassVar[frozenset[str]] = frozenset(
-        {"model", "drawing", "limits", "seed", "largest_failed_share", "effort", "compensators"}
+        {"model", "drawing", "limits", "seed", "largest_failed_share", "effort", "neglected", "compensators"}
     )
 
     def __init_subclass__(cls) -> None:

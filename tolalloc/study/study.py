@@ -85,6 +85,9 @@ class Study(Problem):
     title_block
         What the title blocks of page and drawing say beside study and date: ``drawing number``, ``revision``,
         ``author``, and ``material`` on the drawing. What is not said stays empty there, to be filled in by hand.
+    neglected
+        Names and patterns of sources that the drawing may leave out, taken as exact, beside those that the model leaves
+        out itself; an input of an own function must have its nominal size in ``inputs`` then.
     compensators
         What is chosen at assembly, ``ta.Sorting(...)``, ``ta.Shim(...)`` and ``ta.Indexing(...)``: reducers are judged
         as they are assembled.

@@ -355,7 +355,7 @@ def outside_range(source: Source) -> str:
 
 
 def repriced(space: DesignSpace, zones: Mapping[str, float]) -> tuple[Source, ...]:
-    """Return the sources that vary, some at other zones [m] and what these cost by the cheapest process.
+    """Return the sources that vary, some at other zones [m], with what they cost by the processes that make them.
 
     Raises
     ------
@@ -363,7 +363,9 @@ def repriced(space: DesignSpace, zones: Mapping[str, float]) -> tuple[Source, ..
         A zone that no process holds.
     """
     sources = space.errors.active
-    costs = {name: _price(space, name, zone) for name, zone in zones.items() if name in space.processes}
+    costs = space.cost_of_sources(space.uniform(1.0)) if space.processes else {}
+    costs = {name: cost for name, cost in costs.items() if name in space.processes}
+    costs |= {name: _price(space, name, zone) for name, zone in zones.items() if name in space.processes}
     return with_zones(sources, [zones.get(own.name, own.zone) for own in sources], costs)
 
 

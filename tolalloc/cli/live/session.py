@@ -253,7 +253,7 @@ class Session:
         sources = self.sources(design)
         return {
             "cost": sum(own.cost for own in sources),
-            "before": sum(own.cost for own in self.prepared.errors.active),
+            "before": sum(own.cost for own in repriced(self.prepared.space, {})),
             "costs": {own.name: own.cost for own in sources},
             "made": {own.name: self._process(own) for own in sources if own.name in self.prepared.space.processes},
         }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.allocation.space.requirement import AtYield
-from tolalloc.drawings.sources import Source, length_unit, zone_in, zone_unit
+from tolalloc.drawings.sources import Source, by_row, length_unit, zone_in, zone_unit
 from tolalloc.drawings.table_file import setting_line
 from tolalloc.drawings.tolerance_table import heads_file, heads_text, table_frame
 from tolalloc.reading.units import COST_UNITS, MICROMETRE, unit_of
@@ -47,40 +47,55 @@ _EFFECTS = 4
 
 _Source = tuple[Source, Source]
 """A source before and after."""
+_Row = tuple[Source, Sequence[_Source]]
+"""What a table calls sources, and these, alike, before and after."""
 _Dimension = tuple[str, Sequence[_Source]]
 """The name of a dimension and its members."""
 
 
-def sources_table(result: AllocationResult) -> Table[_Source]:
-    """Return the drawing in short: zone, grade, process, share of the variance and cost of every source."""
+def sources_table(result: AllocationResult) -> Table[_Row]:
+    """Return the drawing in short: zone, grade, process, share of the variance and cost of every row of the table."""
     shares, changes, unit = _shares(result), result.process_changes, unit_of(result.leading)
     by_deviation, by_zone = (_by_source(result, own) for own in (result.chosen.by_deviation, result.chosen.by_zone))
-    none, zone = float("nan"), zone_unit(result.space.errors.sources)
-    length, _ = length_unit(result.space.errors.sources)
-    columns: list[Column[_Source]] = [
+    zone, (length, _) = zone_unit(result.space.errors.sources), length_unit(result.space.errors.sources)
+    made_before, made = _processes(result)
+
+    def each(known: Mapping[str, float], row: _Row, otherwise: float = np.nan) -> list[float]:
+        return [known.get(own.name, otherwise) for own, _ in row[1]]
+
+    columns: list[Column[_Row]] = [
         Column(header="source", value=lambda row: row[0].name),
         *own_words(lambda row: row[:1]),
+        Column(header="places [-]", value=lambda row: str(len(row[1])), nothing="1"),
         Column(header="callout", value=lambda row: row[0].feature.value),
-        Column(header=f"zone before [{zone}]", value=lambda row: zone_in(row[0], zone)),
-        Column(header=f"zone [{zone}]", value=lambda row: zone_in(row[1], zone)),
-        Column(header="change [%]", value=_change),
-        Column(header="grade", value=lambda row: row[1].grade),
-        *_processes(result),
-        Column(header="share of variance [%]", value=lambda row: shares.get(row[0].name, none)),
+        Column(header=f"zone before [{zone}]", value=lambda row: zone_in(row[1][0][0], zone)),
+        Column(header=f"zone [{zone}]", value=lambda row: zone_in(row[0], zone)),
+        Column(header="change [%]", value=lambda row: _change(row[1][0])),
+        Column(header="grade", value=lambda row: row[0].grade),
+        Column(header=made_before.header, value=lambda row: made_before.value(row[1][0])),
+        Column(header=made.header, value=lambda row: made.value(row[1][0])),
+        Column(header="share of variance [%]", value=lambda row: sum(each(shares, row))),
     ]
     if by_deviation:
-        columns.append(Column(header=f"Sens [{unit}/{length}]", value=lambda row: by_deviation.get(row[0].name, none)))
+        header = f"Sens [{unit}/{length}]"
+        columns.append(Column(header=header, value=lambda row: _span(each(by_deviation, row))))
     if by_zone:
         header = f"kept value per zone [{unit}/{length}]"
-        columns.append(Column(header=header, value=lambda row: by_zone.get(row[0].name, none)))
-    columns.append(Column(header="cost before [{cost}]", value=lambda row: row[0].cost))
-    columns.append(Column(header="cost [{cost}]", value=lambda row: row[1].cost))
+        columns.append(Column(header=header, value=lambda row: sum(each(by_zone, row))))
+    columns.append(Column(header="cost before [{cost}]", value=lambda row: sum(old.cost for old, _ in row[1])))
+    columns.append(Column(header="cost [{cost}]", value=lambda row: sum(new.cost for _, new in row[1])))
     if any(changes.values()):
         header = "of it for a new process [{cost}]"
-        columns.append(Column(header=header, value=lambda row: changes.get(row[0].name, 0.0)))
+        columns.append(Column(header=header, value=lambda row: sum(each(changes, row, 0.0))))
     columns.append(Column(header="locked", value=lambda row: "yes" if row[0].locked else "no"))
-    pairs = zip(result.space.errors.sources, result.drawn_sources, strict=True)
-    return Table(name="drawing", columns=columns, rows=[pair for pair in pairs if pair[0].zone != 0.0])
+    before, drawn = {own.name: own for own in result.space.errors.sources}, by_row(result.drawn_sources)
+    rows = [(row, [(before[own.name], own) for own in members]) for row, members in drawn if row.zone != 0.0]
+    return Table(name="drawing", columns=columns, rows=rows)
+
+
+def _span(values: Sequence[float]) -> float | str:
+    """Return a cell of one value or from the smallest of several to the largest."""
+    return values[0] if len(values) == 1 else span(min(values), max(values))
 
 
 def dimensions_table(result: AllocationResult) -> Table[_Dimension]:
@@ -146,8 +161,7 @@ def _processes(result: AllocationResult) -> tuple[Column[_Source], Column[_Sourc
 
 def _zones(members: Iterable[Source], unit: str) -> float | str:
     """Return the zone of all members, or the smallest and the largest of them [unit]."""
-    zones = [zone_in(own, unit) for own in members]
-    return span(min(zones), max(zones))
+    return _span([zone_in(own, unit) for own in members])
 
 
 def _parts(result: AllocationResult) -> dict[str, float]:
@@ -186,9 +200,11 @@ def tolerances_frame(result: AllocationResult, cost_unit: str = COST_UNITS) -> p
     """Return the tolerance table in the layout of the input, with share of the variance and change added."""
     frame = table_frame(result.drawn_sources, cost_unit=cost_unit, called=result.space.errors.called)
     known = sources_table(result).frame(cost_unit).set_index("source")
-    known = known.reindex([source.name for source in result.drawn_sources])
-    for header in ("share of variance [%]", "change [%]", f"cost before [{cost_unit}]"):
+    rows, costs = by_row(result.drawn_sources), {own.name: own.cost for own in result.space.errors.sources}
+    known = known.reindex([row.name for row, _ in rows])
+    for header in ("share of variance [%]", "change [%]"):
         frame[header] = known[header].to_numpy()
+    frame[f"cost before [{cost_unit}]"] = [costs[own[0].name] if row.zone else np.nan for row, own in rows]
     return frame
 
 
@@ -247,11 +263,11 @@ def risks(result: AllocationResult) -> tuple[str, ...]:
     return tuple(found)
 
 
-def zones_figure(rows: Sequence[_Source]) -> Figure:
+def zones_figure(rows: Sequence[_Row]) -> Figure:
     """Return the zones before and after."""
-    names = [before.name for before, _ in rows]
-    unit = zone_unit(before for before, _ in rows)
-    before, after = ([zone_in(own, unit) for own in side] for side in zip(*rows, strict=True))
+    names = [row.name for row, _ in rows]
+    unit = zone_unit(row for row, _ in rows)
+    before, after = ([zone_in(own, unit) for own in side] for side in zip(*(own[0] for _, own in rows), strict=True))
     return Figure(
         name="zones",
         title=_say("figure_zones"),

@@ -12,7 +12,7 @@ from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.requirement import Requirement
 from tolalloc.capability.monte_carlo import KeptLimits, Yield
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.sources import Source
+from tolalloc.drawings.sources import Source, by_row
 from tolalloc.drawings.tolerance_table import doubts
 from tolalloc.models.model import Model
 from tolalloc.reports.document import Section
@@ -217,8 +217,10 @@ def _cost(space: DesignSpace) -> float:
 def _zones(sources: tuple[Source, ...]) -> list[str]:
     """Return a line for every source, or one for all whose names differ by their numbers alone, if they are alike."""
     said: dict[str, dict[str, str]] = {}
-    for source in sources:
+    for source, members in by_row(sources):
         name = f"{source.own_id} ({source.name})" if source.own_id else source.name
+        if source.name != members[0].name:
+            name += f", {len(members)} places ({', '.join(own.name for own in members)})"
         span = f"may become {source.said(source.minimum).split()[0]}…{source.said(source.maximum)}"
         mapping = f"{source.mapping}; {'locked' if source.locked else span}"
         said.setdefault(_without_numbers(name), {})[name] = mapping

@@ -8,7 +8,7 @@ from typing import Any
 from tolalloc.allocation.difference import DifferenceResult
 from tolalloc.allocation.space.design_space import outside_range
 from tolalloc.capability.monte_carlo import Change
-from tolalloc.drawings.sources import Source, zone_in, zone_unit
+from tolalloc.drawings.sources import Source, by_row, zone_in, zone_unit
 from tolalloc.reading.units import COST_UNITS, unit_of
 from tolalloc.reports.columns import Column, Table, own_words
 from tolalloc.reports.document import Section
@@ -20,6 +20,8 @@ _BEYOND = 10
 """Units beyond a quantile below which its interval is too narrow [-]."""
 _say = Sentences("difference")
 
+_Row = tuple[Source, tuple[Source, ...], tuple[Source, ...]]
+"""What a table calls sources, these before, and after."""
 _Changed = tuple[str, str, tuple[float, float], Change]
 """What changes, its unit, before and after, and the change with its interval."""
 
@@ -34,15 +36,15 @@ _CHANGES: tuple[Column[_Changed], ...] = (
 )
 
 
-def _zone_columns(unit: str) -> tuple[Column[tuple[Source, Source]], ...]:
+def _zone_columns(unit: str) -> tuple[Column[_Row], ...]:
     """Return the columns of the sources whose zones change, in a unit."""
     return (
         Column(header="source", value=lambda row: row[0].name),
         *own_words(lambda row: row[:1]),
-        Column(header=f"zone before [{unit}]", value=lambda row: zone_in(row[0], unit)),
-        Column(header=f"zone after [{unit}]", value=lambda row: zone_in(row[1], unit)),
-        Column(header="cost before [{cost}]", value=lambda row: row[0].cost),
-        Column(header="cost after [{cost}]", value=lambda row: row[1].cost),
+        Column(header=f"zone before [{unit}]", value=lambda row: zone_in(row[1][0], unit)),
+        Column(header=f"zone after [{unit}]", value=lambda row: zone_in(row[2][0], unit)),
+        Column(header="cost before [{cost}]", value=lambda row: sum(own.cost for own in row[1])),
+        Column(header="cost after [{cost}]", value=lambda row: sum(own.cost for own in row[2])),
     )
 
 
@@ -119,10 +121,11 @@ class DifferenceTeller(Teller[DifferenceResult]):
         return Table(name="changes", columns=_CHANGES, rows=rows)
 
     @property
-    def _zones(self) -> Table[tuple[Source, Source]]:
+    def _zones(self) -> Table[_Row]:
         """The zones that change, with their costs."""
-        rows = list(zip(self.result.before, self.result.after, strict=True))
-        return Table(name="changed zones", columns=_zone_columns(zone_unit(before for before, _ in rows)), rows=rows)
+        before = {own.name: own for own in self.result.before}
+        rows = [(row, tuple(before[own.name] for own in after), after) for row, after in by_row(self.result.after)]
+        return Table(name="changed zones", columns=_zone_columns(zone_unit(self.result.before)), rows=rows)
 
 
 def _with_interval(change: Change, output: str) -> dict[str, str]:

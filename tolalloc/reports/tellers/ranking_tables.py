@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tolalloc.drawings.sources import Source, zone_in, zone_unit
-from tolalloc.drawings.tolerance_table import with_own_words
 from tolalloc.reading.units import MICROMETRE, unit_of
-from tolalloc.reports.columns import Column, Table, of_positions, span
+from tolalloc.reports.columns import Column, Table, of_positions, own_words, span
 from tolalloc.reports.feature_frame import Frames, callout
 from tolalloc.reports.header import Header
 from tolalloc.reports.templates import Sentences
@@ -93,7 +92,17 @@ def ranking_table(result: RankingResult) -> pd.DataFrame:
     frame = frame.assign(
         **{header: [own.get(name, np.nan) for name in frame["source"]] for header, own in columns.items()}
     )
-    return with_own_words(frame, "source", {own.name: (own,) for own in result.errors.active})
+    return _with_own_words(frame, {own.name: (own,) for own in result.errors.active})
+
+
+def _with_own_words(frame: pd.DataFrame, members: Mapping[str, Sequence[Source]]) -> pd.DataFrame:
+    """Return a table with own id, drawing and label of its rows behind their names, where the drawing states any."""
+    named = next(own for own in ("source", "dimension") if own in frame)
+    words: tuple[Column[str], ...] = own_words(lambda name: members.get(name, ()))
+    for own in reversed(words):
+        if any(said := [own.value(name) for name in frame[named]]):
+            frame.insert(list(frame.columns).index(named) + 1, own.header, said)
+    return frame
 
 
 def ranked(sobol: SobolIndices) -> list[dict[str, Any]]:
@@ -140,7 +149,7 @@ def dimensions_table(result: RankingResult, found: SobolIndices) -> pd.DataFrame
         },
         found.order,
     ).frame()
-    return with_own_words(frame, "dimension", by_group)
+    return _with_own_words(frame, by_group)
 
 
 def ranked_lines(result: RankingResult) -> dict[str, list[Source]]:

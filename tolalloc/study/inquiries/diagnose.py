@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from tolalloc.reports.header import Header
 from tolalloc.running.progress import Progress, RunRecord
 from tolalloc.study.answer import Answer
-from tolalloc.study.inquiry import Inquiry, ReducerName, StiffnessName, TestTorque, Word
+from tolalloc.study.inquiry import Inquiry, Neglected, ProcessesName, ReducerName, StiffnessName, TestTorque, Word
 
 if TYPE_CHECKING:
     from tolalloc.bench.diagnosis import DiagnosisRequest, DiagnosisResult
@@ -28,6 +28,8 @@ class Diagnose(Inquiry["DiagnosisRequest"]):
     reducer: ReducerName = None
     tolerances: Annotated[str, Word("Tolerance table: shipped name, CSV or XLSX.")] = "rv20e_drawing"
     sheet: Annotated[str, Word("Sheet of a workbook that holds the table; the first unless given.")] = ""
+    processes: ProcessesName = "generic"
+    neglected: Neglected = None
     torque: TestTorque = None
     noise: Annotated[float, Word("Standard deviation of one reading [arcsec].")] = 0.5
     discrepancy: Annotated[float, Word("Standard deviation of what the model leaves out [arcsec].")] = 0.5
@@ -46,17 +48,13 @@ class Diagnose(Inquiry["DiagnosisRequest"]):
         from tolalloc.bench.diagnosis import DiagnosisRequest
         from tolalloc.bench.repair import load_repair
         from tolalloc.drawings.drawing import load_drawing
-        from tolalloc.reducers.choice import ReducerChoice
-        from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
+        from tolalloc.reducers.choice import reducer
         from tolalloc.reducers.unit_file import load_unit
 
-        design = load_reducer(str(self.reducer))
-        if self.stiffness:
-            design = with_stiffness(design, load_identified_stiffness(self.stiffness))
-        drawing = load_drawing(self.tolerances, correlations=self.correlations, sheet=self.sheet)
-        if drawing.settings:  # the unit was made with the modification of its drawing
-            design = ReducerChoice(reducer=design).set_to(drawing.settings).reducer
-        errors = drawing.errors
+        drawing = load_drawing(self.tolerances, self.processes, self.correlations, sheet=self.sheet)
+        # The unit was made with the modification of its drawing.
+        choice = reducer(str(self.reducer), stiffness=self.stiffness).set_to(drawing.settings)
+        design, errors = choice.reducer, drawing.errors.at_places(choice.source_names)
         if self.form:
             unit = load_unit(self.form)
             design = unit.as_built(design)
@@ -71,7 +69,8 @@ class Diagnose(Inquiry["DiagnosisRequest"]):
             angle_offset_deg=self.angle_offset,
             level=self.level,
             seed=self.seed,
-            repair=load_repair(self.repair, drawing.errors) if self.repair else None,
+            neglected=tuple(self.neglected or ()),
+            repair=load_repair(self.repair, errors) if self.repair else None,
         )
 
     def solve(self, prepared: DiagnosisRequest, progress: Progress) -> Answer[DiagnosisResult]:

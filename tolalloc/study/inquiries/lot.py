@@ -10,7 +10,7 @@ from tolalloc.exceptions import InputError
 from tolalloc.reports.header import Header
 from tolalloc.running.progress import Progress, RunRecord
 from tolalloc.study.answer import Answer
-from tolalloc.study.inquiry import Inquiry, ReducerName, StiffnessName, TestTorque, Word
+from tolalloc.study.inquiry import Inquiry, Neglected, ProcessesName, ReducerName, StiffnessName, TestTorque, Word
 
 if TYPE_CHECKING:
     from tolalloc.bench.lot_orders import LotCurves
@@ -30,6 +30,7 @@ class Lot(Inquiry["LotRequest"]):
     ]
     tolerances: Annotated[Path, Word("Tolerance table of the drawing: shipped name, CSV or XLSX.")]
     sheet: Annotated[str, Word("Sheet of a workbook that holds the table; the first unless given.")] = ""
+    processes: ProcessesName = "generic"
     false_alarms: Annotated[float, Word("Probability that any process is called moved if none is.")] = 0.05
     next_parts: Annotated[
         int | None, Word("Parts of the next sample, for its control limits; as many as now unless given.")
@@ -41,6 +42,7 @@ class Lot(Inquiry["LotRequest"]):
         Path | None, Word("Folder of curves, a CSV per unit: columns 'angle [deg]', 'transmission error [arcsec]'.")
     ] = None
     reducer: ReducerName = None
+    neglected: Neglected = None
     torque: TestTorque = None
     noise: Annotated[float, Word("Standard deviation of one reading [arcsec].")] = 0.5
     discrepancy: Annotated[float, Word("Standard deviation of what the model leaves out [arcsec].")] = 0.5
@@ -59,10 +61,10 @@ class Lot(Inquiry["LotRequest"]):
 
         if self.write_to:
             require_new(self.write_to)
-        for field in ("reducer", "torque"):
+        for field in ("reducer", "neglected", "torque"):
             if getattr(self, field) is not None and not self.curves:
                 raise InputError.of_argument("lot", field, getattr(self, field), "none without curves")
-        drawing = load_drawing(self.tolerances, sheet=self.sheet)
+        drawing = load_drawing(self.tolerances, self.processes, sheet=self.sheet)
         curves = self._curves(self.curves, drawing) if self.curves else None
         return prepare_lot(self.readings, drawing, self.false_alarms, self.next_parts, self.seed, curves)
 
@@ -78,9 +80,12 @@ class Lot(Inquiry["LotRequest"]):
             raise InputError.of_argument("lot", "noise", self.noise, f"above 0 up to {LARGEST_NOISE:g}")
         if not 0.0 <= self.discrepancy <= LARGEST_NOISE:
             raise InputError.of_argument("lot", "discrepancy", self.discrepancy, f"0 to {LARGEST_NOISE:g}")
-        choice = reducer(str(self.reducer), stiffness=self.stiffness, torque=self.torque).set_to(drawing.settings)
+        own, left_out = self.reducer, self.neglected or ()
+        choice = reducer(str(own), stiffness=self.stiffness, torque=self.torque, neglected=left_out)
+        choice = choice.set_to(drawing.settings)
+        errors = drawing.errors.at_places(choice.source_names)
         noise = Noise(reading=self.noise * ARCSECOND, discrepancy=self.discrepancy * ARCSECOND)
-        return load_lot_curves(folder, choice.bound(drawing.errors, "lot"), drawing.errors, noise)
+        return load_lot_curves(folder, choice.bound(errors, "lot"), errors, noise)
 
     def room(self, prepared: LotRequest) -> str:
         """Return the room that curves are predicted with."""
