@@ -129,7 +129,8 @@ def test_modify_li2018_gives_the_closed_form():
     answer = answer_of("modify", "li2018", "--reducer", "rv40e_xi2015", "--radial", "15")
     assert answer["equidistant amount [µm]"] == pytest.approx(35.9679, abs=1e-4)
     assert answer["shift amount [µm]"] == pytest.approx(20.9679, abs=1e-4)
-    assert answer["backlash [arcmin]"] == pytest.approx(3.220, abs=5e-4)
+    # li2018's 3.220′ of the disc, at the output times zc/zp·(1 − 1/i).
+    assert answer["backlash [arcmin]"] == pytest.approx(3.220 * 39 / 40 * 80 / 81, abs=0.01)
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ def test_a_study_is_ranked_allocated_and_drawn(folder, drive, tmp_path):
     study = ta.Study(
         drive,
         ta.drawing(folder / "zones.csv"),
-        limits={ta.PEAK_TO_PEAK: ta.Limit(upper=110.0, show=ta.AtYield(0.95))},
+        limits={ta.PEAK_TO_PEAK: ta.Limit(upper=125.0, show=ta.AtYield(0.95))},
         questions=[ta.Allocation(front=False, what_if=False), ta.Ranking()],
         name="drive",
         effort=SMALL,

@@ -127,7 +127,6 @@ def test_local_derivatives_have_sign_and_length():
     errors = ErrorModel((source("a", middle=2.0), source("b", Feature.POSITION), source("c", over=0.5)))
     found = local_derivatives(Experiment.of(linear(errors, [-3.0, 3.0, 4.0, 1.0]), errors, SeedTree(4)), 64)
     np.testing.assert_allclose(found.slope, np.array([-3.0, 5.0, 2.0]) * 1e-6)
-    np.testing.assert_allclose(found.root_mean_square, np.array([3.0, 5.0, 2.0]) * 1e-6)
     one, across = found.per_micrometre[[0, 1]] * 1e6
     assert one == pytest.approx(3.0, rel=1e-12)
     assert across == pytest.approx(5.0 / np.sqrt(2.0), rel=0.2)  # a random direction, of 64 units
@@ -148,8 +147,8 @@ def test_root_mean_square_is_over_random_units():
     errors = ErrorModel((source("a"),))
     square = Function(errors.columns, lambda x: x[:, 0] ** 2, lambda x: 2 * x)
     found = local_derivatives(Experiment.of(square, errors, SeedTree(5)), 4096)
-    assert found.slope[0] == found.root_mean_square[0], "signs cancel: there is a mean of none"
-    np.testing.assert_allclose((found.root_mean_square[0] * 1e6) ** 2, 4.0, rtol=4 * np.sqrt(2 / 4096))
+    assert found.slope[0] == pytest.approx(found.per_micrometre[0]), "signs cancel: there is a mean of none"
+    np.testing.assert_allclose((found.slope[0] * 1e6) ** 2, 4.0, rtol=4 * np.sqrt(2 / 4096))
 
 
 def test_failed_units_are_counted_and_too_many_stop():

@@ -156,7 +156,7 @@ def test_the_first_sheet_has_the_answer(told, answer, folder):
         limit, verified, predicted, kept, differs = shown[side.stack.name]
         # All that may fail do so above; below is the quantile of half of them.
         own_share = np.quantile(answer.chosen.outputs[GAP], 0.9973 if side.sign > 0 else 0.00135)
-        assert (limit, verified, kept) == (side.limit, pytest.approx(side.own), "yes")
+        assert (limit, verified, kept) == (side.limit, pytest.approx(side.value), "yes")
         assert verified == pytest.approx(own_share, abs=0.003), "a side's own quantile, not the mirror of the other's"
         assert predicted == pytest.approx(verified, abs=1e-3)
         assert differs == (pytest.approx(off) if answer.model_range.designs else None)

@@ -149,7 +149,7 @@ def test_the_least_level_is_too_high_in_no_more_samples_than_the_stated_error(gu
         sample = LimitedSample(
             values=generator.standard_normal(1000), units=SolvedUnits.all_of(1000), limits=Limits(upper=2.0)
         )
-        (least,), (shown,) = guarantee.least_bounds(sample, 0.95), guarantee.bounds(sample, 0.95)
+        (least,), (shown,) = guarantee.counted_bounds(sample, 0.05), guarantee.bounds(sample, 0.95)
         assert least.value < shown.value
         above += least.value > true
     assert above / 600 < 0.05 + 3 * 0.009
@@ -200,7 +200,7 @@ def test_units_that_leave_the_law_move_the_level_outwards():
             leaving=leaving,
         )
         most = beta.ppf(0.95, leaving + 1, 10_000 - leaving)
-        (shown,), (least,) = AtYield(0.98).bounds(sample, 0.95), AtYield(0.98).least_bounds(sample, 0.95)
+        (shown,), (least,) = AtYield(0.98).bounds(sample, 0.95), AtYield(0.98).counted_bounds(sample, 0.05)
         assert shown.value == pytest.approx(deviation * norm.isf(0.02 - most), rel=1e-6)
         assert least.value == pytest.approx(deviation * norm.isf(0.02 + most), rel=1e-6)
 

@@ -46,7 +46,7 @@ def test_remarks_speak_of_the_modification_in_force(model, clearances):
 def test_a_modification_beyond_the_catalogue_is_a_caution_of_its_settings_alone(model):
     inside, beyond = (portrait_of(model).cautions(np.array(own)) for own in ((1.04, 8.0), (8.0, 20.0)))
     assert not any("lost motion" in own for own in inside)
-    assert any("lost motion" in own and " 1.8′ " in own for own in beyond)
+    assert any("lost motion" in own and " 1.8′" in own for own in beyond)
 
 
 def test_a_check_of_a_design_speaks_of_its_clearances(model):

@@ -8,7 +8,7 @@ from math import cos
 import numpy as np
 import pytest
 
-from tests.builders import reducer_file, unit_with
+from tests.builders import LINEAR_STAGE, reducer_file, unit_with
 from tests.random_cases import random_case, seeds
 from tests.verification.dense_twin import dense_equilibrium
 from tolalloc.reading.units import ARCSECOND
@@ -150,7 +150,7 @@ def named(model: EquivalentModel, errors: np.ndarray, angles: int | None = None)
 
 def test_orders_of_a_single_stage_are_those_of_its_pins_and_output_pins():
     """8 output pins meet 30 pins 240 times, 29 teeth 870 times: all else are sums of both, multiples of 30."""
-    model = EquivalentModel(load_reducer("cd29"))
+    model = EquivalentModel(load_reducer(LINEAR_STAGE))
     found = named(model, exact_unit(model))
     assert list(found)[:5] == [240, 480, 870, 720, 960]
     assert list(found.values())[:2] == pytest.approx([1.485, 0.351], abs=5e-4)

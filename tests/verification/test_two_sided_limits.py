@@ -65,10 +65,9 @@ def told(design: VerifiedDesign) -> dict[str, dict[int, float]]:
     """Return output → side → what is told beside the limit, which the units' own quantile is too."""
     found: dict[str, dict[int, float]] = {}
     for check, side in design.limited_sides:
-        found.setdefault(check.requirement.output, {})[side.sign] = side.own
+        found.setdefault(check.requirement.output, {})[side.sign] = side.value
         spread = np.ptp(np.quantile(design.outputs[check.requirement.output], [0.001, 0.999]))
-        assert unit_quantile(design, check, side) == pytest.approx(side.own, abs=0.02 * spread)
-        assert side.slack == pytest.approx(side.sign * (side.limit - side.own))
+        assert unit_quantile(design, check, side) == pytest.approx(side.value, abs=0.02 * spread)
     return found
 
 
@@ -163,7 +162,7 @@ def test_an_index_is_that_of_each_side():
     limit = ta.Limit(lower=0.3, upper=0.7, show=ta.AtCpk(1.33))
     [check] = as_drawn(study(limits={GAP: limit})).checks
     for side in check.constraints:
-        assert side.own == side.value == pytest.approx(MEAN + side.sign * 3 * 1.33 * DEVIATION, abs=2e-3)
+        assert side.value == pytest.approx(MEAN + side.sign * 3 * 1.33 * DEVIATION, abs=2e-3)
         # No other limit's units: the slope by a common scale of all zones is 3·1.33·σ.
         scale = side.stack.zone_slopes(np.ones(4)) @ np.ones(4)
         assert scale == pytest.approx(3 * 1.33 * DEVIATION, rel=0.02)
@@ -254,3 +253,72 @@ def test_every_design_tried_says_which_units_judged_it(answer):
     assert last["cost [cost units]"] == answer.result.cost
     of_search = table[table["judged on"] == "units of its search"]
     assert len(of_search) == len(table) - 1 > 0
+
+
+def centred(start: float, limits: ta.Limit, others: dict[str, ta.Limit] | None = None, **changed):
+    """Return the quick allocation of two sizes and a setting that moves their difference."""
+    row = {"unit": "mm", "min": 0.001, "max": 2.0, "cost": 1, "plus": 0.1, "minus": -0.1}
+    setting = ta.Setting(name="press [mm]", value=start, lower=-1.0, upper=1.0, step=0.001)
+    outputs = (GAP, *(others or {}))
+    made = ta.Study(
+        ta.model(
+            (lambda a, b, press: (a - b + press, 1.0 * a)) if others else (lambda a, b, press: a - b + press),
+            inputs=("a", "b"),
+            outputs=outputs,
+            settings=(setting,),
+        ),
+        ta.Drawing.of_rows([{"id": "a", "nominal": 10.56, **row}, {"id": "b", "nominal": 10.0, **row}]),
+        limits={GAP: limits, **(others or {})},
+        questions=[ta.Allocation(front=False, what_if=False)],
+        name="centred",
+        **changed,
+    )
+    return made.allocate("quick").result
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("start", "lower", "upper"), [(0.0, 0.3, 0.7), (0.1, 0.3, 0.7), (0.0, 0.2, 1.4), (-0.1, 0.3, 0.7)]
+)
+def test_a_setting_moves_the_mean_to_the_middle_of_the_limits(start, lower, upper):
+    """There σ = z·√2/6 has 3.00 times its size to either side, and two zones of z cost 0.4/z."""
+    zone = 6 * (upper - lower) / 2 / -norm.ppf(SHARE / 2) / np.sqrt(2)
+    found = centred(start, ta.Limit(lower=lower, upper=upper))
+    assert found.met
+    assert found.cost == pytest.approx(0.4 / zone, rel=3e-3)
+    assert found.chosen.settings[0] == pytest.approx((lower + upper) / 2 - 0.56, abs=2e-3)
+    assert found.bound <= 0.4 / zone
+
+
+@pytest.mark.slow
+def test_so_it_does_beside_another_limit():
+    """a ≤ 11 is missed by no unit, so that the gap may fail as often as both together."""
+    zone = 6 * 0.2 / -norm.ppf(SHARE / 2) / np.sqrt(2)
+    found = centred(0.0, ta.Limit(lower=0.3, upper=0.7), {"a [mm]": ta.Limit(upper=14.0)})
+    assert found.met
+    assert found.cost == pytest.approx(0.4 / zone, rel=0.02)
+    rows = {row.limit: row for row in today_table(found, "cost units").rows if row.limit}
+    assert rows["≥ 0.3"].before == pytest.approx(norm.ppf(SHARE / 2, 0.56, 0.1 * np.sqrt(2) / 3), abs=2e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("start", [0.0, -0.1])
+def test_so_it_does_where_the_output_bends(start):
+    """y = (a − b + press)³ keeps 1.3³ and 1.7³ just where its root keeps 1.3 and 1.7."""
+    row = {"unit": "mm", "min": 0.001, "max": 2.0, "cost": 1, "plus": 0.1, "minus": -0.1}
+    made = ta.Study(
+        ta.model(
+            lambda a, b, press: (a - b + press) ** 3,
+            inputs=("a", "b"),
+            outputs=(GAP,),
+            settings=(ta.Setting(name="press [mm]", value=start, lower=-1.0, upper=1.0, step=0.001),),
+        ),
+        ta.Drawing.of_rows([{"id": "a", "nominal": 11.56, **row}, {"id": "b", "nominal": 10.0, **row}]),
+        limits={GAP: ta.Limit(lower=1.3**3, upper=1.7**3)},
+        questions=[ta.Allocation(front=False, what_if=False)],
+        name="bent",
+    )
+    found = made.allocate("quick").result
+    zone = 6 * 0.2 / -norm.ppf(SHARE / 2) / np.sqrt(2)
+    assert found.met
+    assert found.cost == pytest.approx(0.4 / zone, rel=0.02)

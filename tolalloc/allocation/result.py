@@ -22,8 +22,8 @@ from tolalloc.allocation.space.output_sample import LimitedSample
 from tolalloc.allocation.space.problem import OneSidedConstraint, Solution
 from tolalloc.allocation.space.requirement import AtYield, Check, Requirement
 from tolalloc.allocation.verify.verification import VerifiedDesign
-from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import KeptLimits, Yield
+from tolalloc.capability.near_limit import SolvedUnits
 from tolalloc.drawings.compensators import Compensator
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.sources import Source
@@ -346,15 +346,10 @@ def unit_quantile(design: VerifiedDesign, check: Check, side: OneSidedConstraint
     side
         One of its limits: of two, half of the units beyond are left to it, or as many as lie there if these are more.
 
-    Returns
-    -------
-    float
-        Not a number unless the requirement is a yield.
-
     Notes
     -----
-    Order statistic y₍ₖ₎, k = ⌈target·units⌉ (Hahn & Meeker 1991, Statistical Intervals), of
-    1/(1 − target) units or more.
+    What the units show at even odds (Hahn & Meeker 1991, Statistical Intervals); not a number unless a yield is asked
+    for.
 
     Examples
     --------
@@ -366,19 +361,10 @@ def unit_quantile(design: VerifiedDesign, check: Check, side: OneSidedConstraint
     >>> round(unit_quantile(design, design.checks[0], *design.checks[0].constraints), 1)
     1.8
     """
-    asked, guarantee, tested = check.requirement, check.requirement.guarantee, design.independent
-    if not isinstance(guarantee, AtYield):
+    asked, tested = check.requirement, design.independent
+    if not isinstance(asked.guarantee, AtYield):
         return float("nan")
-    units = tested.units if tested and not tested.units.near.all() else None
-    values = asked.read(tested.outputs if tested and units else design.outputs)
-
-    def beyond(limits: Limits, target: float) -> float:
-        excess = LimitedSample.all_of(values, limits).excess
-        if units:
-            return units.kept_excess(excess, target, 0.5)
-        return float(np.sort(excess)[int(np.ceil(target * excess.size)) - 1])
-
-    found = beyond(asked.limits, guarantee.target)
-    if asked.limits.width is not None:
-        found = min(found, beyond(asked.limits.side(side.sign), (1 + guarantee.target) / 2))
-    return float(side.limit + side.sign * found)
+    values = asked.read(tested.outputs if tested else design.outputs)
+    units = tested.units if tested else SolvedUnits.all_of(values.size)
+    sample = LimitedSample(values=values, units=units, limits=asked.limits)
+    return next(own.value for own in asked.guarantee.bounds(sample, 0.5) if own.sign == side.sign)

@@ -38,6 +38,10 @@ class Limits:
         lower: tuple[tuple[Literal[1, -1], float], ...] = () if self.lower is None else ((-1, self.lower),)
         return (*upper, *lower)
 
+    def excess(self, values: Float[np.ndarray, " unit"]) -> Float[np.ndarray, "side unit"]:
+        """Return how far values lie beyond each limit, negative inside [unit of the characteristic]."""
+        return np.stack([sign * (values - limit) for sign, limit in self.turned])
+
     def side(self, sign: int) -> Limits:
         """Return the limit of one side, the upper one for 1."""
         return Limits(upper=self.upper) if sign > 0 else Limits(lower=self.lower)

@@ -177,13 +177,13 @@ class LinearLaw:
         )
         return float(found)
 
-    def parts(self, limits: Limits, by: float) -> list[float]:
-        """Return by which part of its own change each limit moves an excess, the upper one first [-].
+    def upper_part(self, limits: Limits, by: float) -> float:
+        """Return by which part of its own change the upper of two limits moves `excess`, the lower one by the rest [-].
 
-        ∂e/∂limit = f(limit + e)/Σ f with the density f there: of two limits all for the one near which units lie.
+        ∂e/∂limit = f(limit + e)/Σ f with the density f there (own derivation).
         """
-        densities = [self._at(limit + sign * by)[0] for sign, limit in limits.turned]
-        return [density / max(sum(densities), np.finfo(float).tiny) for density in densities]
+        upper, lower = (self._at(limit + sign * by)[0] for sign, limit in limits.turned)
+        return upper / max(upper + lower, np.finfo(float).tiny)
 
     def excess_by_zone(self, limits: Limits, by: float) -> Float[np.ndarray, " source"]:
         """Return the derivative of `excess` by the zones at a share that it has [unit of the output per m].

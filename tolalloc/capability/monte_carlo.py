@@ -287,7 +287,7 @@ class ProcessDoubt:
     ) -> Float[np.ndarray, " process"]:
         """Return how far beyond the limits a share of the units lies, process by process; by halving [output]."""
         (moved, wider), centre = moments, self.values.mean()
-        ends = [sign * (centre + moved - limit) for sign, limit in limits.turned]
+        ends = limits.excess(centre + moved)
         reach = wider * np.abs(self.values[[0, -1]] - centre).max()
         low, high = np.min(ends, axis=0) - reach, np.max(ends, axis=0) + reach
         for _ in range(_HALVINGS):
@@ -466,30 +466,20 @@ class OneSided:
     @property
     def limit(self) -> float:
         """Largest turned output allowed [output]."""
-        if self.limits.width is not None:
-            return self.limits.width
-        return -self.limits.lower if self.limits.upper is None and self.limits.lower is not None else self._upper
-
-    @property
-    def _upper(self) -> float:
-        assert self.limits.upper is not None
-        return self.limits.upper
+        (sign, limit), *_ = self.limits.turned
+        return self.limits.width or sign * limit
 
     def turned(self, values: Float[np.ndarray, "sample output"]) -> Float[np.ndarray, "sample output"]:
         """Return the outputs with the first one turned."""
-        lower, width = self.limits.lower, self.limits.width
-        if lower is None:
-            return values
-        first = (
-            -values[:, :1] if width is None else width + np.maximum(lower - values[:, :1], values[:, :1] - self._upper)
-        )
+        (sign, _), *_ = self.limits.turned
+        width, own = self.limits.width, values[:, :1]
+        first = width + self.limits.excess(own).max(axis=0) if width else sign * own
         return np.concatenate([first, values[:, 1:]], axis=1)
 
     def read(self, turned: float) -> float:
         """Return a turned output as a reader knows it: the output itself, or for two limits the distance beyond."""
-        if self.limits.width is not None:
-            return turned - self.limits.width
-        return turned if self.limits.lower is None else -turned
+        (sign, _), *_ = self.limits.turned
+        return turned - self.limits.width if self.limits.width else sign * turned
 
     def facing(self, response: Response) -> Response:
         """Return another response of the same output, turned alike; itself for an upper limit."""
@@ -606,11 +596,10 @@ def largest_excess(
     [-1.5, 0.5]
     """
     found = [
-        sign * (values[name] - limit) / (float(values[name][np.isfinite(values[name])].std()) or 1.0)
+        own.excess(values[name]) / (float(values[name][np.isfinite(values[name])].std()) or 1.0)
         for name, own in limits.items()
-        for sign, limit in own.turned
     ]
-    return np.asarray(np.max(found, axis=0))
+    return np.asarray(np.concatenate(found).max(axis=0))
 
 
 def kept_at_once(

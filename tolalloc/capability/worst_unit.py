@@ -153,17 +153,8 @@ def _result(experiment: Experiment[ResponseWithDerivatives], sense: int, worst: 
 def _extreme_in_zone(
     source: Source, units: Float[np.ndarray, "unit column"], gradients: Float[np.ndarray, "unit column"]
 ) -> Float[np.ndarray, "unit column"]:
-    """Return, for every unit, the part inside the zone that goes furthest along a gradient.
+    """Return, for every unit, the part inside the zone that goes furthest along a gradient, waves from the units' own.
 
-    Parameters
-    ----------
-    units
-        Its columns now, from which waves are searched [-].
-    gradients
-        Derivatives of an output by these columns [output].
-
-    Notes
-    -----
     Exact for sizes and positions. Waves keep the relative amplitudes of the spectrum, and how large all of them may be
     follows from their phases by the range over a turn; the phases are searched one at a time and together, as if the
     part were turned, from those of the unit or of the gradient, whichever is the better start.

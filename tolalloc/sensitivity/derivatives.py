@@ -28,15 +28,10 @@ class LocalDerivatives:
 
     sources: tuple[str, ...]  # Names of the sources that a drawing limits, in the order of all arrays
     slope: Float[np.ndarray, " source"]  # `mean_slope` over random units, “Sens” on every page [output/µm]
-    # Root mean square of the gradient's length over random units [output/µm]
-    root_mean_square: Float[np.ndarray, " source"]
     # Root mean square change of the output, to first order, by the errors that a source's zone lets through [output]
     by_zone: Float[np.ndarray, " source"]
     # The same by an error of one of its features, in its own directions and waves, per micrometre [output/µm]
     per_micrometre: Float[np.ndarray, " source"]
-    # Good random units, and those without a usable answer [-]
-    units: int
-    failed: int
 
     def of_line(self, members: Sequence[str]) -> LineDerivatives:
         """Return what all places of one line of a drawing do, whose errors are independent of each other.
@@ -45,15 +40,12 @@ class LocalDerivatives:
 
         Examples
         --------
-        >>> one, two = np.ones(2), np.array([3.0, 4.0])
+        >>> two = np.array([3.0, 4.0])
         >>> own = LocalDerivatives(
         ...     sources=("a", "b"),
         ...     slope=np.array([-1.0, 1.0]),
-        ...     root_mean_square=one,
         ...     by_zone=two,
         ...     per_micrometre=two,
-        ...     units=1,
-        ...     failed=0,
         ... )
         >>> own.of_line(("a", "b")).by_zone, own.of_line(("a",)).slope
         (5.0, (-1.0, -1.0))
@@ -138,28 +130,24 @@ def local_derivatives(experiment: Experiment[ResponseWithDerivatives], units: in
     A sum in metres changes by 1e-6 m with a micrometre of either size.
 
     >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> local_derivatives(sum_of_sizes(6.0, 12.0), 64).root_mean_square.tolist()
+    >>> local_derivatives(sum_of_sizes(6.0, 12.0), 64).slope.tolist()
     [1e-06, 1e-06]
     """
     errors = experiment.errors
     sample, by_column, _ = _sampled(experiment, units)
-    where, slope, random = np.array(errors.source_of_column), [], []
+    where, slope = np.array(errors.source_of_column), []
     variance, mean_square = sample.x[sample.evaluation.good].var(axis=0), (by_column**2).mean(axis=0)
     by_zone, per_micrometre = [], []
     for source in errors.active:
         own, per_length = where == source.name, MICROMETRE / source.lever
         slope.append(mean_slope(by_column[:, own] * per_length))
-        random.append(float(np.sqrt(((by_column[:, own] * per_length) ** 2).sum(axis=1).mean())))
         by_zone.append(float(np.sqrt(mean_square[own] @ variance[own])))
         per_micrometre.append(by_zone[-1] / float(np.sqrt(variance[own].sum())) * per_length)
     return LocalDerivatives(
         sources=tuple(source.name for source in errors.active),
         slope=np.array(slope),
-        root_mean_square=np.array(random),
         by_zone=np.array(by_zone),
         per_micrometre=np.array(per_micrometre),
-        units=by_column.shape[0],
-        failed=sample.failed,
     )
 
 

@@ -278,7 +278,7 @@ class Clearance(NamedTuple):
 
     pin_angle: Float[np.ndarray, " angle"]  # Angle of the pins from the crank direction [rad]
     gap: Float[np.ndarray, " angle"]  # After the disc has turned until the first pin touches [m]
-    free_rotation: float  # Of the disc on its pins alone, from one side to the other [rad]
+    backlash: float  # Of the whole reducer at its output, from one side to the other, gaps linear [rad]
     radial: float  # At tip and root [m]
 
 
@@ -299,14 +299,15 @@ def clearance(reducer: Reducer) -> Clearance:
     The shift −25 µm less the equidistant amount −17 µm leave 8 µm at tip and root:
 
     >>> found = clearance(reducer("rv20e_liu2020"))
-    >>> round(found.radial * 1e6, 3), round(found.free_rotation * 206264.8, 1)  # [µm, ″]
-    (8.0, 12.2)
+    >>> round(found.radial * 1e6, 3), round(found.backlash * 206264.8, 1)  # [µm, ″]
+    (8.0, 12.0)
     """
     from tolalloc.reducers.cycloid.clearance import clearance_of
     from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
+    from tolalloc.reducers.equivalent.perfect import exact_loop
 
     found = clearance_of(ToothProfile.of(reducer))
-    return Clearance(found.pin_angle, found.after, found.free_rotation, found.radial)
+    return Clearance(found.pin_angle, found.after, float(exact_loop(reducer).backlash[0]), found.radial)
 
 
 def radial_clearance(reducer: Reducer, deviations: Deviations) -> Float[np.ndarray, " sample"]:

@@ -264,8 +264,10 @@ def _weaker(design: VerifiedDesign) -> list[tuple[int, OneSidedConstraint, Stack
         bounds: tuple[QuantileBound, ...] = ()
         if isinstance(check.requirement.guarantee, Sampled):
             confidence = 1 - (1 - CONFIDENCE) / (2 * constraints)  # the other half is that of the derivatives
-            bounds = check.requirement.guarantee.least_bounds(_sample(design, check), confidence)
+            bounds = check.requirement.guarantee.counted_bounds(_sample(design, check), 1 - confidence)
         for at, constraint in enumerate(check.constraints):
+            if constraint.law and constraint is not max(check.constraints, key=lambda side: side.excess):
+                continue  # what decides says all: the other side's own quantile is not asked for
             excess = bounds[at].excess if bounds else constraint.excess
             if np.isfinite(excess):
                 load = float(constraint.stack.load(design.scales, design.settings))

@@ -370,7 +370,11 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
             tried[-1] = _divided(programs, tried, processes, reach)
         last = tried[-1]
         verifier = verifier.dividing_as(last)
-        found, _ = programs.step(aimed(last, tried), processes, last.design, reach)
+        goal = aimed(last, tried)
+        if step >= steps:
+            missed = (max(side.excess, 0.0) for side in last.constraints)
+            goal = tuple(replace(stack, budget=stack.budget - by) for stack, by in zip(goal, missed, strict=True))
+        found, _ = programs.step(goal, processes, last.design, reach)
         settled = space.cost(found) > (1 - SETTLED) * last.cost if last.met else np.allclose(found, last.design)
         if step > 0 and settled:
             break
@@ -489,13 +493,13 @@ class ZoneAllocation:
         for constraint, price in zip(self.chosen.constraints, self.optimum.prices, strict=True):
             found[constraint.stack.name] = found.get(constraint.stack.name, 0.0) + float(price)
         for check in self.chosen.checks:
-            # Two limits of a law move by one excess: which of them takes its price is known of its density alone.
+            # Two limits of a law share the price of the excess beyond both as units lie near them.
             sides, asked = check.steering, check.requirement
             if isinstance(asked.guarantee, AtYield) and len(sides) > 1 and sides[0].law:
-                names = [side.stack.name for side in sides]
-                parts = sides[0].law.parts(asked.limits, sides[0].excess)
-                price = sum(found[name] for name in names)
-                found |= {name: price * part for name, part in zip(names, parts, strict=True)}
+                decides = max(sides, key=lambda side: side.excess)
+                price, upper = found.pop(decides.stack.name), sides[0].law.upper_part(asked.limits, decides.excess)
+                for side, part in zip(sides, (upper, 1.0 - upper), strict=True):
+                    found[side.stack.name] = found.get(side.stack.name, 0.0) + price * part
         return found
 
     @property
@@ -528,20 +532,7 @@ def require_groups(space: DesignSpace, place: str) -> None:
 def _cheapest_by_models(
     space: DesignSpace, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margin: float
 ) -> Solution:
-    """Return the cheapest design that the models of a verified one let keep the limits.
-
-    Parameters
-    ----------
-    tried
-        All designs of its search.
-    margin
-        How far inside the limits, as far as the verified design itself is [standard errors].
-
-    Raises
-    ------
-    SolveError
-        The program does not even find the design itself.
-    """
+    """Return the cheapest design that the models of a verified one let keep the limits, as far inside as it is."""
     # A load that is its own budget may lie beyond it by rounding.
     kept = kept_stacks(chosen, tried, margin)
     stacks = tuple(replace(stack, budget=stack.budget + 1e-9 * abs(stack.budget)) for stack in kept)

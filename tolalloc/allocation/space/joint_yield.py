@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 
 from tolalloc.allocation.space.output_sample import Control, DesignSample, LimitedSample, OutputSample, Surprises
 from tolalloc.allocation.space.problem import OneSidedConstraint, Stack
-from tolalloc.allocation.space.requirement import AtYield, Check, QuantileBound, Requirement, bounds_of_law
+from tolalloc.allocation.space.requirement import AtYield, Check, QuantileBound, Requirement
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.linear_function import LinearLaw, NearPlane
 from tolalloc.capability.near_limit import largest_first
@@ -175,13 +175,12 @@ class Tail:
         from scipy.stats import norm
 
         limits, law = sample.limits, sample.law
+        bounds = AtYield(1 - share).bounds(sample, _EVEN_ODDS)
         if law:
-            bounds = bounds_of_law(sample, law, share)
             scores = norm.isf(share / _NARROWER) - norm.isf(share)
-            slope = max(law.excess(limits, share / _NARROWER) - bounds[0].excess, 0.0) / float(scores)
+            slope = max(law.excess(limits, share / _NARROWER) - law.excess(limits, share), 0.0) / float(scores)
             error = bounds[0].standard_error
             return cls(share=share, limits=limits, bounds=bounds, slope=slope, error=error, law=law)
-        bounds = AtYield(1 - share).bounds(sample, _EVEN_ODDS)
         slope = _slope(sample, min(_WIDER * share, _WIDEST))
         counted = slope * share / norm.pdf(norm.isf(share)) / np.sqrt(share * sample.units.drawn.units)
         error = max(own.standard_error for own in bounds)

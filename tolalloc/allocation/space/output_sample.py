@@ -222,7 +222,7 @@ class LimitedSample:
     @property
     def excess(self) -> Float[np.ndarray, " solved"]:
         """How far every unit lies beyond the limits, negative inside, infinite without a value [unit of the output]."""
-        found = np.max([sign * (self.values - limit) for sign, limit in self.limits.turned], axis=0)
+        found = self.limits.excess(self.values).max(axis=0)
         return np.where(np.isfinite(found), found, np.inf)
 
     @property

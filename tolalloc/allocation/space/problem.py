@@ -256,18 +256,6 @@ class OneSidedConstraint:
     # Derivative of the excess by every variable, by batches of units that tell its error; none where it has no error
     batches: Float[np.ndarray, "batch variable"] | None = None
     law: LinearLaw | None = None  # Law of the output, where it is linear: the model's derivatives are its own
-    # By how much the side's own quantile lies further inside than what decides, where two limits share the failures
-    inside: float = 0.0  # [unit of the output]
-
-    @property
-    def own(self) -> float:
-        """What of this side alone is told beside the limit: its own quantile [unit of the output]."""
-        return self.value - self.sign * self.inside
-
-    @property
-    def slack(self) -> float:
-        """What is left from that to the limit, negative beyond it [unit of the output]."""
-        return self.inside - self.excess
 
     @property
     def excess(self) -> float:

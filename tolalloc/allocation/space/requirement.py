@@ -25,6 +25,9 @@ _BATCHES = 16
 """Batches of units whose derivatives tell the error of their mean [-]."""
 
 
+_EVEN_ODDS = 0.5
+_FEWEST = 16
+"""Units around an excess that tell which limit they lie near, and as many as lie beyond it, twice [-]."""
 _SURROUNDED, _SURROUNDING = 4, 4000
 """Of so many times what lies beyond a rank, and so many more values, the rank of a resample is one, surely [-]."""
 _ACCURACY = 1e-6
@@ -39,7 +42,6 @@ class QuantileBound:
     limit: float  # The limit [unit of the output]
     value: float  # What is compared with the limit, infinite where too few units answered [unit of the output]
     standard_error: float  # Standard error of the value [unit of the output]
-    inside: float = 0.0  # `OneSidedConstraint.inside` [unit of the output]
 
     def further(self, by: float) -> QuantileBound:
         """Return the bound with a value that lies further out [unit of the output]."""
@@ -58,23 +60,8 @@ class QuantileBound:
 def _order_statistic(sample: LimitedSample, sign: Literal[1, -1], limit: float, beyond: float) -> QuantileBound:
     """Return the outermost value that is no further beyond a limit; beyond every limit where nothing is shown.
 
-    Parameters
-    ----------
-    sample
-        The units with their limits.
-    sign, limit
-        1 for an upper limit, −1 for a lower one [-], and the limit [unit of the output].
-    beyond
-        How far the unit lies beyond its limit that the guarantee's share of rejects just leaves in [unit of the
-        output], infinite where the units are too few.
-
-    Notes
-    -----
     A one-sided confidence bound on a quantile is an order statistic: of n units the k-th largest, with k the most
-    rejects for which P(rejects ≤ k | share rejected) is at most one minus the confidence (binomial distribution).
-
-    References
-    ----------
+    rejects for which P(rejects ≤ k | share rejected) is at most one minus the confidence (binomial distribution):
     C. J. Clopper, E. S. Pearson, Biometrika 26 (1934) 404–413; G. J. Hahn, W. Q. Meeker, Statistical Intervals (1991).
 
     Examples
@@ -145,21 +132,8 @@ def bounds_of_law(sample: LimitedSample, law: LinearLaw, beyond: float) -> tuple
 def _order_statistic_error(
     outermost: Float[np.ndarray, " unit"], stand_for: Float[np.ndarray, " unit"], further: int, drawn: float
 ) -> float:
-    """Return the standard error of the value that so many lie further beyond than [unit of the output].
+    """Return the standard error of the value that so many of the outermost ones lie further beyond than [unit of it].
 
-    Parameters
-    ----------
-    outermost
-        The outermost values, the furthest first [unit of the output].
-    stand_for
-        How many units each of them stands for [-].
-    further
-        How many of them lie further beyond [-].
-    drawn
-        What all units stand for [-].
-
-    Notes
-    -----
     Exact bootstrap: the rank's value of a resample is that of unit i with a probability of the incomplete beta function
     (Maritz & Jarrett 1978). Where units stand for different numbers of others, it is that of as many equal units as
     have the variance of those beyond the rank.
@@ -211,8 +185,8 @@ class Sampled(Guarantee, Protocol):
         """Return what units show of every limit with one-sided confidence, the upper one first."""
         ...
 
-    def least_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
-        """Return the other end of `bounds`: the least that is compared with every limit, with one-sided confidence."""
+    def counted_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
+        """Return the same of what units show without doubt of their processes; below even odds what it is at least."""
         ...
 
 
@@ -287,33 +261,29 @@ class AtYield(NamedFields):
     def bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what units show of every limit, or what its law does where they keep to it."""
         margin = sample.doubt.margin(sample.limits, 1 - self.target) if sample.doubt else 0.0
-        found = tuple(bound.further(margin) for bound in self._counted_bounds(sample, confidence))
+        found = tuple(bound.further(margin) for bound in self.counted_bounds(sample, confidence))
         if len(found) == 1:
             return found
         half = AtYield((1 + self.target) / 2)
-        alone = [half.bounds(sample.side(own.sign), confidence)[0].excess for own in found]
-        inside = (
-            own.excess - min(own.excess, by) if np.isfinite(own.excess) else 0.0
-            for own, by in zip(found, alone, strict=True)
+        alone = tuple(half.bounds(sample.side(own.sign), confidence)[0] for own in found)
+        excess, furthest = max(own.excess for own in found), max(own.excess for own in alone)
+        return tuple(
+            replace(own, value=own.limit + own.sign * excess)
+            if other.excess == furthest
+            else min(own, other, key=lambda bound: bound.excess)
+            for own, other in zip(found, alone, strict=True)
         )
-        return tuple(replace(own, inside=by) for own, by in zip(found, inside, strict=True))
 
-    def _counted_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
-        """Return what units show of processes that are as their measured parts say."""
+    def counted_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
+        """Return what units show of every limit, of processes that are as their measured parts say."""
+        share, one_sided, units = 1 - self.target, max(confidence, 1 - confidence), sample.units
         if sample.law:
-            return bounds_of_law(sample, sample.law, 1 - self.target - sample.most_leaving(confidence))
+            leaving = sample.most_leaving(one_sided)
+            return bounds_of_law(sample, sample.law, share - leaving if confidence >= _EVEN_ODDS else share + leaving)
         if sample.controls:
-            return _controlled_bounds(sample, 1 - self.target, confidence)
-        beyond = sample.units.kept_excess(sample.excess, self.target, confidence)
-        return tuple(_order_statistic(sample, sign, limit, beyond) for sign, limit in sample.limits.turned)
-
-    def least_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
-        """Return what is compared with every limit at its least."""
-        if sample.law:
-            return bounds_of_law(sample, sample.law, 1 - self.target + sample.most_leaving(confidence))
-        if sample.controls:
-            return _controlled_bounds(sample, 1 - self.target, 1 - confidence)
-        beyond = sample.units.least_excess(sample.excess, self.target, confidence)
+            return _controlled_bounds(sample, share, confidence)
+        read = units.kept_excess if confidence >= _EVEN_ODDS else units.least_excess
+        beyond = read(sample.excess, self.target, one_sided)
         return tuple(_order_statistic(sample, sign, limit, beyond) for sign, limit in sample.limits.turned)
 
 
@@ -372,20 +342,16 @@ class AtCpk(NamedFields):
     def constraints(self, sample: OutputSample, limits: Limits) -> tuple[OneSidedConstraint, ...]:
         """Return every one-sided constraint, the upper one first."""
         bounds = self.bounds(sample.limited(limits), sample.confidence)
-        return tuple(_spread_constraint(sample, own, limits.side(own.sign)) for own in bounds)
+        return tuple(spread_constraints(sample, (own,), limits.side(own.sign))[0] for own in bounds)
 
     def bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what units show of every limit."""
-        found = self._counted_bounds(sample, confidence)
+        found = self.counted_bounds(sample, confidence)
         if sample.doubt is None:
             return found
         return tuple(own.further(sample.doubt.margin_of_spread(own.sign, 3 * self.target)) for own in found)
 
-    def least_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
-        """Return what is compared with every limit at its least."""
-        return self._counted_bounds(sample, 1 - confidence)
-
-    def _counted_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
+    def counted_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what units show of processes that are as their measured parts say."""
         return tuple(self._bound(sample.plain, sign, limit, confidence) for sign, limit in sample.limits.turned)
 
@@ -419,14 +385,23 @@ class AtCpk(NamedFields):
 def spread_constraints(
     sample: OutputSample, bounds: tuple[QuantileBound, ...], limits: Limits
 ) -> tuple[OneSidedConstraint, ...]:
-    """Return the constraints of what spreads at what is compared with the limits, each with its local model."""
-    return tuple(_spread_constraint(sample, bound, limits) for bound in bounds)
+    """Return the constraints of what spreads at what is compared with the limits, each with its local model.
+
+    Of a law the side that decides moves as the excess beyond both limits does, the other one as its own quantile.
+    """
+    furthest = max(bounds, key=lambda bound: bound.excess)
+    asked = (limits if bound is furthest else limits.side(bound.sign) for bound in bounds)
+    return tuple(_spread_constraint(sample, *own) for own in zip(bounds, asked, strict=True))
 
 
 def _spread_constraint(sample: OutputSample, bound: QuantileBound, limits: Limits) -> OneSidedConstraint:
     value, groups = bound.turned(sample.values), sample.groups
     excess, (known, derivative) = value - bound.sign * bound.limit, sample.derived()
-    weights = bound.sign * spread_weights(bound.sign * sample.values, bound.sign * known, value)
+    weights = np.zeros(known.size)
+    own = _part(sample, bound.sign, limits, excess)
+    for sign, limit in limits.turned:
+        part, at = (own, value) if sign == bound.sign else (1.0 - own, sign * limit + excess)
+        weights += part * sign * spread_weights(sign * sample.values, sign * known, at)
     gradient, batches = weights @ derivative / weights.size, _batches(weights, derivative)
     if sample.law:
         gradient[:groups] = sample.units.space.by_scale(sample.law.excess_by_zone(limits, excess))
@@ -436,12 +411,27 @@ def _spread_constraint(sample: OutputSample, bound: QuantileBound, limits: Limit
         limit=bound.limit,
         value=bound.value,
         standard_error=bound.standard_error,
-        inside=bound.inside,
         scale=_scale_of(sample, bound.limit),
         stack=root_sum_square_stack(_name_of(sample, bound.sign), sample.design, excess, gradient, groups),
         batches=batches,
         law=sample.law,
     )
+
+
+def _part(sample: OutputSample, sign: int, limits: Limits, excess: float) -> float:
+    """Return by which part of its change the side that decides moves an excess, as the units around it lie [-].
+
+    No less than a half: with less a setting would go towards the limit that decides, and nothing would hold it.
+    """
+    if limits.width is None:
+        return 1.0
+    if sample.law:
+        upper = sample.law.upper_part(limits, excess)
+    else:
+        beyond = limits.excess(sample.values)
+        near = largest_first(beyond.max(axis=0), 2 * int(np.count_nonzero(beyond > excess)) + _FEWEST)
+        upper = float(np.mean(beyond[0, near] >= beyond[1, near]))
+    return max(upper if sign > 0 else 1.0 - upper, _EVEN_ODDS)
 
 
 def spread_weights(

@@ -416,7 +416,7 @@ def _moved(
     """Return a constraint at another value, its model with the same slopes through it."""
     load = float(constraint.stack.load(design.scales, design.settings))
     stack = replace(constraint.stack, budget=load - (turned - bound.sign * bound.limit))
-    return replace(constraint, value=bound.value, standard_error=bound.standard_error, inside=bound.inside, stack=stack)
+    return replace(constraint, value=bound.value, standard_error=bound.standard_error, stack=stack)
 
 
 def _is_hopeless(design: VerifiedDesign) -> bool:

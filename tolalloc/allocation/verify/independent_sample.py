@@ -69,7 +69,7 @@ class Screen:
         """
         if not all(isinstance(own.guarantee, AtYield) for own in requirements):
             return None
-        excess = np.concatenate([_excesses(own, outputs) for own in requirements], axis=1)
+        excess = np.concatenate([own.limits.excess(own.read(outputs)) for own in requirements]).T
         known = np.isfinite(excess).all(axis=1)
         learnt = int(_LEARNT * np.count_nonzero(known))
         if np.count_nonzero(known) - learnt < _FEWEST:
@@ -84,14 +84,6 @@ class Screen:
     def __call__(self, x: Float[np.ndarray, "unit column"]) -> Bool[np.ndarray, " unit"]:
         """Return which units are near a limit."""
         return np.asarray((self.excess(x) >= self.least).any(axis=1))
-
-
-def _excesses(
-    requirement: Requirement, outputs: Mapping[str, Float[np.ndarray, " unit"]]
-) -> Float[np.ndarray, "unit side"]:
-    """Return how far every unit lies beyond the limits, not a number where it has no answer."""
-    values = requirement.read(outputs)
-    return np.stack([sign * (values - limit) for sign, limit in requirement.limits.turned], axis=1)
 
 
 def _least_of_near(predicted: Float[np.ndarray, " held_out"], excess: Float[np.ndarray, " held_out"]) -> float:

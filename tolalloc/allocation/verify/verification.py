@@ -144,7 +144,7 @@ class VerifiedDesign:
     @property
     def quantile_bound(self) -> float:
         """What of the leading output is compared with its limit: at a yield, the smallest limit that is kept."""
-        return self.checks[0].constraints[0].own
+        return self.checks[0].constraints[0].value
 
     def shown_at(self, target: float) -> float:
         """Return the smallest upper limit of the leading output that the units show kept at another yield.

@@ -177,7 +177,7 @@ def turn_orders(
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> model = EquivalentModel(load_reducer("cd29"))
     >>> [(order, round(206264.8 * size, 2)) for order, size, _ in turn_orders(model, exact_unit(model), -1.0).main(2)]
-    [(240.0, 1.49), (480.0, 0.35)]
+    [(870.0, 0.23), (240.0, 0.11)]
     """
     turns, contact = model.reducer.closing_turns, max(model.reducer.contact_orders)
     first = _MULTIPLE * -(-min(angles or 4 * contact + 1, _MOST) // _MULTIPLE)

@@ -137,7 +137,7 @@ def _limits(
         rows.line(
             name,
             side.limit,
-            side.own if isfinite(side.own) else None,
+            side.value if isfinite(side.value) else None,
             _linked("D", at, predicted[name]),
             _linked("E", at, _kept(side.sign, side.limit, predicted[name])),
             off if isfinite(off) else None,

@@ -40,7 +40,7 @@ def requirements_table(result: AllocationResult) -> Table[_Limited]:
 
     def kept(label: str, design: VerifiedDesign) -> Column[_Limited]:
         header = f"kept: {label} [{unit}]"
-        return Column(header=header, value=lambda row: design.limited_sides[row[0]][1].own)
+        return Column(header=header, value=lambda row: design.limited_sides[row[0]][1].value)
 
     unit = " or ".join(dict.fromkeys(unit_of(own.output) for own in result.requirements))
     columns: list[Column[_Limited]] = [
@@ -56,11 +56,11 @@ def requirements_table(result: AllocationResult) -> Table[_Limited]:
             value=lambda row: 100 * result.chosen.yield_of(row[2].requirement, row[1].sign).estimate,
         ),
         *(kept(label, design) for label, design in designs(result).items()),
-        Column(header=f"slack [{unit}]", value=lambda row: row[1].slack),
+        Column(header=f"slack [{unit}]", value=lambda row: -row[1].excess),
         Column(header=f"standard error of it [{unit}]", value=lambda row: row[1].standard_error),
         Column(header="marginal price of the limit [{cost}]", value=lambda row: price(row)[0]),
         Column(header="for each", value=lambda row: price(row)[1]),
-        Column(header="OK", value=lambda row: "yes" if row[1].slack >= 0 else "no"),
+        Column(header="OK", value=lambda row: "yes" if row[1].excess <= 0 else "no"),
     ]
     rows = [(number, side, check) for number, (check, side) in enumerate(result.chosen.limited_sides)]
     return Table(name="requirements", columns=columns, rows=rows)
@@ -110,8 +110,8 @@ def today_table(result: AllocationResult, cost_unit: str) -> Table[_Compared]:
                 name=f"{portrait.display_name(asked.output)} [{unit_of(asked.output)}]",
                 shown="" if after.jointly else asked.guarantee.words,
                 limit=f"{'≤' if drawn.sign > 0 else '≥'} {drawn.limit:.4g}",
-                before=side.own,
-                after=drawn.own,
+                before=side.value,
+                after=drawn.value,
                 kept_before=100 * before.yield_of(check.requirement, side.sign).estimate,
                 kept_after=100 * share,
                 binds="yes" if uses else "",

@@ -246,15 +246,15 @@ def _requirements(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
             f"+SQRT(SUMPRODUCT((drawing!${spreads}${first}:${spreads}${last}*{scales})^2))"
         )
         rest = float(side.stack.slopes @ chosen.design[len(space.groups) :]) - side.stack.budget
-        rest -= float(side.relief @ chosen.scales) + side.inside
+        rest -= float(side.relief @ chosen.scales)
         upper, row = side.sign > 0, _FIRST + at
-        predicted = float(side.limit + side.sign * (side.predicted(chosen.design) - side.inside))
+        predicted = float(side.limit + side.sign * side.predicted(chosen.design))
         kept = "yes" if side.sign * predicted <= side.sign * side.limit else "no"
         watched.append(
             {
                 "what": side.stack.name,
                 "limit": side.limit,
-                "independent verification sample": side.own,
+                "independent verification sample": side.value,
                 "predicted for the zones": Formula(
                     f"=B{row}{'+' if upper else '-'}({load}+({number(rest)}))", predicted
                 ),

@@ -143,6 +143,7 @@ class ModificationTeller(Teller[ModificationResult]):
             "objective [µm]": best.objective / MICROMETRE,
             "status": best.status,
             "violation [µm]": best.violation / MICROMETRE,
+            "backlash [arcmin]": self._contact.play["backlash"],
             "contact": self._contact.summary,
             "warnings": list(self.warnings),
             "assumptions": list(self._unprinted),

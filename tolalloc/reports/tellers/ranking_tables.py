@@ -422,7 +422,6 @@ def measures_table(result: RankingResult) -> pd.DataFrame:
         "delta low 5 % [-]": (moments.sources, distance[0]),
         "delta high 95 % [-]": (moments.sources, distance[1]),
         f"Sens [{unit}/µm]": (local.sources, local.slope),
-        f"length of the gradient, root mean square [{unit}/µm]": (local.sources, local.root_mean_square),
         f"alone at its limit [{unit}]": (result.classical.sources, result.classical.alone),
     }
     if result.errors.compensators:  # a choice makes the output jump, and the inequality of the bound needs none
