@@ -154,10 +154,10 @@ def test_the_first_sheet_has_the_answer(told, answer, folder):
     shown = {row[0]: row[1:] for row in rows}
     for side, off in zip(answer.chosen.constraints, answer.model_range.off, strict=True):
         limit, verified, predicted, kept, differs = shown[side.stack.name]
-        # All that may fail do so above; below is the quantile of half of them.
-        own_share = np.quantile(answer.chosen.outputs[GAP], 0.9973 if side.sign > 0 else 0.00135)
+        # Between the quantiles of half and of all that may fail.
+        ends = np.quantile(side.sign * answer.chosen.outputs[GAP], [0.9973, 0.99865])
         assert (limit, verified, kept) == (side.limit, pytest.approx(side.value), "yes")
-        assert verified == pytest.approx(own_share, abs=0.003), "a side's own quantile, not the mirror of the other's"
+        assert ends[0] - 0.01 < side.sign * verified < ends[1] + 0.01, "not the mirror of what the other side reaches"
         assert predicted == pytest.approx(verified, abs=1e-3)
         assert differs == (pytest.approx(off) if answer.model_range.designs else None)
     cost = shown["cost [cost units]"]

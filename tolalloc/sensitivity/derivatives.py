@@ -123,7 +123,7 @@ def local_derivatives(experiment: Experiment[ResponseWithDerivatives], units: in
 
     An error has no steepest direction but its own: by a source's zone the output changes by √(Σ E[(∂y/∂xᵢ)²]·σᵢ²), and
     divided by √(Σ σᵢ²) by a micrometre of one of its features, which is the distance from the true position, or the
-    amplitude of a wave.
+    amplitude of a wave (own derivation).
 
     Examples
     --------

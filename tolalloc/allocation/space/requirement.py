@@ -439,7 +439,12 @@ def spread_weights(
 ) -> Float[np.ndarray, " known"]:
     """Return by what the derivatives of known units count in that of mean + spread·σ of all units, a value.
 
-    Theory page, equation (24); all alike where nothing varies.
+    1 + spread·(y − mean)/σ, theory page, equation (24) (own derivation); all alike where nothing varies.
+
+    Examples
+    --------
+    >>> spread_weights(np.array([-1.0, 1.0]), np.array([-2.0, 2.0]), 3.0).tolist()
+    [-2.0, 4.0]
     """
     spread = (value - values.mean()) / values.std() if values.std() > 0 else 0.0
     return np.asarray(1.0 + spread * (known - known.mean()) / (known.std() or 1.0))
