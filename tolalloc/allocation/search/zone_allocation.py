@@ -371,8 +371,9 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
         last = tried[-1]
         verifier = verifier.dividing_as(last)
         goal = aimed(last, tried)
-        if step >= steps:
-            missed = (max(side.excess, 0.0) for side in last.constraints)
+        if step >= steps:  # what mends one side of two limits takes from the other: aim further inside
+            sides = ((own.excess, len(check.steering) > 1) for check in last.checks for own in check.steering)
+            missed = (by if two and 0.0 < by < np.inf else 0.0 for by, two in sides)
             goal = tuple(replace(stack, budget=stack.budget - by) for stack, by in zip(goal, missed, strict=True))
         found, _ = programs.step(goal, processes, last.design, reach)
         settled = space.cost(found) > (1 - SETTLED) * last.cost if last.met else np.allclose(found, last.design)
