@@ -38,7 +38,7 @@ class Limits:
         lower: tuple[tuple[Literal[1, -1], float], ...] = () if self.lower is None else ((-1, self.lower),)
         return (*upper, *lower)
 
-    def excess(self, values: Float[np.ndarray, " unit"]) -> Float[np.ndarray, "side unit"]:
+    def excess(self, values: Float[np.ndarray, "*unit"]) -> Float[np.ndarray, "side *unit"]:
         """Return how far values lie beyond each limit, negative inside [unit of the characteristic]."""
         return np.stack([sign * (values - limit) for sign, limit in self.turned])
 

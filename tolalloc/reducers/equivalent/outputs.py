@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from math import gcd
 
 import numpy as np
-from jaxtyping import Complex, Float, Integer
+from jaxtyping import Complex, Float, Integer, Real
 
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import ARCSECOND
@@ -135,7 +135,7 @@ def _waves(
 
 
 def fitted_waves(
-    angle: Float[np.ndarray, " angle"], curve: Float[np.ndarray, "row angle"], order: Float[np.ndarray, " order"]
+    angle: Float[np.ndarray, " angle"], curve: Float[np.ndarray, "row angle"], order: Real[np.ndarray, " order"]
 ) -> Complex[np.ndarray, "row order"]:
     """Return orders of curves, cosine less i times sine amplitudes, by least squares: at any angles, of open turns too.
 
