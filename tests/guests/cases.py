@@ -285,7 +285,7 @@ REDUCERS = (
     Guest(
         name="cobot_cd29",
         cost=3,
-        hand={_CLEARANCE: Hand(8, 8 / 6)},
+        hand={_CLEARANCE: Hand(8, 5 / 6)},
         zones={"pin.diameter": 6},
         reducer=True,
     ),

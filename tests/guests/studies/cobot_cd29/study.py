@@ -2,7 +2,7 @@
 
 import tolalloc as ta
 
-ROW = {"plus": 4, "minus": -4, "unit": "µm", "min": 1, "max": 30, "cost": 3}
+ROW = {"plus": 2.5, "minus": -2.5, "unit": "µm", "min": 1, "max": 30, "cost": 3}
 study = ta.Study(
     ta.reducer("cd29"),
     ta.Drawing.of_rows([{"id": "pin.diameter", **ROW}]),
