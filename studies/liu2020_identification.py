@@ -14,12 +14,6 @@ from published.recovery import Recovery, recovery
 from published.simulated_bench import Bench, random_units, simulated_bench
 
 import tolalloc as ta
-from tolalloc.bench.identification import IdentificationRequest, IdentificationResult, identify
-from tolalloc.bench.information import information
-from tolalloc.bench.least_squares import IdentificationProblem
-from tolalloc.bench.measurements import Measurements
-from tolalloc.bench.parameters import SYMBOLS, Parameter, parameter
-from tolalloc.bench.prediction import KernelPredictor, data_of
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table
@@ -31,9 +25,15 @@ from tolalloc.reducers.unit_file import BuiltUnit
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.header import Header
-from tolalloc.reports.tellers.identification import estimate_sentence
 from tolalloc.running.progress import Progress
 from tolalloc.study.answer import Answer
+from tolalloc.wings.bench.identification import IdentificationRequest, IdentificationResult, identify
+from tolalloc.wings.bench.information import information
+from tolalloc.wings.bench.least_squares import IdentificationProblem
+from tolalloc.wings.bench.measurements import Measurements
+from tolalloc.wings.bench.parameters import SYMBOLS, Parameter, parameter
+from tolalloc.wings.bench.prediction import KernelPredictor, data_of
+from tolalloc.wings.bench.telling.identification import estimate_sentence
 
 TRUTH = {"crank_disc_bearing": 1.15e10, "crank_carrier_bearing": 1.5e10, "carrier_bearing": 7.6e10}
 """Stiffness of the simulated units, inside the bounds of Table 5 and away from the start [N/m]."""

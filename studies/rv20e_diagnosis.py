@@ -12,10 +12,6 @@ import numpy as np
 import pandas as pd
 
 import tolalloc as ta
-from tolalloc.bench.diagnosis import Diagnosis, diagnose
-from tolalloc.bench.measurements import MeasuredCurve
-from tolalloc.bench.posterior import CurveProblem, DiagnosisEffort, Noise, thinned
-from tolalloc.bench.sources import dominant, reductions
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import limited_measure
 from tolalloc.reducers.model import ReducerModel
@@ -23,6 +19,10 @@ from tolalloc.reports.document import Document, Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.running.chunks import one_thread
 from tolalloc.running.progress import Progress
+from tolalloc.wings.bench.diagnosis import Diagnosis, diagnose
+from tolalloc.wings.bench.measurements import MeasuredCurve
+from tolalloc.wings.bench.posterior import CurveProblem, DiagnosisEffort, Noise, thinned
+from tolalloc.wings.bench.sources import dominant, reductions
 
 UNITS, QUICK = 200, 2
 READINGS = 1440

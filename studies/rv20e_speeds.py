@@ -11,14 +11,14 @@ import pandas as pd
 import tolalloc as ta
 from tolalloc.exceptions import SolveError
 from tolalloc.reading.units import ARCSECOND, RPM
-from tolalloc.reducers.dynamics.motion import ASSUMPTIONS, Damping, generalised_alpha, inertia_of
-from tolalloc.reducers.dynamics.speeds import Modes, OrdersAgainstSpeed, critical_speeds, modes, orders_against_speed
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.unit_file import load_unit
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.running.progress import Progress
+from tolalloc.wings.motion.motion import ASSUMPTIONS, Damping, generalised_alpha, inertia_of
+from tolalloc.wings.motion.speeds import Modes, OrdersAgainstSpeed, critical_speeds, modes, orders_against_speed
 
 TORQUE = -167.0
 LOADS = (0.0, 1.0, 100.0)

@@ -13,15 +13,15 @@ import pandas as pd
 import tolalloc as ta
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND, RPM
-from tolalloc.reducers.dynamics.prototype import engine, with_rigid_bearings
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.simulation import SimulationRequest, SimulationResult, prepare_simulation, with_ideal_gears
 from tolalloc.reports.document import Document, Section
-from tolalloc.reports.tellers.simulation import error_figure, range_text, rest_row, run_figures, steady_row
 from tolalloc.running.progress import Progress
 from tolalloc.study.answer import Answer
-from tolalloc.study.inquiries.simulate import simulated
+from tolalloc.wings.motion.ask.simulate import simulated
+from tolalloc.wings.motion.prototype import engine, with_rigid_bearings
+from tolalloc.wings.motion.simulation import SimulationRequest, SimulationResult, prepare_simulation, with_ideal_gears
+from tolalloc.wings.motion.telling.simulation import error_figure, range_text, rest_row, run_figures, steady_row
 
 IMPLIED = 3.67e7
 """Stiffness of every pin contact at which 16 to 17 carry, as xi2015's printed angles imply [N/m]."""

@@ -19,12 +19,12 @@ from published.zhang2025_sections import (
 )
 
 import tolalloc as ta
-from tolalloc.assembly.adjustment import AssemblyRequest
-from tolalloc.assembly.files import load_plan
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reports.document import Document
 from tolalloc.running.progress import Progress
-from tolalloc.study.inquiries.assemble import assembled
+from tolalloc.wings.assembly.adjustment import AssemblyRequest
+from tolalloc.wings.assembly.ask.assemble import assembled
+from tolalloc.wings.assembly.files import load_plan
 
 SEED = 20250711
 """Seed of the parts that stand for zhang2025's Table 3, which is lost."""

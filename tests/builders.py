@@ -8,7 +8,6 @@ import re
 import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from importlib.resources import files
 from pathlib import Path
 from string import Formatter
 from typing import Any
@@ -18,6 +17,7 @@ import pandas as pd
 import pytest
 
 import tolalloc as ta
+from tests.import_graph import PACKAGE
 from tolalloc.allocation.front.pareto_problem import SearchedDesigns
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.requirement import Requirement
@@ -186,8 +186,8 @@ def wording(sentence: str, **gaps: object) -> str:
 def _with_gaps(sentence: str) -> str:
     """Return the words of a sentence of a teller, its gaps open."""
     teller, key = sentence.split(".")
-    text = files("tolalloc.reports").joinpath("sentences", f"{teller}.toml").read_text(encoding="utf-8")
-    return " ".join(tomllib.loads(text)[key].split())
+    (path,) = PACKAGE.rglob(f"sentences/{teller}.toml")
+    return " ".join(tomllib.loads(path.read_text(encoding="utf-8"))[key].split())
 
 
 def telling(sentences: Iterable[str], sentence: str, **gaps: object) -> str:

@@ -12,14 +12,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from tolalloc.reducers.dynamics.motion import Damping, SpeedProfile, inertia_of, motion_of, newmark
-from tolalloc.reducers.dynamics.simulation import simulate
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import forces
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
 from tolalloc.reducers.reducer.design import Clearances
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.running.compiled import is_kept
+from tolalloc.wings.motion.motion import Damping, SpeedProfile, inertia_of, motion_of, newmark
+from tolalloc.wings.motion.stepping import simulate
 
 FEW = AngleSearch(coarse=8)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "tolalloc"
-FOUND_BY_KIND = ("tolalloc.reports.tellers.", "tolalloc.study.inquiries.", "tolalloc.reports.portraits.")
+FOUND_BY_KIND = ("tolalloc.reports.tellers.", "tolalloc.reports.portraits.")
 """Modules that no import names: a command finds them by the kind of its answer or its own name."""
 
 
@@ -32,7 +32,7 @@ def imported(tree: ast.AST, modules: set[str]) -> set[str]:
 @cache
 def public_places() -> dict[str, str]:
     """Return the module from which each public name of the package is loaded."""
-    tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
+    tree = ast.parse((PACKAGE / "__init__.pyi").read_text(encoding="utf-8"))
     nodes = (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module)
     return {name.asname or name.name: node.module for node in nodes for name in node.names}
 

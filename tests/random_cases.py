@@ -10,9 +10,6 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
-from tolalloc.assembly.chain import DatumFlowChain, Part
-from tolalloc.assembly.plan import AssemblyPlan
-from tolalloc.assembly.steps import AssemblyStep
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import Source
@@ -24,6 +21,9 @@ from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.design import Clearances, CycloidStage, FirstStage, Load, Modification, Reducer
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.stiffness import Material, Stiffness
+from tolalloc.wings.assembly.chain import DatumFlowChain, Part
+from tolalloc.wings.assembly.plan import AssemblyPlan
+from tolalloc.wings.assembly.steps import AssemblyStep
 
 LAWS = ("constant", "table2", "logarithmic")
 SINGLE, DISC_TILT = r"^each_|\.each_", r"^disc\d+\.tilt"

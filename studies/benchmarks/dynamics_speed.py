@@ -5,7 +5,7 @@
 One run measures in turn, round after round and on one core, the seconds per unit of one output turn of an RV-20E at
 1 rpm in 1,404 steps of the generalised-α method:
 
-* (a) `tolalloc.reducers.dynamics.simulation.simulate` of one unit, tables and all;
+* (a) `tolalloc.wings.motion.stepping.simulate` of one unit, tables and all;
 * (b) the tables alone, which all units of a batch share;
 * (c) the steps alone: a batch of units less the tables, per unit;
 * (d) the same steps in NumPy, all coordinates at once: Newton's method with a line search, its rows made beforehand.
@@ -29,15 +29,6 @@ from scipy.optimize import brentq
 
 from tests.random_cases import random_units
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.reducers.dynamics.motion import (
-    Damping,
-    SpeedProfile,
-    generalised_alpha,
-    inertia_of,
-    motion_of,
-    nominal_acceleration,
-)
-from tolalloc.reducers.dynamics.simulation import Steps, simulate
 from tolalloc.reducers.equivalent.condensation import spring_groups
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.springs import Coordinates, Positions
@@ -45,6 +36,15 @@ from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.unit_file import load_unit
 from tolalloc.running.chunks import one_blas_thread
 from tolalloc.running.compiled import use_threads
+from tolalloc.wings.motion.motion import (
+    Damping,
+    SpeedProfile,
+    generalised_alpha,
+    inertia_of,
+    motion_of,
+    nominal_acceleration,
+)
+from tolalloc.wings.motion.stepping import Steps, simulate
 
 STEPS, FIRST_STEPS, TORQUE, TURN = 1404, 100, -10.0, 60.0
 DELAY = 1e-5  # damping per stiffness, s

@@ -19,8 +19,8 @@ import numpy as np
 from scipy.stats import binom
 
 import tolalloc as ta
-from tolalloc.bench.lots import GaugedColumn, LotRequest, LotResult, drawn_lot, judge_lot
-from tolalloc.bench.processes import Gauge, Lots
+from tolalloc.wings.bench.lots import GaugedColumn, LotRequest, LotResult, drawn_lot, judge_lot
+from tolalloc.wings.bench.processes import Gauge, Lots
 
 LEVEL = 0.05
 SHIFTS, FACTORS = (0.8, 1.0, 1.1, 1.25, 1.5), (1.4, 1.5, 1.6, 1.8, 2.0)

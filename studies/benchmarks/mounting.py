@@ -3,7 +3,7 @@
     NUMBA_NUM_THREADS=2 python studies/benchmarks/mounting.py
 
 Random sets of measured RV-20E parts inside the shipped tolerance table are mounted by the package,
-`tolalloc.assembly.mounting.best_mounting`:
+`tolalloc.wings.assembly.mounting.best_mounting`:
 
 * one unit: all mountings there are, so its best, mean and worst are exact;
 * two units: against the exact best, from every unit that the parts can make;
@@ -27,8 +27,6 @@ from typing import Any
 import numpy as np
 from kernel_speed import SEED, progress
 
-from tolalloc.assembly.mounting import EvaluatedUnits, best_mounting, random_mounting, units_from
-from tolalloc.assembly.stock import PartStock, drawn_parts
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.tolerance_table import load_tolerance_table
@@ -36,6 +34,8 @@ from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.running.compiled import thread_count
+from tolalloc.wings.assembly.mounting import EvaluatedUnits, best_mounting, random_mounting, units_from
+from tolalloc.wings.assembly.stock import PartStock, drawn_parts
 
 TARGET_SECONDS = 2.0
 CLIMBERS = 8

@@ -6,7 +6,7 @@ xi2015's RV-40E with an ideal first stage, shortened: 525 rpm within 0.1 s, 572 
 all. Either engine is run at the coarsest of some time steps at which its transmission error from 0.3 s on is within
 0.02″ rms of its own run at the finest step; then both are timed in turn, round after round, on one core:
 
-* (a) `tolalloc.reducers.dynamics.simulation.simulate` of one unit;
+* (a) `tolalloc.wings.motion.stepping.simulate` of one unit;
 * (b) the same of a batch, per unit;
 * (c) Exudyn's prototype with exact teeth, one unit, as it knows no batches.
 """
@@ -24,9 +24,10 @@ from numpy_cores import timed
 
 from tolalloc.cli.console import shown_progress
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.reducers.dynamics.motion import Damping
-from tolalloc.reducers.dynamics.simulation import simulate as simulate_model
-from tolalloc.reducers.simulation import (
+from tolalloc.running.chunks import one_blas_thread
+from tolalloc.running.compiled import use_threads
+from tolalloc.wings.motion.motion import Damping
+from tolalloc.wings.motion.simulation import (
     INTEGRATORS,
     PreparedSimulation,
     SimulationRequest,
@@ -35,8 +36,7 @@ from tolalloc.reducers.simulation import (
     simulate,
     with_ideal_gears,
 )
-from tolalloc.running.chunks import one_blas_thread
-from tolalloc.running.compiled import use_threads
+from tolalloc.wings.motion.stepping import simulate as simulate_model
 
 MODEL, PROTOTYPE = "generalised-alpha", "exudyn"
 STEPS = (3.2e-3, 1.6e-3, 8e-4, 4e-4, 2e-4, 1e-4, 5e-5, 2.5e-5, 1.25e-5)

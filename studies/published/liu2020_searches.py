@@ -15,16 +15,16 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 
-from tolalloc.bench.identification import STARTS, IdentificationResult
-from tolalloc.bench.least_squares import NAME as GAUSS_NEWTON
-from tolalloc.bench.least_squares import Batch, IdentificationProblem, Identified, gauss_newton, starts
-from tolalloc.bench.parameters import BIAS
-from tolalloc.bench.prediction import KernelPredictor, Surrogate
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.running.progress import Progress
+from tolalloc.wings.bench.identification import STARTS, IdentificationResult
+from tolalloc.wings.bench.least_squares import NAME as GAUSS_NEWTON
+from tolalloc.wings.bench.least_squares import Batch, IdentificationProblem, Identified, gauss_newton, starts
+from tolalloc.wings.bench.parameters import BIAS
+from tolalloc.wings.bench.prediction import KernelPredictor, Surrogate
 
 from .liu2020_swarm import ImprovedPSO
 from .search_history import History, quartiles

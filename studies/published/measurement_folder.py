@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.bench.measurements import Measurements
 from tolalloc.exceptions import InputError
 from tolalloc.reading.files import as_toml, require_new, write_new
 from tolalloc.reading.units import ARCSECOND, DEGREE
 from tolalloc.reducers.unit_file import table_text, units_text
+from tolalloc.wings.bench.measurements import Measurements
 
 
 def write_measurements(measurements: Measurements, folder: str | Path) -> Path:

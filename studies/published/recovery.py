@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.bench.information import information
-from tolalloc.bench.least_squares import IdentificationProblem, gauss_newton
-from tolalloc.bench.parameters import Parameter
-from tolalloc.bench.prediction import KernelPredictor, data_of
 from tolalloc.capability.monte_carlo import Yield, proportion
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.wings.bench.information import information
+from tolalloc.wings.bench.least_squares import IdentificationProblem, gauss_newton
+from tolalloc.wings.bench.parameters import Parameter
+from tolalloc.wings.bench.prediction import KernelPredictor, data_of
 
 from .simulated_bench import SimulatedBench
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.bench.measurements import MeasuredCurve, MeasuredLoop, MeasuredPeakToPeak, Measurements
-from tolalloc.bench.prediction import CURVE, LOOP, PEAK_TO_PEAK, KernelPredictor, data_of
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.unit_file import BuiltUnit
+from tolalloc.wings.bench.measurements import MeasuredCurve, MeasuredLoop, MeasuredPeakToPeak, Measurements
+from tolalloc.wings.bench.prediction import CURVE, LOOP, PEAK_TO_PEAK, KernelPredictor, data_of
 
 _ANY = ("*",)
 

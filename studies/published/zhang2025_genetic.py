@@ -11,11 +11,11 @@ from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 
 from tolalloc.allocation.space.problem import AllocationProblem
-from tolalloc.assembly.plan import AssemblyPlan
-from tolalloc.assembly.tolerances import AngularAllocation, angular_problem, requirements_of
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import SolveError
 from tolalloc.reading.units import ARCSECOND
+from tolalloc.wings.assembly.plan import AssemblyPlan
+from tolalloc.wings.assembly.tolerances import AngularAllocation, angular_problem, requirements_of
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,14 +11,6 @@ import pandas as pd
 
 import tolalloc as ta
 from published.zhang2025_genetic import genetic_allocation
-from tolalloc.assembly.control import regulator
-from tolalloc.assembly.gains import norms
-from tolalloc.assembly.mounting import best_mounting, random_mounting
-from tolalloc.assembly.orientations import OrientationResponse
-from tolalloc.assembly.plan import AssemblyPlan
-from tolalloc.assembly.stock import PartStock, drawn_parts
-from tolalloc.assembly.tolerances import AngularAllocation, allocate_angles, best_state_weight
-from tolalloc.assembly.trajectory import foreseen
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import SolveError
@@ -31,6 +23,14 @@ from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.running.progress import Progress
+from tolalloc.wings.assembly.control import regulator
+from tolalloc.wings.assembly.gains import norms
+from tolalloc.wings.assembly.mounting import best_mounting, random_mounting
+from tolalloc.wings.assembly.orientations import OrientationResponse
+from tolalloc.wings.assembly.plan import AssemblyPlan
+from tolalloc.wings.assembly.stock import PartStock, drawn_parts
+from tolalloc.wings.assembly.tolerances import AngularAllocation, allocate_angles, best_state_weight
+from tolalloc.wings.assembly.trajectory import foreseen
 
 SEEDS = SeedTree(1).child("zhang2025")
 PRECISIONS = (0.0, 5.0, 10.0)

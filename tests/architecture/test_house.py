@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from tolalloc.bench.parameters import SYMBOLS
 from tolalloc.drawings.fields import COLUMNS, HEADERS, ToleranceRow
 from tolalloc.reducers.equivalent.columns import source_name
-from tolalloc.study.inquiries.identify import NAMES
+from tolalloc.wings.bench.ask.identify import NAMES
+from tolalloc.wings.bench.parameters import SYMBOLS
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "tolalloc"

@@ -8,9 +8,9 @@ import pytest
 
 from tests.builders import baseline_errors
 from tests.studies.command import refused, tolalloc
-from tolalloc.bench.diagnosis import DiagnosisRequest
 from tolalloc.exceptions import InputError
 from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.wings.bench.diagnosis import DiagnosisRequest
 
 
 @pytest.mark.parametrize(

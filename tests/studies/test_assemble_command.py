@@ -114,7 +114,7 @@ def test_measured_parts_are_listed_without_measuring_again(pump, tmp_path):
 @pytest.mark.slow
 def test_impossible_limits_keep_nobody_from_the_turns(unit, tmp_path):
     chain = tmp_path / "tight.chain.toml"
-    shipped = Path("tolalloc/assembly/data/bx40e.chain.toml").read_text(encoding="utf-8")
+    shipped = Path("tolalloc/wings/assembly/data/bx40e.chain.toml").read_text(encoding="utf-8")
     tight = shipped.replace("tilt_limit_arcsec = 15\n", "tilt_limit_arcsec = 0.2\n").replace('reducer = "bx40e"', "")
     chain.write_text(tight, encoding="utf-8")
     for arguments in (["--measured", unit], []):

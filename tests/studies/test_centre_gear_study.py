@@ -8,13 +8,13 @@ import pytest
 import tolalloc as ta
 from tests.builders import page_of
 from tests.studies.command import refused, tolalloc
-from tolalloc.assembly.places import places_of
-from tolalloc.bench.sources import has_half_turn
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.scene import scene_of
 from tolalloc.reports.moving_picture import draw_still
 from tolalloc.reports.scene_record import scene_record
+from tolalloc.wings.assembly.places import places_of
+from tolalloc.wings.bench.sources import has_half_turn
 
 SMALL = ta.Effort(
     ranking=ta.RankingEffort(

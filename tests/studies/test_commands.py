@@ -17,9 +17,6 @@ import tolalloc as ta
 from tests.builders import page_of, reducer_file, says, summary_of
 from tests.studies.command import ROOT, answer_of, refused, require_offline, tolalloc
 from tests.studies.scripts import study_script
-from tolalloc.bench.lot_orders import load_lot_curves
-from tolalloc.bench.posterior import Noise
-from tolalloc.bench.readings import clean_curve, load_readings, require_torque
 from tolalloc.drawings.table_file import DATA
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError
@@ -30,6 +27,9 @@ from tolalloc.reducers.load_case import LoadCase
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reports.header import Header
 from tolalloc.reports.tellers.transmission_error import TransmissionErrorTeller
+from tolalloc.wings.bench.lot_orders import load_lot_curves
+from tolalloc.wings.bench.posterior import Noise
+from tolalloc.wings.bench.readings import clean_curve, load_readings, require_torque
 
 STUDY = ROOT / "studies" / "liu2020_allocation.py"
 PEAK = "peak-to-peak transmission error [arcsec]"

@@ -16,7 +16,7 @@ from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reports.excel import write_sheets
-from tolalloc.study.inquiries.diagnose import Diagnose
+from tolalloc.wings.bench.ask.diagnose import Diagnose
 
 REPORT = ("--reducer", "rv20e_liu2020", "--out")
 

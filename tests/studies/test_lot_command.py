@@ -11,7 +11,7 @@ import pytest
 import tolalloc as ta
 from tests.builders import headed, page_of, says, summary_of
 from tests.studies.command import answer_of, refused, tolalloc
-from tolalloc.bench import lot_orders
+from tolalloc.wings.bench import lot_orders
 
 DRAWING = """id,feature,nominal [mm],plus [unit],minus [unit],unit,min [unit],max [unit],cost,spectrum,systematic,locked
 hub,size,40,8,-4,µm,1,60,1,,,no

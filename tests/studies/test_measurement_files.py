@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from tests.builders import refusal
-from tolalloc.bench.measurements import load_measurements
 from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE, MICRORADIAN
 from tolalloc.reducers.reducer.files import PRESETS
 from tolalloc.reducers.unit_file import load_units
+from tolalloc.wings.bench.measurements import load_measurements
 
 UNITS = """# drawn on the coordinate measuring machine
 unit,crank1.journal1.eccentricity.x [µm],disc1.tilt.x [urad],pin.diameter [um]

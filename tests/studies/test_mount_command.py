@@ -6,10 +6,10 @@ import pytest
 
 from tests.builders import baseline_errors, summary_of
 from tests.studies.command import answer_of, refused, tolalloc
-from tolalloc.assembly.stock import drawn_parts
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reading.units import MICROMETRE
 from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.wings.assembly.stock import drawn_parts
 
 
 def parts_file(folder, units, seed=5):

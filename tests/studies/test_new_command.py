@@ -13,8 +13,6 @@ from openpyxl import load_workbook
 import tolalloc as ta
 from tests.studies.command import answer_of, refused, tolalloc
 from tolalloc.allocation.cost.process_costs import load_process_costs
-from tolalloc.assembly.files import load_errors, load_plan
-from tolalloc.bench.measurements import load_measurements
 from tolalloc.cli.main import EXAMPLES, app
 from tolalloc.cli.samples import FACTOR
 from tolalloc.cli.start import modification_of
@@ -24,6 +22,8 @@ from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.families.rv import RV
 from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.wings.assembly.files import load_errors, load_plan
+from tolalloc.wings.bench.measurements import load_measurements
 
 
 @pytest.mark.slow

@@ -10,12 +10,12 @@ import pytest
 from typer.main import get_command
 
 from tests.studies.command import refused, tolalloc
-from tolalloc.assembly.files import DATA, load_plan
-from tolalloc.bench.measurements import load_measurements
 from tolalloc.cli.main import app
 from tolalloc.cli.start import KINDS, schema
 from tolalloc.exceptions import TolallocError
 from tolalloc.reducers.reducer.files import PRESETS, ReducerRecord, load_reducer
+from tolalloc.wings.assembly.files import DATA, load_plan
+from tolalloc.wings.bench.measurements import load_measurements
 
 SHIPPED = {
     "reducer": sorted(PRESETS.glob("*.reducer.toml")),

@@ -13,7 +13,7 @@ import pytest
 from tests.builders import says, summary_of
 from tests.studies.command import answer_of, process, refused, tolalloc
 from tolalloc.exceptions import TolallocError
-from tolalloc.reducers.simulation import SimulationRequest, prepare_simulation
+from tolalloc.wings.motion.simulation import SimulationRequest, prepare_simulation
 
 # Ten times the speed of xi2015: a crank turn takes 24 ms. One pin pass takes 0.6 ms.
 SHORT = ("--speed", "5250", "--ramp", "0.02", "--duration", "0.06", "--step", "1e-5")

@@ -10,13 +10,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tolalloc.assembly.chain import DatumFlowChain, Part
-from tolalloc.assembly.control import kalman_filter, regulator
-from tolalloc.assembly.gains import final_errors, norms, state_weight_sweep
-from tolalloc.assembly.plan import AssemblyPlan
-from tolalloc.assembly.steps import Choice, Efforts, state_space, steps_in_order
-from tolalloc.assembly.trajectory import foreseen
 from tolalloc.reading.units import ARCSECOND
+from tolalloc.wings.assembly.chain import DatumFlowChain, Part
+from tolalloc.wings.assembly.control import kalman_filter, regulator
+from tolalloc.wings.assembly.gains import final_errors, norms, state_weight_sweep
+from tolalloc.wings.assembly.plan import AssemblyPlan
+from tolalloc.wings.assembly.steps import Choice, Efforts, state_space, steps_in_order
+from tolalloc.wings.assembly.trajectory import foreseen
 
 OPPOSITE = (0.0, 0.0, np.pi)
 BX40E = DatumFlowChain(

@@ -13,12 +13,12 @@ from scipy.optimize import minimize
 
 from studies.published.zhang2025_genetic import genetic_allocation
 from tests.validation_manual import shown
-from tolalloc.assembly.control import kalman_filter, regulator
-from tolalloc.assembly.files import load_plan
-from tolalloc.assembly.gains import Gains, final_errors, tuned_gains
-from tolalloc.assembly.tolerances import allocate_angles, allocated, best_state_weight, retuned_allocation
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reading.units import ARCSECOND
+from tolalloc.wings.assembly.control import kalman_filter, regulator
+from tolalloc.wings.assembly.files import load_plan
+from tolalloc.wings.assembly.gains import Gains, final_errors, tuned_gains
+from tolalloc.wings.assembly.tolerances import allocate_angles, allocated, best_state_weight, retuned_allocation
 
 PLAN = load_plan("bx40e")
 PRICED = replace(PLAN, requirements=replace(PLAN.requirements, effort_price=0.02 / ARCSECOND**2))

@@ -18,18 +18,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tolalloc.assembly.control import regulator
-from tolalloc.assembly.files import load_plan
-from tolalloc.assembly.orientations import OrientationResponse
-from tolalloc.assembly.trajectory import foreseen
 from tolalloc.reading.units import ARCSECOND, MEGAPASCAL, MICROMETRE
-from tolalloc.reducers.dynamics.motion import Damping
-from tolalloc.reducers.dynamics.simulation import simulate as simulate_model
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import Solved, contact_pattern, peak_line_load, unit_pressure
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.stiffness import Material, contact_modulus, line_contact
-from tolalloc.reducers.simulation import (
+from tolalloc.running.progress import SILENT
+from tolalloc.wings.assembly.control import regulator
+from tolalloc.wings.assembly.files import load_plan
+from tolalloc.wings.assembly.orientations import OrientationResponse
+from tolalloc.wings.assembly.trajectory import foreseen
+from tolalloc.wings.motion.motion import Damping
+from tolalloc.wings.motion.simulation import (
     INTEGRATORS,
     PreparedSimulation,
     SimulationRequest,
@@ -37,7 +37,7 @@ from tolalloc.reducers.simulation import (
     prepare_simulation,
     simulate,
 )
-from tolalloc.running.progress import SILENT
+from tolalloc.wings.motion.stepping import simulate as simulate_model
 
 PRECISIONS = (0.0, 1.0, 5.0, 10.0)
 PLAN = load_plan("bx40e")

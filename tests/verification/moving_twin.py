@@ -9,9 +9,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from tests.verification.dense_twin import DenseModel, dense_model, least_energy
-from tolalloc.reducers.dynamics.motion import Inertia, SpeedProfile
 from tolalloc.reducers.equivalent.springs import HARMONICS, Coordinates
 from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.wings.motion.motion import Inertia, SpeedProfile
 
 
 def part_paths(reducer: Reducer, carrier_angle: float) -> np.ndarray:

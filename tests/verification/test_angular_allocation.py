@@ -10,11 +10,11 @@ from scipy.optimize import minimize
 from scipy.stats import norm
 
 from studies.published.zhang2025_genetic import genetic_allocation
-from tolalloc.assembly.files import load_plan
-from tolalloc.assembly.tolerances import allocate_angles, best_state_weight, retuned_allocation, verify_angles
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import ARCSECOND
+from tolalloc.wings.assembly.files import load_plan
+from tolalloc.wings.assembly.tolerances import allocate_angles, best_state_weight, retuned_allocation, verify_angles
 
 PLAN = load_plan("bx40e")
 FREE = np.full(4, np.inf)

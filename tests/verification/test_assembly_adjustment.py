@@ -10,16 +10,16 @@ import pytest
 from scipy.linalg import solve_discrete_are
 
 from tests.random_cases import random_plan, seeds
-from tolalloc.assembly.chain import DatumFlowChain, Part
-from tolalloc.assembly.control import KalmanFilter, Regulator, kalman_filter, limiting_regulator, regulator
-from tolalloc.assembly.files import load_plan
-from tolalloc.assembly.gains import FinalErrors, final_errors, norms, state_weight_sweep, tuned_gains
-from tolalloc.assembly.plan import AssemblyPlan
-from tolalloc.assembly.steps import AssemblyStep, Efforts, StateSpace, steps_in_order
-from tolalloc.assembly.trajectory import Trajectory, foreseen, simulated
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND
+from tolalloc.wings.assembly.chain import DatumFlowChain, Part
+from tolalloc.wings.assembly.control import KalmanFilter, Regulator, kalman_filter, limiting_regulator, regulator
+from tolalloc.wings.assembly.files import load_plan
+from tolalloc.wings.assembly.gains import FinalErrors, final_errors, norms, state_weight_sweep, tuned_gains
+from tolalloc.wings.assembly.plan import AssemblyPlan
+from tolalloc.wings.assembly.steps import AssemblyStep, Efforts, StateSpace, steps_in_order
+from tolalloc.wings.assembly.trajectory import Trajectory, foreseen, simulated
 
 SEEDS = range(6)
 NOISE = 2 * ARCSECOND, 1 * ARCSECOND

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from tests.builders import written
-from tolalloc.assembly.files import DATA, load_errors, load_plan
-from tolalloc.assembly.plan import AssemblyPlan
-from tolalloc.assembly.steps import AssemblyStep, check_steps
 from tolalloc.exceptions import InputError, TolallocError
 from tolalloc.reading.units import ARCSECOND, DEGREE, MILLIMETRE
 from tolalloc.reducers.equivalent.interfaces import crank_disc
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.springs import Positions
 from tolalloc.reducers.reducer.files import PRESETS, load_reducer
+from tolalloc.wings.assembly.files import DATA, load_errors, load_plan
+from tolalloc.wings.assembly.plan import AssemblyPlan
+from tolalloc.wings.assembly.steps import AssemblyStep, check_steps
 
 SHORT = """
 name = "short"

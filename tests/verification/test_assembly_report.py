@@ -10,12 +10,6 @@ import pandas as pd
 import pytest
 
 from tests.builders import headed, says, telling, wording, written
-from tolalloc.assembly.adjustment import AssemblyRequest, AssemblyResult, assemble
-from tolalloc.assembly.files import load_plan
-from tolalloc.assembly.gains import assembled, tuned_gains
-from tolalloc.assembly.orientations import TRANSMISSION, TransmissionCurves, TransmissionEffect
-from tolalloc.assembly.steps import Efforts, steps_in_order
-from tolalloc.assembly.trajectory import random_numbers
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.model import OUTCOMES
 from tolalloc.reducers.equivalent.outputs import ContactPattern
@@ -23,13 +17,18 @@ from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reports.columns import of_positions
 from tolalloc.reports.figure import chart
 from tolalloc.reports.header import Header
-from tolalloc.reports.tellers import assembly_tables as tables
-from tolalloc.reports.tellers import assembly_tolerances as tolerance_tables
-from tolalloc.reports.tellers import assembly_transmission as transmission
-from tolalloc.reports.tellers.assembly import plan_record
-from tolalloc.reports.tellers.assembly_tables import characteristic_table, larger
 from tolalloc.running.progress import RunRecord, Silent
 from tolalloc.study.answer import Answer
+from tolalloc.wings.assembly.adjustment import AssemblyRequest, AssemblyResult, assemble
+from tolalloc.wings.assembly.files import load_plan
+from tolalloc.wings.assembly.gains import assembled, tuned_gains
+from tolalloc.wings.assembly.orientations import TRANSMISSION, TransmissionCurves, TransmissionEffect
+from tolalloc.wings.assembly.steps import Efforts, steps_in_order
+from tolalloc.wings.assembly.telling import tables, transmission
+from tolalloc.wings.assembly.telling import tolerances as tolerance_tables
+from tolalloc.wings.assembly.telling.assembly import plan_record
+from tolalloc.wings.assembly.telling.tables import characteristic_table, larger
+from tolalloc.wings.assembly.trajectory import random_numbers
 
 pytestmark = pytest.mark.slow  # an assembly with all of its efforts is made first, and read by all
 

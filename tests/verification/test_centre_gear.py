@@ -11,7 +11,6 @@ from tests.builders import at_constant_contact, order_spectrum, reducer_file, re
 from tolalloc.exceptions import TolallocError
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.cycloid.tooth_profile import normals
-from tolalloc.reducers.dynamics.motion import inertia_of
 from tolalloc.reducers.equivalent.hysteresis import friction_torques
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import Solved, forces
@@ -19,6 +18,7 @@ from tolalloc.reducers.equivalent.perfect import perfect_reducer
 from tolalloc.reducers.reducer.bearings import loss_factor
 from tolalloc.reducers.reducer.design import CentreGearClearances, Reducer, interface_forces
 from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.wings.motion.motion import inertia_of
 
 RIGID = 1e13
 VECTORS = (

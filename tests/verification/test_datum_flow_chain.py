@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from tolalloc.assembly.chain import DatumFlowChain, Part
-from tolalloc.assembly.files import load_plan
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import ARCSECOND
+from tolalloc.wings.assembly.chain import DatumFlowChain, Part
+from tolalloc.wings.assembly.files import load_plan
 
 LARGEST = 60 * ARCSECOND
 

@@ -8,9 +8,16 @@ import numpy as np
 import pytest
 
 from tests.builders import seeded_units
-from tolalloc.bench.diagnosis import Diagnosis, diagnose
-from tolalloc.bench.measurements import MeasuredCurve
-from tolalloc.bench.posterior import (
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import limited_measure
+from tolalloc.exceptions import InputError
+from tolalloc.reading.units import ARCSECOND, DEGREE
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.study.prepared import Prepared
+from tolalloc.wings.bench.diagnosis import Diagnosis, diagnose
+from tolalloc.wings.bench.measurements import MeasuredCurve
+from tolalloc.wings.bench.posterior import (
     CurveProblem,
     DiagnosisEffort,
     GaugeReading,
@@ -20,7 +27,7 @@ from tolalloc.bench.posterior import (
     climb,
     thinned,
 )
-from tolalloc.bench.sources import (
+from tolalloc.wings.bench.sources import (
     dominant,
     exchanged,
     groups,
@@ -30,13 +37,6 @@ from tolalloc.bench.sources import (
     reductions,
     with_twins,
 )
-from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import limited_measure
-from tolalloc.exceptions import InputError
-from tolalloc.reading.units import ARCSECOND, DEGREE
-from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.study.prepared import Prepared
 
 NOISE = Noise()
 ANGLES = 2 * np.pi * np.arange(480) / 480

@@ -7,7 +7,7 @@ import pytest
 
 from tests.validation_manual import shown
 from tests.verification.test_dynamics import input_of, run
-from tolalloc.reducers.dynamics.motion import Damping, SpeedProfile, generalised_alpha, motion_of, newmark
+from tolalloc.wings.motion.motion import Damping, SpeedProfile, generalised_alpha, motion_of, newmark
 
 INTEGRATORS = {"newmark": newmark(), "alpha 0": generalised_alpha(0.0), "alpha 0.8": generalised_alpha(0.8)}
 STEPS = 160 * 2 ** np.arange(5)

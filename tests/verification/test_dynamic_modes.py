@@ -12,13 +12,13 @@ from tests.builders import order_spectrum
 from tests.verification.dense_twin import dense_model, least_energy
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.reducers.dynamics.motion import Damping, SpeedProfile, generalised_alpha, inertia_of, motion_of, newmark
-from tolalloc.reducers.dynamics.simulation import simulate
-from tolalloc.reducers.dynamics.speeds import Modes, critical_speeds, modes, orders_against_speed
 from tolalloc.reducers.equivalent.model import EquivalentModel, Status
 from tolalloc.reducers.equivalent.springs import Coordinates
 from tolalloc.reducers.reducer.design import Clearances
 from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.wings.motion.motion import Damping, SpeedProfile, generalised_alpha, inertia_of, motion_of, newmark
+from tolalloc.wings.motion.speeds import Modes, critical_speeds, modes, orders_against_speed
+from tolalloc.wings.motion.stepping import simulate
 
 TURN = 2 * np.pi * np.arange(96) / 96
 

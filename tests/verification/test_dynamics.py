@@ -13,7 +13,11 @@ from tests.verification.dense_twin import dense_model
 from tests.verification.moving_twin import MovingTwin, path_derivatives
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.reducers.dynamics.motion import (
+from tolalloc.reducers.equivalent.model import EquivalentModel, Status
+from tolalloc.reducers.equivalent.springs import Coordinates, Positions
+from tolalloc.reducers.reducer.design import Clearances
+from tolalloc.running.compiled import thread_count, use_threads
+from tolalloc.wings.motion.motion import (
     Damping,
     Inertia,
     Integrator,
@@ -25,11 +29,7 @@ from tolalloc.reducers.dynamics.motion import (
     newmark,
     nominal_acceleration,
 )
-from tolalloc.reducers.dynamics.simulation import Simulated, simulate
-from tolalloc.reducers.equivalent.model import EquivalentModel, Status
-from tolalloc.reducers.equivalent.springs import Coordinates, Positions
-from tolalloc.reducers.reducer.design import Clearances
-from tolalloc.running.compiled import thread_count, use_threads
+from tolalloc.wings.motion.stepping import Simulated, simulate
 
 UNDAMPED = Damping()
 

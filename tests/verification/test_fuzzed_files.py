@@ -27,9 +27,6 @@ from tests.studies.bench_files import CURVES_AND_LOOPS
 from tests.verification.plain_reading import DECIMALS, differences, made, rows, said
 from tolalloc.allocation.cost.points import load_shop_points
 from tolalloc.allocation.cost.process_costs import load_process_costs
-from tolalloc.assembly.files import DATA as CHAINS
-from tolalloc.assembly.files import load_plan
-from tolalloc.bench.measurements import load_measurements
 from tolalloc.drawings.correlation import load_correlations
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
@@ -38,6 +35,9 @@ from tolalloc.drawings.tolerance_table import load_process_capabilities, load_to
 from tolalloc.exceptions import TolallocError
 from tolalloc.reducers.reducer.files import PRESETS, load_identified_stiffness, load_reducer
 from tolalloc.reducers.unit_file import load_unit, load_units
+from tolalloc.wings.assembly.files import DATA as CHAINS
+from tolalloc.wings.assembly.files import load_plan
+from tolalloc.wings.bench.measurements import load_measurements
 
 GIBIBYTE = 2**20
 """As Linux counts memory [kB]."""

@@ -15,7 +15,6 @@ from openpyxl.chart import BarChart
 from tests.builders import refusal, written
 from tolalloc.allocation.cost.points import load_shop_points
 from tolalloc.allocation.cost.process_costs import load_process_costs
-from tolalloc.bench.readings import load_readings
 from tolalloc.drawings.table_file import DATA
 from tolalloc.drawings.tolerance_table import load_process_capabilities, load_tolerance_table
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
@@ -23,6 +22,7 @@ from tolalloc.reading.file_content import require_believable
 from tolalloc.reading.files import shipped_or_path
 from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer
 from tolalloc.reducers.unit_file import load_unit, load_units
+from tolalloc.wings.bench.readings import load_readings
 
 HEADERS, ROW = ("id", "plus", "minus", "unit", "min", "max", "cost"), ("a", 0.1, -0.1, "mm", 0.02, 0.5, 3)
 HEADER, LINE = ",".join(HEADERS), ",".join(map(str, ROW))

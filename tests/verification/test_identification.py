@@ -16,19 +16,6 @@ from studies.published.liu2020_tables import BiasOnly, improvement
 from studies.published.recovery import recovery
 from studies.published.simulated_bench import Bench, random_units, simulated_bench
 from tests.builders import baseline_errors, says
-from tolalloc.bench.information import information
-from tolalloc.bench.least_squares import IdentificationProblem, gauss_newton, require_enough, starts
-from tolalloc.bench.parameters import Parameter, parameter
-from tolalloc.bench.prediction import (
-    AllReadings,
-    KernelPredictor,
-    Prediction,
-    ReadingBlock,
-    Surrogate,
-    data_of,
-    fit_surrogate,
-)
-from tolalloc.bench.profile import as_stiffness, bootstrap, estimates, judged, profile, simplest
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND
@@ -38,8 +25,21 @@ from tolalloc.reducers.equivalent.springs import HARMONICS
 from tolalloc.reducers.families.rv import RV
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
-from tolalloc.reports.tellers.identification import estimate_sentence
 from tolalloc.sensitivity.surrogate.regression import fit_box_polynomial, total_degrees
+from tolalloc.wings.bench.information import information
+from tolalloc.wings.bench.least_squares import IdentificationProblem, gauss_newton, require_enough, starts
+from tolalloc.wings.bench.parameters import Parameter, parameter
+from tolalloc.wings.bench.prediction import (
+    AllReadings,
+    KernelPredictor,
+    Prediction,
+    ReadingBlock,
+    Surrogate,
+    data_of,
+    fit_surrogate,
+)
+from tolalloc.wings.bench.profile import as_stiffness, bootstrap, estimates, judged, profile, simplest
+from tolalloc.wings.bench.telling.identification import estimate_sentence
 
 NONE = np.empty(0)
 RV20E = load_reducer("rv20e_liu2020")

@@ -9,11 +9,11 @@ import pytest
 import tolalloc as ta
 from tests.builders import ZONE_OF_A_LENGTH, refusal, written
 from tests.golden.cases import small_effort
-from tolalloc.bench.lots import load_lot, prepare_lot
 from tolalloc.drawings.sources import meant
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_text
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.study.prepared import Prepared
+from tolalloc.wings.bench.lots import load_lot, prepare_lot
 
 POSITION = {"feature": "position", "plus": 5, "minus": 0, "unit": "µm", "min": 1, "max": 10, "cost": 6.5}
 JOURNALS = {f"crank{i}.journal{j}.eccentricity" for i in (1, 2, 3) for j in (1, 2)}

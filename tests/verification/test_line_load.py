@@ -13,6 +13,7 @@ from scipy.special import ellipe, ellipkm1
 
 from tests.random_cases import random_reducer
 from tolalloc.exceptions import InputError
+from tolalloc.numeric import reducer as design_of
 from tolalloc.reading.units import ARCSECOND, MEGAPASCAL, MICROMETRE, MILLIMETRE
 from tolalloc.reducers import TORSIONAL_STIFFNESS
 from tolalloc.reducers.cycloid.line_contact import LineContact
@@ -26,7 +27,6 @@ from tolalloc.reducers.equivalent.outputs import Solved, contact_pattern, line_c
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.reducers.response.outputs import OutputsResponse, requirements_of
-from tolalloc.study.numeric import reducer as design_of
 
 TORQUE = -100.0
 

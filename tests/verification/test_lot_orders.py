@@ -10,7 +10,11 @@ import pytest
 from scipy import stats
 
 import tolalloc as ta
-from tolalloc.bench.lot_orders import (
+from tolalloc.capability.indices import holm
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.exceptions import InputError
+from tolalloc.models.model import Evaluation
+from tolalloc.wings.bench.lot_orders import (
     LotCurves,
     PredictedOrder,
     judged_orders,
@@ -19,11 +23,7 @@ from tolalloc.bench.lot_orders import (
     predicted_orders,
     with_sources,
 )
-from tolalloc.bench.posterior import Noise
-from tolalloc.capability.indices import holm
-from tolalloc.drawings.seeds import SeedTree
-from tolalloc.exceptions import InputError
-from tolalloc.models.model import Evaluation
+from tolalloc.wings.bench.posterior import Noise
 
 LEVEL, UNITS, LOTS = 0.05, 25, 200
 NOISE = 0.03

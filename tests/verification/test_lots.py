@@ -13,7 +13,9 @@ from scipy import stats
 
 import tolalloc as ta
 from tests.validation_manual import shown
-from tolalloc.bench.lots import (
+from tolalloc.capability.indices import c4, control_limits, holm
+from tolalloc.drawings.sources import Source
+from tolalloc.wings.bench.lots import (
     GaugedColumn,
     LotRequest,
     LotResult,
@@ -22,9 +24,7 @@ from tolalloc.bench.lots import (
     judge_lot,
     load_lot,
 )
-from tolalloc.bench.processes import CONFIDENCE, EXACT, Gauge, GaugeError, Lots, NormalLaw
-from tolalloc.capability.indices import c4, control_limits, holm
-from tolalloc.drawings.sources import Source
+from tolalloc.wings.bench.processes import CONFIDENCE, EXACT, Gauge, GaugeError, Lots, NormalLaw
 
 LEVEL, PARTS = 0.05, 25
 ROW = {"plus": 3, "minus": -3, "unit": "µm", "min": 1, "max": 60, "cost": 1.0}

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from tests.builders import prepared, reducer_file, refusal
-from tolalloc.bench.sources import has_half_turn
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers import RADIAL_CLEARANCE
@@ -17,8 +16,6 @@ from tolalloc.reducers.cycloid.clearance import clearance_of, linear_clearance
 from tolalloc.reducers.cycloid.loaded_contact import assess
 from tolalloc.reducers.cycloid.measured_profile import MeasuredProfile, aligned, normal_deviations
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile, normals, path_of
-from tolalloc.reducers.dynamics.prototype import mesh_of, part_errors
-from tolalloc.reducers.dynamics.solvers.pin_forces import pin_contacts
 from tolalloc.reducers.equivalent.interfaces import pin_contact
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import radial_clearance
@@ -29,7 +26,10 @@ from tolalloc.reducers.reducer.files import load_reducer, write_modified
 from tolalloc.reducers.reducer.form import FlankForm, Form, PinForm, flank_form, load_designed
 from tolalloc.reducers.transmission_error import transmission_error
 from tolalloc.reducers.unit_file import BuiltUnit, load_unit
-from tolalloc.study.inquiries.diagnose import Diagnose
+from tolalloc.wings.bench.ask.diagnose import Diagnose
+from tolalloc.wings.bench.sources import has_half_turn
+from tolalloc.wings.motion.prototype import mesh_of, part_errors
+from tolalloc.wings.motion.solvers.pin_forces import pin_contacts
 
 AMOUNTS = Modification(equidistant=-8.16e-6, shift=-16.16e-6)
 NONE = Modification(equidistant=0.0, shift=0.0)

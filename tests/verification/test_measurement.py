@@ -10,17 +10,17 @@ import pytest
 
 from studies.published.measurement_folder import write_measurements
 from tests.builders import written
-from tolalloc.bench.measurements import (
+from tolalloc.exceptions import InputError
+from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE
+from tolalloc.reducers.unit_file import BuiltUnit, load_units, units_text
+from tolalloc.wings.bench.measurements import (
     MeasuredCurve,
     MeasuredLoop,
     MeasuredPeakToPeak,
     Measurements,
     load_measurements,
 )
-from tolalloc.bench.readings import FULL, READINGS, RawReadings, clean_curve, clean_loop, resampled
-from tolalloc.exceptions import InputError
-from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE
-from tolalloc.reducers.unit_file import BuiltUnit, load_units, units_text
+from tolalloc.wings.bench.readings import FULL, READINGS, RawReadings, clean_curve, clean_loop, resampled
 
 TURN = 2 * np.pi
 ORDERS = (1, 2, 39, 78, 80)

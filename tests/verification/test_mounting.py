@@ -10,8 +10,19 @@ import numpy as np
 import pytest
 
 from tests.builders import baseline_errors, kernel_of, seeded_units, written
-from tolalloc.assembly.mounting import best_mounting, random_mounting, units_from
-from tolalloc.assembly.places import (
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.exceptions import InputError, SolveError, TolallocError, UnknownNameError
+from tolalloc.models.model import Evaluation
+from tolalloc.reading.units import ARCSECOND, MICROMETRE
+from tolalloc.reducers.equivalent.interfaces import crank_disc, dense_rows
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.springs import Positions
+from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.wings.assembly.mounting import best_mounting, random_mounting, units_from
+from tolalloc.wings.assembly.places import (
     PartTurn,
     Place,
     carrier_turn,
@@ -24,19 +35,8 @@ from tolalloc.assembly.places import (
     sun_turn,
     unmounted,
 )
-from tolalloc.assembly.stock import MeasuredPart, PartStock, drawn_parts, load_parts, own_errors
-from tolalloc.bench.sources import half_turn
-from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.seeds import SeedTree
-from tolalloc.exceptions import InputError, SolveError, TolallocError, UnknownNameError
-from tolalloc.models.model import Evaluation
-from tolalloc.reading.units import ARCSECOND, MICROMETRE
-from tolalloc.reducers.equivalent.interfaces import crank_disc, dense_rows
-from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.springs import Positions
-from tolalloc.reducers.reducer.design import Reducer
-from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.wings.assembly.stock import MeasuredPart, PartStock, drawn_parts, load_parts, own_errors
+from tolalloc.wings.bench.sources import half_turn
 
 TORQUE = -1.0
 ROUNDING = 1e-9  # arcsec

@@ -10,9 +10,9 @@ import tolalloc as ta
 from tests.builders import ZONE_OF_A_LENGTH, written
 from tolalloc.exceptions import InputError
 from tolalloc.reducers.choice import bind
-from tolalloc.study.inquiries.diagnose import Diagnose
-from tolalloc.study.inquiries.lot import Lot
 from tolalloc.study.prepared import Prepared
+from tolalloc.wings.bench.ask.diagnose import Diagnose
+from tolalloc.wings.bench.ask.lot import Lot
 
 ROW = {"unit": "µm", "min": 1, "max": 10, "cost": 6.5}
 ROWS = (

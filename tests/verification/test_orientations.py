@@ -7,11 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tolalloc.assembly.chain import DatumFlowChain, Part
-from tolalloc.assembly.control import regulator
-from tolalloc.assembly.files import load_plan
-from tolalloc.assembly.orientations import OrientationResponse, transmission_curves
-from tolalloc.assembly.trajectory import foreseen
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.models.model import Response
@@ -20,6 +15,11 @@ from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import Solved, peak_line_load
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
 from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.wings.assembly.chain import DatumFlowChain, Part
+from tolalloc.wings.assembly.control import regulator
+from tolalloc.wings.assembly.files import load_plan
+from tolalloc.wings.assembly.orientations import OrientationResponse, transmission_curves
+from tolalloc.wings.assembly.trajectory import foreseen
 
 LOAD = "largest line load, rated torque [N/mm]"
 

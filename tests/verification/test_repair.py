@@ -7,9 +7,9 @@ import pytest
 from scipy import stats
 
 from tests.builders import refusal
-from tolalloc.bench.repair import NextReading, Repair, load_repair, repair_costs, worth_of
 from tolalloc.drawings.drawing import load_drawing
 from tolalloc.drawings.seeds import SeedTree
+from tolalloc.wings.bench.repair import NextReading, Repair, load_repair, repair_costs, worth_of
 
 UNITS = 2**15
 

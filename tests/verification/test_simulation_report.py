@@ -10,9 +10,9 @@ import pytest
 from tests.builders import says
 from tolalloc.reading.units import ARCSECOND, RPM
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.simulation import AtRest, SimulationRequest, SimulationResult, TimeSeries
 from tolalloc.reports.header import Header
-from tolalloc.reports.tellers.simulation import SimulationTeller, error_figure, line, range_text, series_table
+from tolalloc.wings.motion.simulation import AtRest, SimulationRequest, SimulationResult, TimeSeries
+from tolalloc.wings.motion.telling.simulation import SimulationTeller, error_figure, line, range_text, series_table
 
 RATIO, SPEED, LOAD, STEP = 81.0, 525 * RPM, 572.0, 1e-4
 TIMES = 5001

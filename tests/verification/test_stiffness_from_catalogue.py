@@ -8,7 +8,6 @@ import pytest
 
 from tests.builders import says
 from tests.studies.command import answer_of, refused, tolalloc
-from tolalloc.bench.catalogue import identify_from_catalogue, with_bearings
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCMINUTE
 from tolalloc.reducers.equivalent.perfect import exact_loop
@@ -17,6 +16,7 @@ from tolalloc.reducers.reducer.files import load_identified_stiffness, load_redu
 from tolalloc.reports.header import Header
 from tolalloc.reports.portraits.reducer import twist_table
 from tolalloc.study.answer import Answer
+from tolalloc.wings.bench.catalogue import identify_from_catalogue, with_bearings
 
 
 @pytest.fixture(scope="module")

@@ -16,9 +16,13 @@ from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE
 from tolalloc.reducers.cycloid.clearance import exact_clearance
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
-from tolalloc.reducers.dynamics import prototype as door
-from tolalloc.reducers.dynamics.motion import Damping, Inertia
-from tolalloc.reducers.dynamics.prototype import (
+from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import forces
+from tolalloc.reducers.reducer.design import Modification, Reducer
+from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.wings.motion import prototype as door
+from tolalloc.wings.motion.motion import Damping, Inertia
+from tolalloc.wings.motion.prototype import (
     RIGID,
     TimeCourse,
     TimeSteps,
@@ -27,11 +31,7 @@ from tolalloc.reducers.dynamics.prototype import (
     simulate_prototype,
     with_rigid_bearings,
 )
-from tolalloc.reducers.dynamics.solvers.pin_forces import fill_forces, pin_contacts
-from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import forces
-from tolalloc.reducers.reducer.design import Modification, Reducer
-from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.wings.motion.solvers.pin_forces import fill_forces, pin_contacts
 
 pytest.importorskip("exudyn")
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from dataclasses import MISSING, fields
-from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_type_hints
 
@@ -15,9 +14,8 @@ from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, not
 from tolalloc.study.inquiry import Inquiry, Word
 
 
-def inquiry_command(name: str) -> Callable[..., None]:
-    """Return the command of a module of `tolalloc.study.inquiries`."""
-    inquiry: type[Inquiry[Any]] = import_module(f"tolalloc.study.inquiries.{name}").INQUIRY
+def inquiry_command(inquiry: type[Inquiry[Any]]) -> Callable[..., None]:
+    """Return the command of an inquiry."""
 
     def command(out: Path | None, as_json: bool, **given: Any) -> None:
         from tolalloc.reports.folder import require_usable

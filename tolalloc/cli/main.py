@@ -6,6 +6,7 @@ import io
 import os
 import sys
 import time
+from collections.abc import Callable
 from contextlib import nullcontext
 from typing import Annotated
 
@@ -20,6 +21,7 @@ from tolalloc.cli.options import SayingNumbers, saying_options
 from tolalloc.cli.run import allocate, rank, run
 from tolalloc.cli.studies import check, series, whatif
 from tolalloc.exceptions import InputError, StoppedError, TolallocError, in_short
+from tolalloc.wings import all_inquiries
 
 app = typer.Typer(
     cls=SayingNumbers,
@@ -40,7 +42,7 @@ def _version(version: Annotated[bool, typer.Option("--version", help="Print the 
         raise typer.Exit
 
 
-_COMMANDS = (
+_COMMANDS: tuple[Callable[..., None], ...] = (
     new,
     check,
     open_page,
@@ -49,24 +51,13 @@ _COMMANDS = (
     allocate,
     whatif,
     series,
-    inquiry_command("compare"),
-    inquiry_command("costs"),
-    inquiry_command("te"),
-    inquiry_command("contact"),
-    inquiry_command("duty"),
-    inquiry_command("modify"),
-    inquiry_command("identify"),
-    inquiry_command("diagnose"),
-    inquiry_command("lot"),
-    inquiry_command("assemble"),
-    inquiry_command("mount"),
-    inquiry_command("simulate"),
+    *map(inquiry_command, all_inquiries()),
     schema,
     doctor,
 )
 """In the order in which a newcomer meets them."""
 
-EXAMPLES = {
+EXAMPLES = {own.word: own.example for own in all_inquiries()} | {
     "new": "tolalloc new mine --like rv40e --cranks 3 --with all",
     "run": "tolalloc run mine/study.py --quick",
     "check": "tolalloc check mine/study.py",
@@ -75,18 +66,6 @@ EXAMPLES = {
     "allocate": "tolalloc allocate mine/study.py --grades --limit 50",
     "whatif": "tolalloc whatif mine/study.py pin.diameter=3 'disc*.pitch=10'",
     "series": "tolalloc series mine/*.py --quick",
-    "costs": "tolalloc costs mine/shop.csv",
-    "te": "tolalloc te --reducer rv20e --unit table4 --attribute",
-    "contact": "tolalloc contact --reducer mine/reducer.toml",
-    "duty": "tolalloc duty mine/cycle.csv --reducer mine/reducer.toml",
-    "modify": "tolalloc modify --flank 3.5 --radial 8 --reducer mine/reducer.toml",
-    "identify": "tolalloc identify mine/bench.toml --reducer mine/reducer.toml",
-    "diagnose": "tolalloc diagnose mine/unit7.csv --reducer mine/reducer.toml --tolerances mine/zones.csv",
-    "lot": "tolalloc lot mine/lot.csv mine/zones.csv",
-    "assemble": "tolalloc assemble mine/chain.toml --measured mine/angles.csv",
-    "mount": "tolalloc mount mine/parts.csv --reducer mine/reducer.toml",
-    "simulate": "tolalloc simulate --reducer rv40e --out motion",
-    "compare": "tolalloc compare runs/mine runs/other",
     "schema": "tolalloc schema reducer",
     "doctor": "tolalloc doctor",
 }

@@ -27,7 +27,7 @@ def new(
     cranks: Annotated[int | None, typer.Option(help="Cranks, 2 to 4; those of the preset unless given.")] = None,
     discs: Annotated[int | None, typer.Option(help="Discs, 1 to 3; those of the preset unless given.")] = None,
     samples: Annotated[
-        str, typer.Option("--with", help="Samples: costs,processes,cmm,bench,curve,lot,parts,assembly or all.")
+        str, typer.Option("--with", help="Samples for the other commands, such as costs,bench,lot, or all.")
     ] = "",
 ) -> None:
     """Make a folder with a reducer, its tolerance table, a study and samples: the start of your own."""

@@ -5,19 +5,16 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
 from typing import Any
 
-from pydantic import BaseModel, create_model
+from pydantic import BaseModel
 
-from tolalloc.assembly.files import ChainRecord, PartRecord
-from tolalloc.assembly.steps import AssemblyStep
-from tolalloc.bench.measurements import CurveRecord, LoopRecord, MeasurementRecord, PeakToPeakRecord
-from tolalloc.cli.samples import Samples
+from tolalloc.cli.samples import samples
 from tolalloc.drawings.distributions import Distribution
 from tolalloc.drawings.drawing import load_drawing
 from tolalloc.drawings.fields import COLUMNS, headers_in
@@ -41,24 +38,8 @@ from tolalloc.reducers.reducer.files import (
     load_reducer,
 )
 from tolalloc.reducers.unit_file import UnitRecord
-
-
-def _chain() -> type[BaseModel]:
-    """Return the record of a chain file with its inner tables, which are read one by one."""
-    inner: dict[str, Any] = {"part": (tuple[PartRecord, ...], ...), "step": (tuple[AssemblyStep, ...], ())}
-    return create_model("ChainRecord", __base__=ChainRecord, **inner)
-
-
-def _bench() -> type[BaseModel]:
-    """Return the record of a measurement file with its inner tables, which are read one by one."""
-    inner: dict[str, Any] = {
-        "units": (str | tuple[str, ...], ...),  # one name is read as a list of one
-        "peak_to_peak": (PeakToPeakRecord | None, None),
-        "curves": (tuple[CurveRecord, ...], ()),
-        "loops": (tuple[LoopRecord, ...], ()),
-    }
-    return create_model("MeasurementRecord", __base__=MeasurementRecord, **inner)
-
+from tolalloc.study.sample import NewReducer, Sample
+from tolalloc.wings import wings
 
 KINDS: dict[str, Callable[[], type[BaseModel]]] = {
     "reducer": lambda: ReducerRecord,
@@ -66,8 +47,7 @@ KINDS: dict[str, Callable[[], type[BaseModel]]] = {
     "single-stage": lambda: SingleStageRecord,
     "unit": lambda: UnitRecord,
     "stiffness": lambda: IdentifiedStiffnessRecord,
-    "bench": _bench,
-    "chain": _chain,
+    **{kind: record for wing in wings() for kind, record in wing.schemas.items()},
 }
 """Kind of TOML file → the record that reads it."""
 
@@ -134,10 +114,16 @@ class Likeness:
         """The preset itself."""
         return load_reducer(self.preset)
 
+    @property
+    def samples(self) -> Mapping[str, Sample]:
+        """Kinds of samples that the family has."""
+        has_cranks = self.reducer.crank_count > 0
+        return {kind: own for kind, own in samples().items() if has_cranks or not own.needs_cranks}
+
     def kinds(self, samples: str) -> tuple[str, ...]:
         """Return the kinds of samples that are named, separated by commas, or all that the family has."""
         if samples == "all":
-            return self.new.samples
+            return tuple(self.samples)
         return tuple(kind.strip() for kind in samples.split(",") if kind.strip())
 
     def text(self, name: str) -> str:
@@ -375,38 +361,6 @@ set a drawing.
 {samples}{commands}
 Every zone, range and cost is assumed: write your own. A row with zone 0 is neglected.
 """
-_SAID = {
-    "costs": {"shop.csv": "prices of a shop, invented"},
-    "processes": {
-        "processes.csv": "what processes hold, assumed",
-        "process_costs.csv": "ways to make a feature and what each costs, invented",
-        "with_processes.py": "the study with these ways to choose from",
-    },
-    "cmm": {
-        "pin_diameters.csv": "measured pins, simulated: name it under `measured`, with `empirical` under `distribution`"
-    },
-    "bench": {"bench.toml": "curves and loops of two units, simulated; its tables are `bench_….csv`"},
-    "cycle": {"cycle.csv": "load cases of a joint, invented"},
-    "curve": {"unit7.csv": "the curve of a bad unit, simulated"},
-    "lot": {"lot.csv": "gauge readings of a lot of 25 units, simulated"},
-    "parts": {"parts.csv": "measured parts of two units, simulated"},
-    "assembly": {
-        "chain.toml": "which part is adjusted against which, as zhang2025 has it",
-        "angles.csv": "measured angles of four parts, invented",
-    },
-}
-"""Kind of sample → its files and what they are."""
-_ASKED = {
-    "costs": "tolalloc costs shop.csv",
-    "processes": "tolalloc check with_processes.py",
-    "bench": "tolalloc identify bench.toml --reducer reducer.toml",
-    "cycle": "tolalloc duty cycle.csv --reducer reducer.toml",
-    "curve": "tolalloc diagnose unit7.csv --reducer reducer.toml --tolerances zones.csv",
-    "lot": "tolalloc lot lot.csv zones.csv",
-    "parts": "tolalloc mount parts.csv --reducer reducer.toml",
-    "assembly": "tolalloc assemble chain.toml --measured angles.csv",
-}
-"""Kind of sample → the command that reads it."""
 
 
 def _write_schemas(folder: Path, reducer: str) -> None:
@@ -415,8 +369,8 @@ def _write_schemas(folder: Path, reducer: str) -> None:
     That of the reducer is of its family's kind.
     """
     (folder / "schemas").mkdir()
-    for file, kind in {"reducer.toml": reducer, "bench.toml": "bench", "chain.toml": "chain"}.items():
-        if (path := folder / file).exists():
+    for path in sorted(folder.glob("*.toml")):
+        if (kind := reducer if path.stem == "reducer" else path.stem) in KINDS:
             text = json.dumps(schema(kind), ensure_ascii=False, indent=2)
             (folder / "schemas" / f"{kind}.json").write_text(text + "\n", encoding="utf-8")
             named = f"#:schema ./schemas/{kind}.json\n{path.read_text(encoding='utf-8')}"
@@ -435,8 +389,12 @@ class NewFolder:
         if not _NAME.fullmatch(self.place.name):
             raise InputError.at("new folder", "name", self.place.name, "60 letters, digits, - and _, a letter first")
         for kind in self.samples:
-            if kind not in self.like.new.samples:
-                raise UnknownNameError.among("new folder", "sample", kind, (*self.like.new.samples, "all"))
+            if kind not in self.like.samples:
+                raise UnknownNameError.among("new folder", "sample", kind, (*self.like.samples, "all"))
+
+    @property
+    def _asked(self) -> tuple[Sample, ...]:
+        return tuple(self.like.samples[kind] for kind in self.samples)
 
     def write(self) -> tuple[Reducer, tuple[Source, ...]]:
         """Write the folder, whole or not at all, and return its reducer and its sources.
@@ -480,17 +438,17 @@ class NewFolder:
             files = '"zones.xlsx", processes="processes.csv", costs="process_costs.csv"'
             study = study.replace('"zones.xlsx"', files).replace(f'name="{name}"', f'name="{name}-processes"')
             (folder / "with_processes.py").write_text(study, encoding="utf-8")
-        makers = Samples(reducer=reducer, sources=sources).makers if self.samples else {}
-        for kind in self.samples:
-            for file, text in makers[kind]().items():
+        new = NewReducer(reducer=reducer, sources=sources)
+        for own in self._asked:
+            for file, text in own.make(new).items():
                 (folder / file).write_text(text, encoding="utf-8")
         _write_schemas(folder, self.like.new.schema)
         return reducer, sources
 
     def _read_me(self) -> str:
         """Return the page of the folder: what to type, and what every file is."""
-        rows = "".join(f"| `{file}` | {what} |\n" for kind in self.samples for file, what in _SAID[kind].items())
-        asked = "".join(f"{_ASKED[kind]}\n" for kind in self.samples if kind in _ASKED)
+        rows = "".join(f"| `{file}` | {what} |\n" for own in self._asked for file, what in own.files.items())
+        asked = "".join(f"{own.command}\n" for own in self._asked if own.command)
         commands = f"\nOn the samples, some of them for minutes:\n\n```sh\n{asked}```\n" if asked else ""
         return _READ_ME.format(name=self.place.name, samples=rows, commands=commands)
 

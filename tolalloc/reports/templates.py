@@ -20,21 +20,21 @@ _BLANKS = re.compile(r"[ \n]+")
 
 
 @lru_cache(maxsize=64)
-def _texts(name: str) -> dict[str, str]:
-    text = files("tolalloc.reports").joinpath("sentences", f"{name}.toml").read_text(encoding="utf-8")
+def _texts(name: str, room: str) -> dict[str, str]:
+    text = files(room).joinpath("sentences", f"{name}.toml").read_text(encoding="utf-8")
     return {key: _BLANKS.sub(" ", value.strip()) for key, value in tomllib.loads(text).items()}
 
 
 class Sentences:
-    """The sentences of one teller, ``tolalloc/reports/sentences/NAME.toml``.
+    """The sentences of one teller, ``sentences/NAME.toml`` of its room.
 
     >>> Sentences("costs")("assumption")
     'the error of a cost is relative, and the same at all zones'
     """
 
-    def __init__(self, name: str) -> None:
-        self._name = name
+    def __init__(self, name: str, room: str = "tolalloc.reports") -> None:
+        self._name, self._room = name, room
 
     def __call__(self, key: str, /, **gaps: Any) -> str:
         """Return a sentence with its gaps filled; a key or gap that is missing is the teller's fault, a KeyError."""
-        return _SPOKEN.format(_texts(self._name)[key], **gaps)
+        return _SPOKEN.format(_texts(self._name, self._room)[key], **gaps)

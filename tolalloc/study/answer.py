@@ -35,6 +35,8 @@ class Answer(Generic[Result]):
         What every answer says of its run.
     result
         The numbers, frozen, with units.
+    told_by
+        What tells of it; the teller of its kind unless given.
 
     Notes
     -----
@@ -44,11 +46,14 @@ class Answer(Generic[Result]):
     kind: str
     header: Header
     result: Result
+    told_by: type[Teller[Result]] | None = None
 
     @cached_property
     def teller(self) -> Teller[Result]:
         """What tells people of the result."""
-        return teller_of(self.kind, self.result, self.header)
+        return (
+            self.told_by(self.result, self.header) if self.told_by else teller_of(self.kind, self.result, self.header)
+        )
 
     @property
     def title(self) -> str:

@@ -91,6 +91,8 @@ class Inquiry(NamedFields, ABC, Generic[Prepared]):
     are_arguments: ClassVar[bool] = True
     word: ClassVar[str]
     """Its command and the function of ``ta``."""
+    example: ClassVar[str]
+    """Its command as typed in a folder that ``tolalloc new mine --with all`` made."""
     counted: ClassVar[str] = "units"
     """What its progress counts."""
     kernel: ClassVar[Literal["", "equivalent"]] = ""

@@ -41,7 +41,6 @@ class NewRows:
     table: str  # Tolerance table that is scaled, and that states the clearances of its modification
     diameter: float  # Of the pin circle to which the table belongs [mm]
     lost_motion: float  # Limit that its first study asks for [arcmin]
-    samples: tuple[str, ...]  # Kinds of samples that a folder may have
     priced: tuple[str, str, str]  # Patterns of sources that the sample of process costs prices
     schema: str  # Kind of its reducer files
     stiffer: str  # Stiffness whose true value the simulated bench differs in, a field of `Stiffness`

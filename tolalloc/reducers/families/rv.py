@@ -124,7 +124,6 @@ RV = ReducerFamily(
         table="rv20e_drawing",
         diameter=104.0,
         lost_motion=1.0,
-        samples=("costs", "processes", "cmm", "bench", "curve", "cycle", "lot", "parts", "assembly"),
         priced=("disc?.bore?.position", "crank?.journal?.eccentricity", "pin.diameter"),
         schema="reducer",
         stiffer="crank_disc_bearing",

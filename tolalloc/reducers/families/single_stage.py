@@ -270,7 +270,6 @@ SINGLE_STAGE = ReducerFamily(
         table="cd29_drawing",
         diameter=80.0,
         lost_motion=2.0,
-        samples=("costs", "processes", "cmm", "bench", "curve", "cycle", "lot"),
         priced=("disc?.hole.position", "shaft.journal?.eccentricity", "pin.diameter"),
         schema="single-stage",
         stiffer="eccentric_bearing",

@@ -20,6 +20,7 @@ class Compare(Inquiry[Comparison]):
     """Two finished studies side by side: answers, rankings, zones; the last two of the folder runs unless named."""
 
     word: ClassVar[str] = "compare"
+    example: ClassVar[str] = "tolalloc compare runs/mine runs/other"
     by_position: ClassVar[int] = 2
 
     first: Annotated[Path | None, Word("Folder of a finished run, A; the last but one in runs unless given.")] = None
@@ -48,6 +49,3 @@ class Compare(Inquiry[Comparison]):
         names = ", ".join(run.name for run in prepared.runs)
         header = Header(name=names, model="", currency=common_currency(prepared.runs))
         return Answer(kind="comparison", header=header, result=prepared)
-
-
-INQUIRY = Compare

@@ -30,6 +30,7 @@ class Contact(Inquiry["tuple[Reducer, float]"]):
     """Clearance, backlash, pins in contact, forces and pressure of exact parts."""
 
     word: ClassVar[str] = "contact"
+    example: ClassVar[str] = "tolalloc contact --reducer mine/reducer.toml"
     kernel: ClassVar[Literal["", "equivalent"]] = "equivalent"
     written: ClassVar[tuple[str, ...]] = ("profile",)
 
@@ -101,6 +102,3 @@ def written_profile(teeth: ToothProfile, points: int, file: Path | None) -> tupl
     made = write_profile(teeth, points, file)
     error = f"{made.chord_error / MICROMETRE:.2g} µm"
     return (f"Profile: {file}, {made.per_tooth} points per tooth, chord error at most {error}.",)
-
-
-INQUIRY = Contact

@@ -18,6 +18,7 @@ class Costs(Inquiry[tuple[ShopFit, ...]]):
     """Cost of a zone from shop data: every closed form with its fit error and the range where it holds."""
 
     word: ClassVar[str] = "costs"
+    example: ClassVar[str] = "tolalloc costs mine/shop.csv"
     by_position: ClassVar[int] = 1
 
     shop: Annotated[Path, Word("CSV: columns process, tolerance [unit], unit, cost [cost units].")]
@@ -30,6 +31,3 @@ class Costs(Inquiry[tuple[ShopFit, ...]]):
         """Return the forms with the currency that the file states."""
         header = Header(name=self.shop.name, model="closed forms", currency=currency_of_prices(self.shop))
         return Answer(kind="costs", header=header, result=prepared)
-
-
-INQUIRY = Costs

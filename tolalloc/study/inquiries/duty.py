@@ -23,6 +23,7 @@ class Duty(Inquiry["tuple[Reducer, tuple[LoadCase, ...]]"]):
     """Lives of the bearings, loads, losses and temperature of the discs under a duty cycle, of exact parts."""
 
     word: ClassVar[str] = "duty"
+    example: ClassVar[str] = "tolalloc duty mine/cycle.csv --reducer mine/reducer.toml"
     by_position: ClassVar[int] = 1
     kernel: ClassVar[Literal["", "equivalent"]] = "equivalent"
 
@@ -52,6 +53,3 @@ class Duty(Inquiry["tuple[Reducer, tuple[LoadCase, ...]]"]):
         result = duty_of(design, cases, self.resistance)
         header = Header(name=f"{design.name}: {self.cycle.stem}", model=design.name, assumptions=design.assumptions)
         return Answer(kind="duty", header=header, result=result)
-
-
-INQUIRY = Duty

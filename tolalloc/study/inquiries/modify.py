@@ -24,6 +24,7 @@ class Modify(Inquiry["tuple[ModificationRequest, Reducer, float]"]):
     """Choose equidistant and shift amount for wanted clearances or by a published objective; say what they deliver."""
 
     word: ClassVar[str] = "modify"
+    example: ClassVar[str] = "tolalloc modify --flank 3.5 --radial 8 --reducer mine/reducer.toml"
     by_position: ClassVar[int] = 1
     kernel: ClassVar[Literal["", "equivalent"]] = "equivalent"
     written: ClassVar[tuple[str, ...]] = ("profile", "write_to")
@@ -107,6 +108,3 @@ def answer_of(result: ModificationResult) -> Answer[ModificationResult]:
     conditions = {"torque on the carrier [N·m]": result.contact.torque}
     header = Header(name=result.request.method, model=result.reducer.name, conditions=conditions)
     return Answer(kind="modification", header=header, result=result)
-
-
-INQUIRY = Modify

@@ -21,6 +21,7 @@ class TransmissionError(Inquiry["tuple[Reducer, BuiltUnit, float]"]):
     """Transmission error of one built unit over one output turn."""
 
     word: ClassVar[str] = "te"
+    example: ClassVar[str] = "tolalloc te --reducer rv20e --unit table4 --attribute"
     kernel: ClassVar[Literal["", "equivalent"]] = "equivalent"
 
     reducer: ReducerName = None
@@ -59,6 +60,3 @@ class TransmissionError(Inquiry["tuple[Reducer, BuiltUnit, float]"]):
             statuses=result.statuses,
         )
         return Answer(kind="transmission error", header=header, result=result)
-
-
-INQUIRY = TransmissionError

@@ -1,0 +1,66 @@
+"""What to turn at every step of an assembly, what it leaves, and what tolerances cost then."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+from tolalloc.reports.header import Header
+from tolalloc.running.progress import Progress, RunRecord
+from tolalloc.study.answer import Answer
+from tolalloc.study.inquiry import Inquiry, Word
+
+if TYPE_CHECKING:
+    from tolalloc.wings.assembly.adjustment import AssemblyRequest, AssemblyResult
+
+
+@dataclass(frozen=True, kw_only=True)
+class Assemble(Inquiry["AssemblyRequest"]):
+    """Turn parts while they are assembled: how far, what that leaves, and which angular tolerances are cheapest."""
+
+    word: ClassVar[str] = "assemble"
+    example: ClassVar[str] = "tolalloc assemble mine/chain.toml --measured mine/angles.csv"
+    by_position: ClassVar[int] = 1
+    counted: ClassVar[str] = "assemblies"
+
+    chain: Annotated[str, Word("Datum flow chain: shipped name or TOML file.")]
+    measured: Annotated[Path | None, Word("CSV: columns part, 'x [arcsec]', 'y [arcsec]', 'z [arcsec]'.")] = None
+    precision: Annotated[float | None, Word("Weight of the final angles against effort, in place of the chain's.")] = (
+        None
+    )
+    seed: Annotated[int, Word("Seed of every random number.")] = 1
+
+    def prepare(self) -> AssemblyRequest:
+        """Return the assembly with its files read and checked."""
+        from tolalloc.wings.assembly.adjustment import prepare_assembly
+
+        return prepare_assembly(self.chain, self.measured, self.precision, self.seed)
+
+    def room(self, prepared: AssemblyRequest) -> str:
+        """Return the room that a chain with a reducer solves with."""
+        return "equivalent" if prepared.plan.reducer else ""
+
+    def solve(self, prepared: AssemblyRequest, progress: Progress) -> Answer[AssemblyResult]:
+        """Return what is to be turned, what it leaves, what that does, and what tolerances cost."""
+        return assembled(prepared, progress)
+
+
+def assembled(request: AssemblyRequest, progress: Progress) -> Answer[AssemblyResult]:
+    """Return the answer on an assembly; see `tolalloc.wings.assembly.adjustment.assemble`."""
+    from tolalloc.reducers.equivalent.model import OUTCOMES
+    from tolalloc.wings.assembly.adjustment import assemble
+    from tolalloc.wings.assembly.telling.assembly import AssemblyTeller
+
+    record = RunRecord(progress, OUTCOMES)
+    result = assemble(request, record)
+    effect, plan = result.transmission, request.plan
+    header = Header(
+        name=plan.name,
+        model=effect.reducer.name if effect else "",
+        seed=request.seed,
+        assumptions=(*plan.assumptions, *(effect.reducer.assumptions if effect else ())),
+        statuses=record.counts,
+        stages=record.stages,
+    )
+    return Answer(kind="assembly", header=header, result=result, told_by=AssemblyTeller)

@@ -1,0 +1,346 @@
+"""What a measured curve tells of the parts of its unit: which source drives it, and what the gauges would show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE
+from tolalloc.reports.columns import Column, Table
+from tolalloc.reports.document import Section
+from tolalloc.reports.figure import Figure, Series
+from tolalloc.reports.teller import Teller
+from tolalloc.reports.templates import Sentences
+from tolalloc.reports.wording import alike
+from tolalloc.wings.bench.diagnosis import DiagnosisResult
+from tolalloc.wings.bench.repair import REDRAWN, Advice, NextReading
+from tolalloc.wings.bench.sources import InseparableColumns
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_SHOWN = 10
+"""Sources that a terminal shows [-]."""
+_say = Sentences("diagnosis", "tolalloc.wings.bench")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Gauged:
+    """What the gauge of one source would show, or one column of it: mean and 95 % interval [µm]."""
+
+    name: str
+    mean: float
+    low: float
+    high: float
+    zone: float = 0.0  # What the drawing allows [µm]
+    probability: float = 0.0  # Of being the dominant source [-]
+    named: bool = False  # Whether it is among those that hold the dominant one
+
+
+_MEAN: tuple[Column[_Gauged], ...] = (
+    Column(header="low 2.5 % [µm]", value=lambda row: row.low),
+    Column(header="high 97.5 % [µm]", value=lambda row: row.high),
+)
+_SOURCES: tuple[Column[_Gauged], ...] = (
+    Column(header="source", value=lambda row: row.name),
+    Column(header="P(dominant) [%]", value=lambda row: row.probability * 100),
+    Column(header="named", value=lambda row: "yes" if row.named else "no"),
+    Column(header="reading [µm]", value=lambda row: row.mean),
+    *_MEAN,
+    Column(header="zone [µm]", value=lambda row: row.zone),
+)
+_COLUMNS: tuple[Column[_Gauged], ...] = (
+    Column(header="column", value=lambda row: row.name),
+    Column(header="mean [µm]", value=lambda row: row.mean),
+    *_MEAN,
+)
+_GROUPS: tuple[Column[tuple[int, InseparableColumns, int]], ...] = (
+    Column(header="group [-]", value=lambda row: row[0]),
+    Column(header="column", value=lambda row: row[1].columns[row[2]]),
+    Column(header="spread alone over the drawing's [-]", value=lambda row: row[1].alone[row[2]]),
+    Column(header="weight in the known sum [-]", value=lambda row: row[1].combination[row[2]]),
+    Column(header="known sum over the drawing's spread [-]", value=lambda row: row[1].value),
+    Column(header="its spread over the drawing's [-]", value=lambda row: row[1].together),
+)
+_NEXT: tuple[Column[NextReading], ...] = (
+    Column(header="source", value=lambda row: row.source, terminal=1),
+    Column(header="gauge minutes [min]", value=lambda row: row.minutes, terminal=1),
+    Column(header="standard deviation of the gauge [µm]", value=lambda row: row.gauge / MICROMETRE),
+    Column(header="expected cost before [{cost}]", value=lambda row: row.before),
+    Column(header="expected cost after [{cost}]", value=lambda row: row.after, terminal=1),
+    Column(header="standard error of what it saves [{cost}]", value=lambda row: row.error),
+    Column(header="saved per minute [{cost}]", value=lambda row: row.gain_per_minute, terminal=1),
+    Column(header="saved beyond its minutes [{cost}]", value=lambda row: row.worth, terminal=1),
+    Column(header="pays", value=lambda row: "yes" if row.pays else "no", terminal=1),
+)
+_DECISIONS: tuple[Column[tuple[str, float, float]], ...] = (
+    Column(header="decision", value=lambda row: row[0]),
+    Column(header="expected cost [{cost}]", value=lambda row: row[1]),
+    Column(header="standard error [{cost}]", value=lambda row: row[2]),
+)
+
+
+class DiagnosisTeller(Teller[DiagnosisResult]):
+    """What is said of a diagnosed unit."""
+
+    @cached_property
+    def _gauged(self) -> tuple[_Gauged, ...]:
+        """What the gauge of every source would show, the likeliest to dominate first."""
+        found = self.result.diagnosis
+        zones = np.array([source.zone for source in self.result.errors.active])
+        low, high = found.reading_interval / MICROMETRE
+        mean, allowed = found.reading_mean / MICROMETRE, zones / MICROMETRE
+        order = np.lexsort((-np.abs(found.reading_mean) / zones, -found.dominant_probability))
+        return tuple(
+            _Gauged(
+                name=found.sources[at],
+                mean=float(mean[at]),
+                low=float(low[at]),
+                high=float(high[at]),
+                zone=float(allowed[at]),
+                probability=float(found.dominant_probability[at]),
+                named=found.sources[at] in found.named,
+            )
+            for at in order
+        )
+
+    @property
+    def _sources(self) -> Table[_Gauged]:
+        return Table(name="sources", columns=_SOURCES, rows=self._gauged)
+
+    @property
+    def _columns(self) -> Table[_Gauged]:
+        """Every column with its interval."""
+        found = self.result.diagnosis
+        levers = [source.lever for source in self.result.errors.active for _ in source.columns]
+        scale = np.array(levers) / MICROMETRE
+        (low, high), mean = found.column_interval * scale, found.column_mean * scale
+        rows = [
+            _Gauged(name=name, mean=float(mean[at]), low=float(low[at]), high=float(high[at]))
+            for at, name in enumerate(found.columns)
+        ]
+        return Table(name="columns", columns=_COLUMNS, rows=rows)
+
+    @property
+    def _groups(self) -> Table[tuple[int, InseparableColumns, int]]:
+        """The columns that the curve does not tell apart, with the combination that it knows."""
+        groups = enumerate(self.result.diagnosis.groups, start=1)
+        rows = [(number, group, at) for number, group in groups for at in range(len(group.columns))]
+        return Table(name="groups", columns=_GROUPS, rows=rows)
+
+    @cached_property
+    def _next(self) -> Table[NextReading]:
+        return Table(name="next", columns=_NEXT, rows=self.result.advice.readings if self.result.advice else ())
+
+    @cached_property
+    def _decisions(self) -> Table[tuple[str, float, float]]:
+        found = self.result.advice
+        rows = zip(found.decisions, found.cost.tolist(), found.error.tolist(), strict=True) if found else ()
+        return Table(name="decisions", columns=_DECISIONS, rows=sorted(rows, key=lambda row: row[1]))
+
+    def _advised(self, found: Advice) -> str:
+        """Return what to measure next, or that nothing is worth its time, and what to do without it."""
+        unit, own = self.header.cost_unit, found.next
+        now = _say("decide", decision=found.best, cost=float(found.cost.min()), unit=unit)
+        if own is None:
+            return _say("stop", now=now)
+        costs = {
+            "before": own.before,
+            "after": own.after,
+            "rate": own.price / own.minutes,
+            "saved": own.gain_per_minute,
+        }
+        return _say("next", source=own.source, minutes=own.minutes, unit=unit, now=now, **costs)
+
+    @property
+    def title(self) -> str:
+        """Which unit it is."""
+        return _say("title", unit=self.header.name)
+
+    @property
+    def subtitle(self) -> str:
+        """How it was measured."""
+        sources = len(self.result.errors.active)
+        return _say("subtitle", reducer=self.header.model, torque=self.result.torque, sources=sources)
+
+    @cached_property
+    def sentences(self) -> tuple[str, ...]:
+        """The diagnosis in sentences."""
+        found, fit = self.result.diagnosis, self.result.diagnosis.fit
+        peak_to_peak = np.ptp(self.result.curve.transmission_error) / ARCSECOND
+        measured = _say("measured", unit=self.header.name, peak_to_peak=peak_to_peak)
+        if not fit.explained:
+            return (_say("unexplained", measured=measured, chi_square=fit.chi_square, freedom=fit.freedom),)
+        named = [row for row in self._gauged if row.named]
+        likely = ", ".join(_say("one_likely", source=row.name, share=row.probability * 100) for row in named)
+        first = named[0]
+        reading, low, high = alike(first.mean, first.low, first.high, figures=2)
+        pairs = "; ".join(_say("pair", one=one, other=other) for one, other in found.twins)
+        return (
+            _say("likely", measured=measured, level=self.result.level, likely=likely),
+            _say("first", source=first.name, reading=reading, low=low, high=high, zone=first.zone),
+            *((_say("twins", pairs=pairs),) if pairs else ()),
+            *(
+                _say("groups", sources=", ".join(sources))
+                for sources in dict.fromkeys(group.sources for group in found.groups)
+            ),
+            *((self._advised(self.result.advice),) if self.result.advice else ()),
+        )
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before opening the unit."""
+        return (
+            *(() if self.result.diagnosis.fit.explained else (_say("warn_unexplained"),)),
+            *((_say("warn_failed", failed=self.header.failed),) if self.header.failed else ()),
+            *(_say("warn_repaired", repair=repair) for repair in self.result.curve.repairs),
+        )
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What no source states."""
+        noise = self.result.noise
+        return (
+            *self.result.reducer.assumptions,
+            _say("assume_noise", reading=noise.reading / ARCSECOND),
+            _say(
+                "assume_discrepancy",
+                discrepancy=noise.discrepancy / ARCSECOND,
+                angle=noise.correlation_angle / DEGREE,
+            ),
+            _say("assume_prior"),
+            _say("assume_angle"),
+            *((_say("assume_repair", redrawn=REDRAWN), _say("assume_gauge")) if self.result.advice else ()),
+            *self.header.assumptions,
+        )
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The whole answer for a program, units in the names."""
+        found = self.result.diagnosis
+        return {
+            "unit": self.header.name,
+            "reducer": self.header.model,
+            "torque [N·m]": self.result.torque,
+            "seed": self.header.seed,
+            "explained": found.fit.explained,
+            "mean sum of squared residuals [-]": found.fit.chi_square,
+            "expected [-]": found.fit.freedom,
+            "named": list(found.named),
+            "level [-]": self.result.level,
+            "sources": self._sources.records(),
+            "twins": [list(pair) for pair in found.twins],
+            "not told apart": [list(group.sources) for group in found.groups],
+            "curves solved [-]": found.evaluations,
+            "curves failed [-]": found.failed,
+            **self._advice_summary,
+            "warnings": list(self.warnings),
+        }
+
+    @property
+    def _advice_summary(self) -> dict[str, Any]:
+        advice = self.result.advice
+        if not advice:
+            return {}
+        measure = advice.next.source if advice.next else None
+        tables = {"readings": self._next.records(), "decisions": self._decisions.records()}
+        return {"measure next": measure, "decision": advice.best, **tables}
+
+    @property
+    def terminal(self) -> tuple[tuple[pd.DataFrame, str], ...]:
+        """The sources that are likeliest to dominate."""
+        sources = self._sources.frame().head(_SHOWN), _say("terminal", unit=self.header.name)
+        saving = [own for own in self._next.rows if own.gain > 0.0]
+        if not saving:
+            return (sources,)
+        table = replace(self._next, rows=saving[:_SHOWN])
+        return sources, (table.terminal(self.header.cost_unit), _say("terminal_next"))
+
+    @cached_property
+    def sections(self) -> tuple[Section, ...]:
+        """Sections in the order of the questions that a reader has."""
+        groups = self._groups
+        return (
+            *self._advice_section,
+            Section(
+                heading=_say("dominant_heading"),
+                paragraphs=(_say("dominant"),),
+                figures=(self._dominant_figure(),),
+                tables=(("sources", self._sources.frame()),),
+            ),
+            Section(heading=_say("readings_heading"), figures=(self._reading_figure(),)),
+            Section(
+                heading=_say("groups_heading"),
+                tables=(("groups", groups.frame()),) if groups.rows else (),
+                paragraphs=() if groups.rows else (_say("no_groups"),),
+            ),
+            Section(heading=_say("curve_heading"), figures=self._curve_figures()),
+            Section(heading=_say("columns_heading"), tables=(("columns", self._columns.frame()),)),
+        )
+
+    @property
+    def _advice_section(self) -> tuple[Section, ...]:
+        if not self.result.advice:
+            return ()
+        unit = self.header.cost_unit
+        tables = (("next", self._next.frame(unit)), ("decisions", self._decisions.frame(unit)))
+        return (Section(heading=_say("next_heading"), paragraphs=(_say("next_meaning"),), tables=tables),)
+
+    def _dominant_figure(self) -> Figure:
+        names, shares = [row.name for row in self._gauged], [row.probability * 100 for row in self._gauged]
+        return Figure(
+            name="dominant",
+            title=_say("dominant_figure"),
+            x_label="probability of being the dominant source [%]",
+            series=(Series(label="probability", kind="bars", x=names, y=shares),),
+        )
+
+    def _reading_figure(self) -> Figure:
+        rows = self._gauged
+        return Figure(
+            name="readings",
+            title=_say("readings_figure"),
+            x_label="reading over zone [-]",
+            series=(
+                Series(
+                    label="mean and 95 % interval",
+                    kind="bars",
+                    x=[row.name for row in rows],
+                    y=[row.mean / row.zone for row in rows],
+                    low=[row.low / row.zone for row in rows],
+                    high=[row.high / row.zone for row in rows],
+                ),
+            ),
+            vertical=((1.0, "zone"),),
+        )
+
+    def _curve_figures(self) -> tuple[Figure, Figure]:
+        fit = self.result.diagnosis.fit
+        angle = list(fit.carrier_angle / DEGREE)
+        measured, fitted = (list(values / ARCSECOND) for values in (fit.measured, fit.fitted))
+        low, high = (list(edge / ARCSECOND) for edge in fit.band)
+        left = list((fit.measured - fit.fitted) / ARCSECOND)
+        axis = "carrier angle [°]"
+        return (
+            Figure(
+                name="curve",
+                title=_say("curve_figure"),
+                x_label=axis,
+                y_label="transmission error [arcsec]",
+                series=(
+                    Series(label="measured", kind="points", x=angle, y=measured),
+                    Series(label="model, mean and 95 % band", kind="line", x=angle, y=fitted, low=low, high=high),
+                ),
+            ),
+            Figure(
+                name="left",
+                title=_say("left_figure"),
+                x_label=axis,
+                y_label="transmission error [arcsec]",
+                series=(Series(label="measured less model", kind="line", x=angle, y=left),),
+                horizontal=((0.0, ""),),
+            ),
+        )

@@ -1,0 +1,362 @@
+"""What a lot shows: which process moved, how its parts keep their zones, control limits and the drawing of the lot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from math import sqrt
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE
+from tolalloc.reports.columns import Column, Table, own_words
+from tolalloc.reports.document import Section
+from tolalloc.reports.figure import Figure, Series
+from tolalloc.reports.teller import Teller
+from tolalloc.reports.templates import Sentences
+from tolalloc.reports.wording import alike
+from tolalloc.wings.bench.lot_orders import LotOrder
+from tolalloc.wings.bench.lots import FOUND, LotCapability, LotResult, MeasuredProcess
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_SHOWN = 10
+"""Rows of a table that a terminal shows [-]."""
+_NAMED = 5
+"""Moved processes that the first sentence names [-]."""
+_LIMIT = 3.0
+"""Standard errors at which a control limit stands [-]."""
+_say = Sentences("lot", "tolalloc.wings.bench")
+
+
+def _moved(own: MeasuredProcess) -> str:
+    """Return what of a process moved, in a word."""
+    words = (("mean", own.named_shift), ("spread", own.spread_moved))
+    return " and ".join(word for word, is_so in words if is_so)
+
+
+_PROCESSES: tuple[Column[MeasuredProcess], ...] = (
+    Column(header="source", value=lambda row: row.name, terminal=1),
+    *own_words(lambda row: (row.column.source,)),
+    Column(header="gauge", value=lambda row: row.column.gauge.value),
+    Column(header="readings [-]", value=lambda row: row.stated.law.parts, terminal=1),
+    Column(header="mean [µm]", value=lambda row: row.mean / MICROMETRE, terminal=1),
+    Column(header="mean, low 2.5 % [µm]", value=lambda row: row.mean_interval[0] / MICROMETRE),
+    Column(header="mean, high 97.5 % [µm]", value=lambda row: row.mean_interval[1] / MICROMETRE),
+    Column(header="drawing's mean [µm]", value=lambda row: row.stated.mean / MICROMETRE, terminal=1),
+    Column(header="standard deviation [µm]", value=lambda row: row.deviation / MICROMETRE),
+    Column(header="standard deviation, low 2.5 % [µm]", value=lambda row: row.deviation_interval[0] / MICROMETRE),
+    Column(header="standard deviation, high 97.5 % [µm]", value=lambda row: row.deviation_interval[1] / MICROMETRE),
+    Column(header="drawing's standard deviation [µm]", value=lambda row: row.stated.deviation / MICROMETRE),
+    Column(
+        header="variance by the gauge [%]",
+        value=lambda row: row.gauge_share * 100.0 if row.column.error.deviation else "",
+        nothing="",
+    ),
+    Column(header="shift [drawing's σ]", value=lambda row: row.shift[0], terminal=1),
+    Column(header="spread over the drawing's [-]", value=lambda row: row.spread[0], terminal=1),
+    Column(header="p value of the mean [-]", value=lambda row: row.shift_probability),
+    Column(header="p value of the spread [-]", value=lambda row: row.spread_probability),
+    Column(header="smaller p value [-]", value=lambda row: row.probability, key=None, terminal=1),
+    Column(header="moved", value=_moved, terminal=1),
+)
+_CAPABILITIES: tuple[Column[LotCapability], ...] = (
+    Column(header="source", value=lambda row: row.source.name, terminal=1),
+    *own_words(lambda row: (row.source,)),
+    Column(header="parts [-]", value=lambda row: row.parts),
+    Column(header="zone [µm]", value=lambda row: row.source.zone / MICROMETRE, terminal=1),
+    Column(header="outside the zone [-]", value=lambda row: row.outside, terminal=1),
+    Column(header="drawing's Cp [-]", value=lambda row: row.source.cp, terminal=1),
+    Column(header="Cp [-]", value=lambda row: row.cp, terminal=1),
+    Column(header="Cp, low 2.5 % [-]", value=lambda row: row.cp_interval[0]),
+    Column(header="Cp, high 97.5 % [-]", value=lambda row: row.cp_interval[1]),
+    Column(header="Cpk [-]", value=lambda row: row.cpk, terminal=1),
+    Column(header="Cpk, low 2.5 % [-]", value=lambda row: row.cpk_interval[0]),
+    Column(header="Cpk, high 97.5 % [-]", value=lambda row: row.cpk_interval[1]),
+    Column(header="drawing's shift [half zone]", value=lambda row: row.source.shift),
+    Column(header="shift [half zone]", value=lambda row: row.row.shift),
+)
+_LIMITS: tuple[Column[MeasuredProcess], ...] = (
+    Column(header="source", value=lambda row: row.name),
+    Column(header="gauge", value=lambda row: row.column.gauge.value),
+    Column(header="parts of the sample [-]", value=lambda row: row.next.parts),
+    Column(header="mean, lower limit [µm]", value=lambda row: row.next.mean[0] / MICROMETRE),
+    Column(header="mean, centre [µm]", value=lambda row: row.stated.mean / MICROMETRE),
+    Column(header="mean, upper limit [µm]", value=lambda row: row.next.mean[1] / MICROMETRE),
+    Column(header="s, lower limit [µm]", value=lambda row: row.next.deviation[0] / MICROMETRE),
+    Column(header="s, upper limit [µm]", value=lambda row: row.next.deviation[1] / MICROMETRE),
+)
+_ORDERS: tuple[Column[LotOrder], ...] = (
+    Column(header="order", value=lambda row: row.order, terminal=1),
+    Column(header="root mean square amplitude of the lot [arcsec]", value=lambda row: row.amplitude, terminal=1),
+    Column(header="predicted, low 5 % [arcsec]", value=lambda row: row.predicted[0], terminal=1),
+    Column(header="predicted, high 95 % [arcsec]", value=lambda row: row.predicted[1], terminal=1),
+    Column(header="p value [-]", value=lambda row: row.probability, terminal=1),
+    Column(header="moved", value=lambda row: "yes" if row.moved else "", terminal=1),
+    Column(header="sources, total effect on it", value=lambda row: _makers(row, len(row.sources))),
+)
+
+
+class LotTeller(Teller[LotResult]):
+    """What is said of a lot."""
+
+    @property
+    def title(self) -> str:
+        """Which lot it is, and what it was made to."""
+        return _say("title", lot=self.header.name, drawing=self.header.model)
+
+    @property
+    def subtitle(self) -> str:
+        """How much was measured."""
+        return _say("subtitle", rows=self.result.rows, columns=len(self.result.processes))
+
+    @cached_property
+    def sentences(self) -> tuple[str, ...]:
+        """What moved, what could have been seen, and which zone is kept least."""
+        found, moved, level = self.result, self.result.moved, self.result.level * 100.0
+        if not moved:
+            unmoved = _say("unmoved", columns=len(found.processes), level=level)
+            return (unmoved, *self._curves, *self._seen, *self._gauges, self._least_capable)
+        named = "; ".join(map(_what, moved[:_NAMED]))
+        more = f"; and {len(moved) - _NAMED} more" if len(moved) > _NAMED else ""
+        left = len(found.processes) - len(moved)
+        rest = (_say("rest", count=left),) if left else ()
+        first = _say("moved", what=named + more, level=level)
+        return (first, *rest, *self._curves, *self._seen, *self._gauges, self._least_capable)
+
+    @property
+    def _curves(self) -> tuple[str, ...]:
+        """Which orders of the curves moved, and what makes them."""
+        found = self.result.orders
+        if not self.result.curves:
+            return ()
+        said = {"orders": len(found), "units": len(self.result.curves.waves)}
+        moved = sorted((own for own in found if own.moved), key=lambda own: own.probability)
+        if not moved:
+            return (_say("orders_unmoved", **said),)
+        first = moved[0]
+        amplitude, low, high = alike(first.amplitude, *first.predicted)
+        what = {"order": first.order, "amplitude": amplitude, "low": low, "high": high}
+        more = _say("orders_more", names=", ".join(str(own.order) for own in moved[1:])) if moved[1:] else ""
+        several = "order_of_several" if len(first.sources) > 1 else "order_of_one"
+        makers = _say(several, order=first.order, makers=_makers(first, _NAMED)) if first.sources else ""
+        return (" ".join(filter(None, (_say("order_moved", **said, **what), more, makers))),)
+
+    @property
+    def _seen(self) -> tuple[str, ...]:
+        """What shift of a size this lot could have shown."""
+        normal = [own.stated.law.parts for own in self.result.processes if own.stated.is_normal]
+        return (_say("detectable", shift=self.result.detectable, found=FOUND, parts=min(normal)),) if normal else ()
+
+    @property
+    def _gauges(self) -> tuple[str, ...]:
+        """How much of what was read is the gauge, where it makes most."""
+        most = max(self.result.processes, key=lambda own: own.gauge_share)
+        return (_say("gauges", name=most.name, share=most.gauge_share),) if most.gauge_share else ()
+
+    @property
+    def _least_capable(self) -> str:
+        least = min(self.result.capabilities, key=lambda own: own.cpk)
+        cpk, low, high = alike(least.cpk, *least.cpk_interval)
+        name, outside = least.source.name, least.outside
+        return _say("least_capable", source=name, cpk=cpk, low=low, high=high, outside=outside, parts=least.parts)
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know before acting on it."""
+        rows = self.result.capabilities
+        return (
+            *(_say("warn_far", source=own.source.name, count=own.far, parts=own.parts) for own in rows if own.far),
+            *(
+                _say("warn_clipped", source=own.source.name, cp=own.row.cp, shift=own.row.shift)
+                for own in rows
+                if own.clipped
+            ),
+            *self._doubts_of_curves,
+            *self.result.stated.notes,
+        )
+
+    @property
+    def _doubts_of_curves(self) -> tuple[str, ...]:
+        curves = self.result.curves
+        if not curves:
+            return ()
+        failed = (_say("warn_failed", failed=self.header.failed),) if self.header.failed else ()
+        return (*failed, *curves.model.mismatches, *(_say("warn_repaired", repair=own) for own in curves.repairs))
+
+    @property
+    def _assumed_of_curves(self) -> tuple[str, ...]:
+        if not self.result.curves:
+            return ()
+        noise, torque = self.result.curves.discrepancy, self.result.curves.model.kernel.torque
+        errs = {"reading": noise.reading / ARCSECOND, "discrepancy": noise.discrepancy / ARCSECOND}
+        return (_say("assume_curves", torque=torque, angle=noise.correlation_angle / DEGREE, **errs),)
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What the tests take for granted."""
+        normal = [own.stated.is_normal for own in self.result.processes]
+        return (
+            *((_say("assume_fit"),) if any(normal) else ()),
+            *(() if all(normal) else (_say("assume_simulated", lots=self.result.lots),)),
+            _say("assume_holm", level=self.result.level * 100.0),
+            *self._assumed_of_gauges,
+            *self._assumed_of_curves,
+            *self.header.assumptions,
+        )
+
+    @property
+    def _assumed_of_gauges(self) -> tuple[str, ...]:
+        erring = [own.name for own in self.result.processes if own.column.error.deviation]
+        if not erring:
+            return (_say("assume_gauge"),)
+        return (_say("assume_gauge_errs", names=", ".join(erring)),)
+
+    @cached_property
+    def _processes(self) -> Table[MeasuredProcess]:
+        return Table(name="processes", columns=_PROCESSES, rows=self.result.processes)
+
+    @cached_property
+    def _capabilities(self) -> Table[LotCapability]:
+        return Table(name="capability", columns=_CAPABILITIES, rows=self.result.capabilities)
+
+    @cached_property
+    def _orders(self) -> Table[LotOrder]:
+        return Table(name="orders of the curves", columns=_ORDERS, rows=self.result.orders)
+
+    @cached_property
+    def _limits(self) -> Table[MeasuredProcess]:
+        return Table(name="control limits", columns=_LIMITS, rows=self.result.processes)
+
+    @property
+    def sections(self) -> tuple[Section, ...]:
+        """What moved, how the zones are kept, what the next sample is held against, and the drawing of the lot."""
+        return (
+            Section(
+                heading=_say("process_heading"),
+                paragraphs=(_say("process"),),
+                figures=(self._shift_figure, self._spread_figure),
+                tables=(("processes", self._processes.frame()),),
+            ),
+            *self._section_of_curves,
+            Section(
+                heading=_say("capability_heading"),
+                paragraphs=(_say("capability"),),
+                tables=(("capability", self._capabilities.frame()),),
+            ),
+            Section(
+                heading=_say("limits_heading"),
+                paragraphs=(_say("limits"),),
+                tables=(("control limits", self._limits.frame()),),
+            ),
+            Section(
+                heading=_say("table_heading"),
+                paragraphs=(_say("table"),),
+                tables=(("lot", self.result.drawing.to_frame()),),
+            ),
+        )
+
+    @property
+    def _section_of_curves(self) -> tuple[Section, ...]:
+        if not self.result.curves:
+            return ()
+        tables = (("orders of the curves", self._orders.frame()),)
+        return (Section(heading=_say("orders_heading"), paragraphs=(_say("orders"),), tables=tables),)
+
+    @property
+    def terminal(self) -> tuple[tuple[pd.DataFrame, str], ...]:
+        """The processes that are likeliest to have moved, and the zones that are kept least."""
+        surest = sorted(self.result.processes, key=lambda own: own.probability)
+        least = sorted(self.result.capabilities, key=lambda own: own.cpk)
+        processes = replace(self._processes, rows=surest[:_SHOWN])
+        capabilities = replace(self._capabilities, rows=least[:_SHOWN])
+        orders = ((self._orders.terminal(), _say("terminal_orders", lot=self.header.name)),)
+        return (
+            (processes.terminal(), _say("terminal_processes", lot=self.header.name)),
+            *(orders if self.result.curves else ()),
+            (capabilities.terminal(), _say("terminal_capability", lot=self.header.name)),
+        )
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The answer for a program, units in the names."""
+        return {
+            "lot": self.header.name,
+            "drawing": self.header.model,
+            "measured [-]": self.result.rows,
+            "false-alarm rate [-]": self.result.level,
+            "moved": [own.name for own in self.result.moved],
+            "shift found with 95 % probability [σ]": self.result.detectable,
+            "processes": self._processes.records(),
+            "capability": self._capabilities.records(),
+            "control limits": self._limits.records(),
+            **({"orders of the curves": self._orders.records()} if self.result.curves else {}),
+            "seed": self.header.seed,
+            "warnings": list(self.warnings),
+        }
+
+    def add_files(self, folder: Path) -> None:
+        """Add the tolerance table of the lot, which is read back."""
+        self.result.drawing.to_csv(folder / "lot.tolerances.csv")
+
+    @property
+    def _shift_figure(self) -> Figure:
+        """Means in standard errors, between the control limits."""
+        rows = self.result.processes
+        one, low, high = zip(
+            *(tuple(shift * sqrt(own.stated.law.parts) for shift in own.shift) for own in rows), strict=True
+        )
+        return Figure(
+            name="shift",
+            title=_say("shift_figure"),
+            x_label="mean less the drawing's, over its standard error [-]",
+            series=(
+                Series(
+                    label="mean and 95 % interval", kind="bars", x=[own.name for own in rows], y=one, low=low, high=high
+                ),
+            ),
+            vertical=((-_LIMIT, ""), (_LIMIT, "control limits")),
+        )
+
+    @property
+    def _spread_figure(self) -> Figure:
+        """Standard deviations over the drawing's."""
+        rows = self.result.processes
+        one, low, high = zip(*(own.spread for own in rows), strict=True)
+        return Figure(
+            name="spread",
+            title=_say("spread_figure"),
+            x_label="standard deviation over the drawing's [-]",
+            series=(
+                Series(
+                    label="standard deviation and 95 % interval",
+                    kind="bars",
+                    x=[own.name for own in rows],
+                    y=one,
+                    low=low,
+                    high=high,
+                ),
+            ),
+            vertical=((1.0, "drawing"),),
+        )
+
+
+def _makers(own: LotOrder, most: int) -> str:
+    """Return the sources that make an order, each with its part of the variance."""
+    return ", ".join(_say("maker", name=name, share=share) for name, share in own.sources[:most])
+
+
+def _what(own: MeasuredProcess) -> str:
+    """Return what of a process moved, and by how much."""
+    mean, low, high, stated = alike(
+        *(length / MICROMETRE for length in (own.mean, *own.mean_interval, own.stated.mean))
+    )
+    ratio, least, most = alike(*own.spread)
+    of_mean = {"name": own.name, "mean": mean, "stated": stated, "shift": own.shift[0]}
+    of_spread = {"name": own.name, "ratio": ratio, "low": least, "high": most}
+    if not own.named_shift:
+        return _say("spread_up", **of_spread)
+    return (
+        _say("both", **{**of_mean, **of_spread}) if own.spread_moved else _say("mean_up", low=low, high=high, **of_mean)
+    )

@@ -1,0 +1,1 @@
+"""Questions of this wing, one record each: what `tolalloc` and ``ta`` ask."""

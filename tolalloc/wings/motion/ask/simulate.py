@@ -1,0 +1,97 @@
+"""A reducer through a speed and a torque profile."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+
+from tolalloc.reading.units import RPM
+from tolalloc.reports.header import Header
+from tolalloc.running.progress import Progress
+from tolalloc.study.answer import Answer
+from tolalloc.study.inquiry import Inquiry, RatedTorque, ReducerName, UnitName, Word
+
+if TYPE_CHECKING:
+    from tolalloc.wings.motion.simulation import PreparedSimulation, SimulationResult
+
+
+@dataclass(frozen=True, kw_only=True)
+class Simulate(Inquiry["PreparedSimulation"]):
+    """Speeds, accelerations, transmission error and pins in contact over time, beside the static model."""
+
+    word: ClassVar[str] = "simulate"
+    example: ClassVar[str] = "tolalloc simulate --reducer rv40e --out motion"
+    counted: ClassVar[str] = "ms"
+    kernel: ClassVar[Literal["", "equivalent"]] = "equivalent"
+
+    reducer: ReducerName = None
+    unit: UnitName = "exact"
+    speed: Annotated[float, Word("Input speed that is reached [rpm].")] = 525.0
+    torque: RatedTorque = None
+    engine: Annotated[
+        str, Word("generalised-alpha or newmark (equivalent model), exudyn (exact profile, optional extra).")
+    ] = "generalised-alpha"
+    duration: Annotated[float, Word("Simulated time [s].")] = 2.0
+    ramp: Annotated[float, Word("Time in which the speed rises [s]; the load rises in half of it afterwards.")] = 1.0
+    step: Annotated[float, Word("Time step [s].")] = 5e-5
+    output_inertia: Annotated[float, Word("Moment of inertia that the carrier turns besides its own [kg·m²].")] = 0.0
+    damping: Annotated[float, Word("Damping over stiffness of meshes and bearings [s].")] = 1e-5
+    mass_damping: Annotated[
+        float | None,
+        Word(
+            "Damping over mass of all parts; exudyn: of the carrier's rotation [1/s]. Unless given, 500 without "
+            "--output-inertia and less with it, so that the load is hardly damped."
+        ),
+    ] = None
+    pin_stiffness: Annotated[
+        float | None, Word("One stiffness for every pin contact [N/m]; the reducer's law unless given.")
+    ] = None
+
+    def prepare(self) -> PreparedSimulation:
+        """Return the simulation, its files read and checked."""
+        from tolalloc.wings.motion.simulation import SimulationRequest, prepare_simulation
+
+        asked = SimulationRequest(
+            reducer=str(self.reducer),
+            unit=self.unit,
+            speed_rpm=self.speed,
+            torque_nm=self.torque,
+            engine=self.engine,
+            duration=self.duration,
+            ramp=self.ramp,
+            step=self.step,
+            output_inertia=self.output_inertia,
+            damping=self.damping,
+            mass_damping=self.mass_damping,
+            pin_stiffness=self.pin_stiffness,
+        )
+        return prepare_simulation(asked)
+
+    def solve(self, prepared: PreparedSimulation, progress: Progress) -> Answer[SimulationResult]:
+        """Return what the reducer does over time."""
+        return simulated(prepared, progress)
+
+
+def simulated(prepared: PreparedSimulation, progress: Progress) -> Answer[SimulationResult]:
+    """Return the answer of a simulation, whose header names the unit.
+
+    Raises
+    ------
+    SolveError
+        A time step or an angle without equilibrium.
+    """
+    from tolalloc.wings.motion.simulation import simulate
+    from tolalloc.wings.motion.telling.simulation import SimulationTeller
+
+    header = Header(
+        name=prepared.unit.name,
+        model=prepared.reducer.name,
+        conditions={
+            "input speed [rpm]": prepared.speed / RPM,
+            "torque on the carrier [N·m]": prepared.torque,
+            "engine": prepared.asked.engine,
+        },
+        assumptions=(*prepared.reducer.assumptions, *prepared.unit.assumptions),
+    )
+    result = simulate(prepared, progress)
+    return Answer(kind="simulation", header=header, result=result, told_by=SimulationTeller)
