@@ -18,6 +18,7 @@ from tolalloc.cli.start import schema as schema
 from tolalloc.drawings.compensators import Indexing as Indexing
 from tolalloc.drawings.compensators import Shim as Shim
 from tolalloc.drawings.drawing import Drawing as Drawing
+from tolalloc.drawings.drawing import load_drawing as drawing  # noqa: F401
 from tolalloc.drawings.seeds import SamplingDesign as SamplingDesign
 from tolalloc.drawings.seeds import SeedTree as SeedTree
 from tolalloc.drawings.sorting import Sorting as Sorting

