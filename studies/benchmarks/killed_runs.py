@@ -44,7 +44,7 @@ study = ta.Study(
     questions=(ta.Ranking(), ta.Allocation(fixed_first=False, front=False, what_if=False)),
     effort=ta.Effort(
         ranking=ta.RankingEffort(
-            units=1000, sobol=ta.SobolEffort(start=16, limit=16), trajectories=4, moment_units=256,
+            units=1000, sobol=ta.SobolEffort(start=16, limit=16),
             derivative_units=64, inverse_units=100, surrogate_units=128, level_units=100, level_runs=2,
             widened_units=100, permutations=20,
         ),

@@ -11,7 +11,7 @@ import tolalloc as ta
 
 SMALL_EFFORT = """ta.Effort(
         ranking=ta.RankingEffort(
-            units=1000, sobol=ta.SobolEffort(start=16, limit=16, resamples=50), trajectories=2, moment_units=100,
+            units=1000, sobol=ta.SobolEffort(start=16, limit=16, resamples=50),
             derivative_units=10, inverse_units=1, surrogate_units=96, level_units=100, level_runs=2, widened_units=100,
             permutations=2),
         allocation=ta.AllocationEffort(

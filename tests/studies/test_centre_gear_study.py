@@ -20,8 +20,6 @@ SMALL = ta.Effort(
     ranking=ta.RankingEffort(
         units=1000,
         sobol=ta.SobolEffort(start=8, limit=8, resamples=50),
-        trajectories=2,
-        moment_units=100,
         derivative_units=10,
         inverse_units=1,
         surrogate_units=96,

@@ -37,7 +37,7 @@ PEAK = "peak-to-peak transmission error [arcsec]"
 
 EFFORT = """effort=ta.Effort(
     ranking=RankingEffort(
-        units=1024, sobol=SobolEffort(start=64, limit=64), trajectories=4, moment_units=128, derivative_units=64,
+        units=1024, sobol=SobolEffort(start=64, limit=64), derivative_units=64,
         inverse_units=926, surrogate_units=96, level_units=100, level_runs=2, widened_units=200, permutations=10),
     allocation=AllocationEffort(
         verification_units=1152, confirmation_units=2304, shared_units=48, exact_points=8, share_blocks=8,

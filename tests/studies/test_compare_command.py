@@ -213,7 +213,7 @@ def test_runs_of_several_limits_say_the_yield_of_each_and_of_all(tmp_path):
         name="apart",
     )
     sobol = ta.SobolEffort(start=16, limit=16, resamples=50)
-    fields = {"trajectories": 2, "derivative_units": 10, "surrogate_units": 96, "moment_units": 100, "level_units": 100}
+    fields = {"derivative_units": 10, "surrogate_units": 96, "level_units": 100}
     ranking = study.rank(ta.Effort(ranking=replace(QUICK_RANKING, sobol=sobol, **fields)))
     high, low = ranking.result.yields.values()
     assert ranking.result.joint.estimate == pytest.approx(high.estimate + low.estimate - 1)

@@ -16,7 +16,7 @@ from tolalloc.drawings.tolerance_table import load_process_capabilities, load_to
 
 PEAK_TO_PEAK = "peak-to-peak transmission error"
 EFFORT = """effort=ta.Effort(ranking=RankingEffort(
-    units=1024, sobol=SobolEffort(start=128, limit=128, second_order=True), trajectories=8, moment_units=256,
+    units=1024, sobol=SobolEffort(start=128, limit=128, second_order=True),
     derivative_units=64, inverse_units=926, surrogate_units=96, level_units=100, level_runs=2, widened_units=200,
     permutations=200))"""
 
@@ -72,20 +72,6 @@ def test_pairs_say_what_errors_add_together(ranked):
     assert (pairs["S2 low 5 % [-]"] <= pairs["second index S2 [-]"]).mean() > 0.9
     # The two discs and the housing act together, pin and groove hardly at all.
     assert "pin.diameter" not in set(pairs.iloc[0][["source", "with"]])
-
-
-@pytest.mark.slow
-def test_every_measure_lies_in_its_interval(ranked):
-    measures = pd.read_csv(ranked / "tables" / "measures.csv")
-    for name, value in (
-        ("bound", "bound of ST by derivatives [-]"),
-        ("mu*", "Morris mu* [arcsec]"),
-        ("delta", "delta [-]"),
-    ):
-        (low,) = [header for header in measures if header.startswith(f"{name} low 5 %")]
-        (high,) = [header for header in measures if header.startswith(f"{name} high 95 %")]
-        assert measures[value].between(measures[low], measures[high]).all(), name
-        assert (measures[high] > measures[low]).all(), name
 
 
 @pytest.mark.slow

@@ -305,7 +305,7 @@ def test_a_run_first_says_how_the_drawing_stands_as_it_is(tmp_path):
     found, heard = Prepared(study=study).kept_limits(1024), Heard()
     for share, own in zip((5 / 6, 2 / 3, 1 / 2), (*found.each.values(), found.joint), strict=True):
         assert own.estimate == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / 1024))
-    few = {"trajectories": 2, "derivative_units": 10, "surrogate_units": 96, "moment_units": 100, "level_units": 100}
+    few = {"derivative_units": 10, "surrogate_units": 96, "level_units": 100}
     sobol = ta.SobolEffort(start=16, limit=16, resamples=50)
     study.run(tmp_path / "run", ta.Effort(ranking=replace(QUICK_RANKING, sobol=sobol, **few)), heard)
     assert heard.said[:2] == ["the drawing as it is", 1024]

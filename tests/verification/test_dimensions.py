@@ -159,7 +159,7 @@ def ranked():
         name="lines",
     )
     sobol = ta.SobolEffort(start=64, limit=64, resamples=50)
-    fields = {"trajectories": 2, "derivative_units": 100, "surrogate_units": 96, "moment_units": 100}
+    fields = {"derivative_units": 100, "surrogate_units": 96}
     return own.rank(ta.Effort(ranking=replace(QUICK_RANKING, sobol=sobol, level_units=100, **fields)))
 
 

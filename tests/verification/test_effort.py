@@ -15,7 +15,6 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.effort import RankingEffort, SobolEffort
-from tolalloc.sensitivity.screening import elementary_effects, moment_independent
 from tolalloc.sensitivity.shapley import shapley_effects
 from tolalloc.sensitivity.sobol import sobol_indices
 from tolalloc.sensitivity.surrogate.validation import answers_of
@@ -45,8 +44,6 @@ def drawn(units: int):
 
 ESTIMATORS = {
     "units": lambda units: target_sensitivity(drawn(units), ERRORS, 9.0, SEEDS, permutations=9, resamples=9),
-    "trajectories": lambda count: elementary_effects(Experiment.of(Itself(), ERRORS, SEEDS), count),
-    "moment_units": lambda units: moment_independent(drawn(units), ERRORS, SEEDS, resamples=2),
     "surrogate_units": lambda units: answers_of(Itself(), drawn(units).x, SEEDS),
     "level_units": lambda units: subset_simulation(LIMIT, SEEDS, samples=units),
     "level_runs": lambda runs: yield_at_limit(LIMIT, drawn(100), samples=100, runs=runs, scaled=100),
@@ -55,8 +52,6 @@ ESTIMATORS = {
 }
 SMALLEST = {
     "units": 1000,
-    "trajectories": 2,
-    "moment_units": 100,
     "derivative_units": 10,
     "inverse_units": 1,
     "surrogate_units": 10,

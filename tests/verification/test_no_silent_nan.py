@@ -26,7 +26,6 @@ from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.derivatives import classical_estimate
 from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.saltelli import saltelli_indices
-from tolalloc.sensitivity.screening import elementary_effects
 from tolalloc.sensitivity.shapley import shapley_effects
 from tolalloc.sensitivity.sobol import sobol_indices
 
@@ -126,12 +125,11 @@ class Scattered:
     [
         lambda asked: sobol_indices(asked, SobolEffort(start=128, limit=128, places=1)).dropped,
         lambda asked: shapley_effects(asked, 200).dropped,
-        lambda asked: elementary_effects(asked, 200).dropped,
         lambda asked: classical_estimate(asked).alone.size - 50,
     ],
 )
 def test_the_share_that_may_fail_is_one_of_units_however_many_sources_there_are(estimate):
-    """0.2 % of units, in a tenth of the blocks, orders and trajectories of 51 or 52 units, which drop."""
+    """0.2 % of units, in a tenth of the blocks and orders of 51 or 52 units, which drop."""
     errors = sizes(Scattered(0.0).columns)
     dropped = estimate(Experiment.of(Scattered(0.002), errors, SEEDS))
     assert dropped == 0 or dropped > 5

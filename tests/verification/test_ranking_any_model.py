@@ -26,8 +26,6 @@ GAP, PLAY = "gap [mm]", "play [deg]"
 EFFORT = RankingEffort(
     units=1500,
     sobol=SobolEffort(start=64, limit=64),
-    trajectories=4,
-    moment_units=200,
     derivative_units=50,
     inverse_units=100,
     surrogate_units=100,

@@ -14,7 +14,7 @@ from tolalloc.study.questions import Allocation
 
 GAP = "gap [mm]"
 EFFORT = ta.Effort(
-    ranking=ta.RankingEffort(units=1000, permutations=2, moment_units=100, surrogate_units=96, level_units=100),
+    ranking=ta.RankingEffort(units=1000, permutations=2, surrogate_units=96, level_units=100),
     allocation=ta.AllocationEffort(verification_units=512, confirmation_units=1024, error=0.5),
     is_quick=True,
 )

@@ -1,4 +1,4 @@
-"""Each error alone: at its limit, as a hand calculation adds it, and by derivatives, which bound total indices."""
+"""Each error alone: at its limit, as a hand calculation adds it, and by derivatives."""
 
 from __future__ import annotations
 
@@ -7,19 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import ndtr, ndtri
 
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import AnsweredUnits, MonteCarlo, require_few_failures
-from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import SolveError
 from tolalloc.models.model import Response, ResponseWithDerivatives
 from tolalloc.reading.units import MICROMETRE
-from tolalloc.sensitivity.ranking import percentile_interval
-from tolalloc.sensitivity.saltelli import resample_counts, unseen
-
-_STEP = 1e-4
-"""Step of the differences in standard normal space; rounding and curvature then both cost about 1e-8 [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,27 +58,6 @@ class LineDerivatives:
     slope: tuple[float, float]  # Smallest and largest of its places, as of `LocalDerivatives`
     per_micrometre: float  # Root mean square change by a micrometre in every place [output/µm]
     by_zone: float  # The same by what the zones let through [output]
-
-
-@dataclass(frozen=True, kw_only=True)
-class DerivativeMeasures:
-    """Derivative-based global measures and the bounds that they put on the total indices."""
-
-    sources: tuple[str, ...]  # Names, in the order of all arrays; correlated sources stand together, joined by " + "
-    # Mean square of the gradient by the source's standard normal numbers [output²]
-    measure: Float[np.ndarray, " source"]
-    variance: float  # Variance of the output [output²]
-    bound: Float[np.ndarray, " source"]  # Measure over variance, not less than the total Sobol index [-]
-    bound_resamples: Float[np.ndarray, "resample source"]  # The same from bootstrap resamples of the units [-]
-    unseen: Float[np.ndarray, " source"]  # Bound possible where too few units show an effect, else 0 [-]
-    # Good units, and those without a usable answer [-]
-    units: int
-    failed: int
-
-    @property
-    def bound_interval(self) -> Float[np.ndarray, "2 source"]:
-        """90 % percentile interval of the bounds [-]."""
-        return percentile_interval(self.bound_resamples, unseen=self.unseen)
 
 
 _CANCELLED = 0.1
@@ -134,7 +106,7 @@ def local_derivatives(experiment: Experiment[ResponseWithDerivatives], units: in
     [1e-06, 1e-06]
     """
     errors = experiment.errors
-    sample, by_column, _ = _sampled(experiment, units)
+    sample, by_column = _sampled(experiment, units)
     where, slope = np.array(errors.source_of_column), []
     variance, mean_square = sample.x[sample.evaluation.good].var(axis=0), (by_column**2).mean(axis=0)
     by_zone, per_micrometre = [], []
@@ -151,93 +123,15 @@ def local_derivatives(experiment: Experiment[ResponseWithDerivatives], units: in
     )
 
 
-def derivative_measures(
-    experiment: Experiment[ResponseWithDerivatives], units: int = 1024, resamples: int = 400
-) -> DerivativeMeasures:
-    """Return the derivative-based measure of every source and its bound on the total index.
-
-    Raises
-    ------
-    SolveError
-        More units failed, or the output does not vary.
-
-    Notes
-    -----
-    Every distribution is a function x(u) of independent standard normal numbers, for which Poincaré's inequality has
-    the constant 1: total index ≤ E[|∂Y/∂u|²] / V with all numbers of a source in |·|. A linear output of normal columns
-    attains it. A kink does no harm, a jump would: the inequality needs an output that is continuous.
-
-    References
-    ----------
-    Sobol' & Kucherenko 2009; Lamboni, Iooss, Popelin & Gamboa 2013, Theorem 3.1, Poincaré constants.
-
-    Examples
-    --------
-    A sum with σ of 1 and 2 has the shares 1/5 and 4/5, which the bounds attain but for chance.
-
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> derivative_measures(sum_of_sizes(6.0, 12.0), 4096, 100).bound.round(2).tolist()
-    [0.2, 0.79]
-    """
-    errors = experiment.errors
-    sample, by_column, uniform = _sampled(experiment.child("sample"), units)
-    blocks = errors.block_of_column
-    zones = np.repeat(experiment.zones, [own.stop - own.start for own in errors.columns_of_source])
-    squares = _squared_gradients(by_column * zones, errors, uniform, blocks)
-    centred = sample.values - sample.values.mean()
-    counts = resample_counts(centred.size, resamples, experiment.seeds.child("resamples"))
-    means = counts @ np.column_stack([centred, centred**2, squares]) / centred.size
-    variance = means[:, 1] - means[:, 0] ** 2
-    if not variance.min() > 0.0:
-        raise SolveError("Derivative measures: the output is the same for all units, so no source can be ranked.")
-    bounds = means[:, 2:] / variance[:, np.newaxis]
-    return DerivativeMeasures(
-        sources=tuple(dict.fromkeys(blocks)),
-        measure=means[0, 2:],
-        variance=float(variance[0]),
-        bound=bounds[0],
-        bound_resamples=bounds[1:],
-        unseen=unseen(squares) / variance[0],
-        units=centred.size,
-        failed=sample.failed,
-    )
-
-
 def _sampled(
     experiment: Experiment[ResponseWithDerivatives], units: int
-) -> tuple[MonteCarlo, Float[np.ndarray, "good column"], Float[np.ndarray, "good column"]]:
-    """Return random units, and of the good ones the derivatives and the uniform numbers."""
-    uniform = experiment.uniform(units)
-    x = experiment.deviations(experiment.errors.standard_values(uniform))
+) -> tuple[MonteCarlo, Float[np.ndarray, "good column"]]:
+    """Return random units, and of the good ones the derivatives."""
+    x = experiment.deviations(experiment.errors.standard_values(experiment.uniform(units)))
     answer = experiment.response.with_derivatives(x)
     sample = MonteCarlo(x=x, evaluation=answer.evaluation)
     require_few_failures(sample, "derivatives", experiment.largest_failed_share)
-    return sample, answer.by_column[answer.evaluation.good], uniform[answer.evaluation.good]
-
-
-def _squared_gradients(
-    by_standard: Float[np.ndarray, "unit column"],
-    errors: ErrorModel,
-    uniform: Float[np.ndarray, "unit column"],
-    blocks: tuple[str, ...],
-) -> Float[np.ndarray, "unit block"]:
-    """Return the squared length of the gradient by each block's standard normal numbers [output²].
-
-    Blocks do not mix, so one number of every block is moved at a time, and sources of blocks with fewer numbers stay.
-    """
-    members = np.array(blocks)[:, np.newaxis] == list(dict.fromkeys(blocks))
-    number_in_block, numbers = (members.cumsum(axis=0) * members).sum(axis=1), members @ members.sum(axis=0)
-    normal, squares = ndtri(uniform), np.zeros((uniform.shape[0], members.shape[1]))
-    for number in range(1, int(number_in_block.max()) + 1):
-        moved = [at for at, own in enumerate(errors.columns_of_source) if numbers[own.start] >= number]
-        sides, own = [], number_in_block == number
-        for way in (_STEP, -_STEP):
-            beside = uniform.copy()
-            beside[:, own] = ndtr(normal[:, own] + way)
-            sides.append(errors.marginal_values(errors.dependent(beside), moved))
-        change, felt = (sides[0] - sides[1]) / (2.0 * _STEP), numbers >= number
-        squares += ((by_standard[:, felt] * change[:, felt]) @ members[felt]) ** 2
-    return squares
+    return sample, answer.by_column[answer.evaluation.good]
 
 
 DIRECTIONS = 16

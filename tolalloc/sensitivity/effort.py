@@ -16,12 +16,6 @@ WORST_SHARE = 0.05
 """Share of the units, largest output first, that is looked at where too few are beyond the limit [-]."""
 FEWEST_OUTSIDE = 50
 """Units needed on either side of the threshold [-]."""
-FEWEST_TRAJECTORIES = 2
-"""Trajectories without which the effects have no scatter [-]."""
-FEWEST_UNITS_OF_CLASS = 10
-"""Units of a class of PAWN, below which its distance to the whole sample is chance [-]."""
-CLASSES = 10
-"""Classes of equal size that PAWN divides each measure into, SALib's number [-]."""
 
 
 FAST_SECONDS = {True: 0.25, False: 1.0}
@@ -100,10 +94,6 @@ class RankingEffort(NamedFields):
         How these units are spread; yields have an interval for the Monte Carlo design alone.
     sobol
         Blocks of the Sobol analysis, and what stops their growth.
-    trajectories
-        Trajectories of Morris' elementary effects [-].
-    moment_units
-        Units behind PAWN and delta [-].
     derivative_units
         Units behind derivatives [-].
     inverse_units
@@ -131,8 +121,6 @@ class RankingEffort(NamedFields):
     units: Annotated[int, _least(fewest_units())] = 16_384
     design: Annotated[SamplingDesign, a(SamplingDesign)] = SamplingDesign.MONTE_CARLO
     sobol: Annotated[SobolEffort, a(SobolEffort)] = field(default_factory=lambda: SobolEffort(start=256, limit=1024))
-    trajectories: Annotated[int, _least(FEWEST_TRAJECTORIES)] = 32
-    moment_units: Annotated[int, _least(FEWEST_UNITS_OF_CLASS * CLASSES)] = 4096
     derivative_units: Annotated[int, _least(10)] = 1024
     inverse_units: Annotated[int, _least(1)] = 2048
     surrogate_units: Annotated[int, _least(validation.FEWEST_OF_FOLD * validation.FOLDS)] = 2048
@@ -154,8 +142,7 @@ class RankingEffort(NamedFields):
     def counted(self, sources: int) -> int:
         """Return about how many units a ranking of so many sources solves, the methods for rare failures left out [-].
 
-        Random units, Saltelli blocks of sources + 2 units, trajectories, derivatives and surrogates with their trials,
-        own count.
+        Random units, Saltelli blocks of sources + 2 units, derivatives and surrogates with their trials, own count.
 
         Examples
         --------
@@ -163,14 +150,7 @@ class RankingEffort(NamedFields):
         11272
         """
         blocks = self.sobol.limit * (sources + 2)
-        return (
-            self.units
-            + blocks
-            + self.trajectories * (sources + 1)
-            + 4 * self.derivative_units
-            + 9 * self.surrogate_units
-            + self.moment_units
-        )
+        return self.units + blocks + 2 * self.derivative_units + 9 * self.surrogate_units
 
     def within(self, units: float, sources: int) -> RankingEffort:
         """Return this effort scaled to about so many units in all, each number at least what its measure needs.
@@ -195,8 +175,6 @@ class RankingEffort(NamedFields):
             self,
             units=min(max(round(share * self.units), fewest_units()), max(_MOST_UNITS, self.units)),
             sobol=replace(self.sobol, start=blocks, limit=blocks),
-            trajectories=scaled(self.trajectories, FEWEST_TRAJECTORIES),
-            moment_units=scaled(self.moment_units, FEWEST_UNITS_OF_CLASS * CLASSES),
             derivative_units=scaled(self.derivative_units, 10),
             inverse_units=scaled(self.inverse_units, 100),
             surrogate_units=scaled(self.surrogate_units, validation.FEWEST_OF_FOLD * validation.FOLDS),
@@ -236,8 +214,6 @@ class RankingEffort(NamedFields):
 QUICK_RANKING = RankingEffort(
     units=2048,
     sobol=SobolEffort(start=32, limit=64),
-    trajectories=8,
-    moment_units=512,
     derivative_units=128,
     inverse_units=400,
     surrogate_units=512,

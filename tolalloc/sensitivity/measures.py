@@ -17,11 +17,10 @@ from tolalloc.models.differences import derived
 from tolalloc.models.model import KeepsTables, Model, Response, ResponseWithDerivatives
 from tolalloc.running.chunks import one_blas_thread
 from tolalloc.running.progress import RunRecord
-from tolalloc.sensitivity.derivatives import classical_estimate, derivative_measures, local_derivatives
+from tolalloc.sensitivity.derivatives import classical_estimate, local_derivatives
 from tolalloc.sensitivity.effort import RankingEffort
 from tolalloc.sensitivity.inverse import InverseSensitivity, fewest_units, inverse_sensitivity
 from tolalloc.sensitivity.result import RankingResult
-from tolalloc.sensitivity.screening import MomentIndependent, elementary_effects, moment_independent
 from tolalloc.sensitivity.shapley import ShapleyEffects, shapley_effects
 from tolalloc.sensitivity.sobol import SobolAnalysis, SobolIndices, order_contribution, regrouped, sobol_indices
 from tolalloc.sensitivity.surrogate.control_variate import MOST_CONTROLLED, cheap_model
@@ -137,13 +136,6 @@ class Measures:
         """Return the leading output with its derivatives, exact ones if the model knows them."""
         return derived(self.model, self.leading, sample.x[sample.evaluation.good].std(axis=0))
 
-    def moments(self, sample: MonteCarlo) -> MomentIndependent:
-        """Return PAWN and delta of the first units of a sample."""
-        first = _first(sample, self.effort.moment_units)
-        return moment_independent(
-            first, self.errors, self.seeds.child("moments"), largest_failed_share=self.largest_failed_share
-        )
-
     def reject(self, sample: MonteCarlo) -> TargetSensitivity:
         """Return what the units of a sample beyond the limits share."""
         return target_sensitivity(
@@ -231,9 +223,6 @@ def rank(asked: Measures, record: RunRecord) -> RankingResult:
             derived = measures.derived(sample)
             shapley = measures.shapley()
             local = local_derivatives(own("local", derived), effort.derivative_units)
-            derivatives = derivative_measures(own("derivatives", derived), effort.derivative_units)
-            effects = elementary_effects(own("effects", measures.response), effort.trajectories)
-            moments = measures.moments(sample)
             classical = classical_estimate(own("classical", measures.response))
         with record.stage("units out of the limit"):
             reject, beyond = measures.reject(sample), measures.beyond(sample)
@@ -258,9 +247,6 @@ def rank(asked: Measures, record: RunRecord) -> RankingResult:
         shapley=shapley,
         classical=classical,
         local=local,
-        derivatives=derivatives,
-        effects=effects,
-        moments=moments,
         reject=reject,
         inverse=inverse,
         beyond=beyond,

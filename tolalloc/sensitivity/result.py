@@ -14,9 +14,8 @@ from tolalloc.capability.yield_at_limit import YieldAtLimit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SamplingDesign
 from tolalloc.models.model import Model
-from tolalloc.sensitivity.derivatives import ClassicalEstimate, DerivativeMeasures, LocalDerivatives
+from tolalloc.sensitivity.derivatives import ClassicalEstimate, LocalDerivatives
 from tolalloc.sensitivity.inverse import InverseSensitivity
-from tolalloc.sensitivity.screening import ElementaryEffects, MomentIndependent
 from tolalloc.sensitivity.shapley import ShapleyEffects
 from tolalloc.sensitivity.sobol import OrderContribution, SalibArrays, SobolAnalysis, SobolIndices
 from tolalloc.sensitivity.surrogate.validation import Choice
@@ -60,12 +59,7 @@ class RankingResult:
     effect: UncertainEffect | None
     shapley: ShapleyEffects | None  # Effects of correlated sources; none where all are independent
     classical: ClassicalEstimate  # What a hand calculation says
-    # Derivatives by each source, and what they bound
-    local: LocalDerivatives
-    derivatives: DerivativeMeasures
-    # Measures beside Sobol's
-    effects: ElementaryEffects
-    moments: MomentIndependent
+    local: LocalDerivatives  # Derivatives by each source
     reject: TargetSensitivity  # What drives the units out of the limits
     inverse: InverseSensitivity  # How far each zone may open alone
     beyond: YieldAtLimit  # Probability of a leading output beyond its limits

@@ -78,7 +78,7 @@ def _of_ranking(prepared: Prepared) -> tuple[_Part, ...]:
     of_all, of_limited = (_seconds(prepared, asked, uncertain=True) for asked in ((*outputs, *waves), limited))
     sources, dimensions = len(errors.blocks) + len(model.uncertain), len({*errors.dimension_of_column})
     inverse = max(effort.inverse_units, fewest_units(prepared.target))
-    trials = effort.trajectories * (sources + 1) + 4 * effort.derivative_units + (sources + 2) * inverse
+    trials = 2 * effort.derivative_units + (sources + 2) * inverse
     block, (start, limit) = sources + 2, (effort.sobol.start, effort.sobol.limit)
     most = trials + _TRIALS * effort.surrogate_units + 3 * effort.units
     return (

@@ -415,13 +415,9 @@ class RankingTeller(Teller[RankingResult]):
     def _trust_sections(self) -> tuple[Section, ...]:
         """Return what the answer rests on: other measures, surrogates, distributions, work done."""
         result = self.result
-        moments, statuses = result.moments, self.header.statuses.items()
+        statuses = self.header.statuses.items()
         return (
-            Section(
-                heading=_say("measures_heading"),
-                paragraphs=(_say("measures", pawn=moments.pawn_dummy, delta=moments.delta_dummy),),
-                tables=(("measures", tables.measures_table(result)),),
-            ),
+            Section(heading=_say("measures_heading"), tables=(("measures", tables.measures_table(result)),)),
             Section(
                 heading=_say("surrogates_heading"),
                 tables=(("surrogates", tables.surrogate_table(result.choice)),),

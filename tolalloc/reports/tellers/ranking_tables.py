@@ -406,26 +406,11 @@ def _reading(factor: float) -> str:
 def measures_table(result: RankingResult) -> pd.DataFrame:
     """Return every measure of every source side by side, in the order of the total index."""
     sobol, local, unit = result.indices, result.local, unit_of(result.leading)
-    effects, moments, bounds = result.effects, result.moments, result.derivatives
-    spread, distance = effects.mu_star_interval(0), moments.delta_interval
     columns = {
         "total index ST [-]": (sobol.sources, sobol.total),
-        "bound of ST by derivatives [-]": (bounds.sources, bounds.bound),
-        "bound low 5 % [-]": (bounds.sources, bounds.bound_interval[0]),
-        "bound high 95 % [-]": (bounds.sources, bounds.bound_interval[1]),
-        f"Morris mu* [{unit}]": (effects.sources, effects.mu_star[0]),
-        f"mu* low 5 % [{unit}]": (effects.sources, spread[0]),
-        f"mu* high 95 % [{unit}]": (effects.sources, spread[1]),
-        f"Morris sigma [{unit}]": (effects.sources, effects.sigma[0]),
-        "PAWN [-]": (moments.sources, moments.pawn),
-        "delta [-]": (moments.sources, moments.delta),
-        "delta low 5 % [-]": (moments.sources, distance[0]),
-        "delta high 95 % [-]": (moments.sources, distance[1]),
         f"Sens [{unit}/µm]": (local.sources, local.slope),
         f"alone at its limit [{unit}]": (result.classical.sources, result.classical.alone),
     }
-    if result.errors.compensators:  # a choice makes the output jump, and the inequality of the bound needs none
-        columns = {header: own for header, own in columns.items() if "bound" not in header}
     if result.shapley:
         columns["Shapley effect [-]"] = (result.shapley.sources, result.shapley.effects[0])
     named = dict.fromkeys(sobol.sources[at] for at in sobol.order)
