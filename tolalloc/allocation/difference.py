@@ -100,27 +100,10 @@ def difference(
     zones
         Source, or a pattern of several as ``disc*.pitch``, and its full zone [µm].
 
-    Raises
-    ------
-    InputError, UnknownNameError
-        A pattern that fits no source with a zone, a zone that is not above 0 or that no process holds.
-
     Notes
     -----
     Var(y′ − y) = Var y′ + Var y − 2·Cov(y′, y) is small as both drawings use the same uniform numbers (common random
     numbers): Glasserman & Yao 1992, Management Science 38, 884–908.
-
-    Examples
-    --------
-    Half of a zone that costs 1 costs 2.
-
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
-    >>> from tolalloc.running.progress import Silent
-    >>> own = verifier_of_sum(6.0, 8.0, limit=5.0)
-    >>> record = RunRecord(Silent(), {})
-    >>> found = difference(own.model, own.space, own.requirements, {"x1": 3000.0}, 100, SeedTree(1), record)
-    >>> round(found.cost_change, 6)
-    1.0
     """
     errors = space.errors
     wanted = named_zones(errors, zones)
@@ -165,13 +148,6 @@ def limited_shares(requirement: Requirement) -> tuple[float, ...]:
     Two limits leave half of the rejects beyond either of them.
 
     1 − (1 − Y)/k of k limits, or its complement for a lower one (own derivation).
-
-    Examples
-    --------
-    >>> from tolalloc.capability.indices import Limits
-    >>> both = Requirement(output="gap [mm]", limits=Limits(lower=0.0, upper=1.0), guarantee=AtYield(target=0.99))
-    >>> [round(share, 4) for share in limited_shares(both)]
-    [0.995, 0.005]
     """
     target = requirement.guarantee.target if isinstance(requirement.guarantee, AtYield) else USUAL_YIELD
     sides = requirement.limits.turned

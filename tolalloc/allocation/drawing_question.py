@@ -107,13 +107,7 @@ class DrawingQuestion:
         return SeedTree(self.seed).child("allocate", name)
 
     def require_answerable(self) -> None:
-        """Raise unless every stage can be asked: zones to change, steps of ladders, units enough.
-
-        Raises
-        ------
-        InputError
-            What cannot be asked, before anything long runs.
-        """
+        """Raise unless every stage can be asked: zones to change, steps of ladders, units enough."""
         require_groups(self.space, self.place)
         if self.boxes:
             require_bounded(self.model, self.space, self.requirements, self.place)
@@ -390,13 +384,6 @@ def allocate_drawing(
         Of what was asked, so that a checkpoint of another question is not gone on from.
     checkpoint
         File that keeps the answers of the search for the front, so that an interrupted run goes on from them.
-
-    Raises
-    ------
-    InputError
-        What cannot be asked.
-    SolveError
-        Too many units failed.
 
     Notes
     -----

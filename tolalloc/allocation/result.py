@@ -277,22 +277,6 @@ def solver_noise(solution: Solution) -> float:
     """Return the cost below which a price tells nothing of a solution [cost units].
 
     max(gap, 1e-6)·cost, with gap = cost/bound − 1 (own derivation).
-
-    Examples
-    --------
-    >>> from tolalloc.allocation.space.problem import Solution
-    >>> none = np.empty(0)
-    >>> found = Solution(
-    ...     zones=none,
-    ...     processes=none.astype(int),
-    ...     shared=none,
-    ...     cost=50.0,
-    ...     bound=49.0,
-    ...     prices=none,
-    ...     bound_prices=np.empty((0, 2)),
-    ... )
-    >>> round(solver_noise(found), 3)
-    1.02
     """
     return max(solution.gap, _ROUNDING) * solution.cost
 
@@ -301,13 +285,6 @@ def limit_step(side: OneSidedConstraint) -> float:
     """Return a small change of a limit to tell its price by: a power of ten, a tenth of the limit at most.
 
     10^⌊log₁₀(|limit|/10)⌋, of what outputs are compared by where the limit is 0 (own derivation) [unit of the output].
-
-    Examples
-    --------
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
-    >>> verifiers = [verifier_of_sum(0.6, 0.8, limit=limit) for limit in (0.5, 60.0)]
-    >>> [limit_step(own.verify(own.space.uniform(1.0), "as drawn").constraints[0]) for own in verifiers]
-    [0.01, 1.0]
     """
     size = abs(side.limit) or side.scale
     return float(10.0 ** np.floor(np.log10(size / 10) + _OF_A_LOGARITHM)) if size > 0 else 1.0
@@ -321,14 +298,6 @@ def limit_price(side: OneSidedConstraint, price: float) -> tuple[float, str]:
     """Return the price of a small change of a limit [cost units], and that change with its unit.
 
     λ·step (own derivation), as every shadow price for small changes.
-
-    Examples
-    --------
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
-    >>> verifier = verifier_of_sum(0.6, 0.8, limit=0.5)
-    >>> [side] = verifier.verify(verifier.space.uniform(1.0), "as drawn").constraints
-    >>> limit_price(side, 2.0)
-    (0.02, '0.01 mm')
     """
     step, unit = limit_step(side), unit_of(side.stack.name)
     return price * step, unit if step == 1 else f"{step:g} {unit}"
@@ -350,16 +319,6 @@ def unit_quantile(design: VerifiedDesign, check: Check, side: OneSidedConstraint
     -----
     What the units show at even odds (Hahn & Meeker 1991, Statistical Intervals); not a number unless a yield is asked
     for.
-
-    Examples
-    --------
-    A normal sum of σ = √2 is below 1.282·√2 = 1.81 with 90 %.
-
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
-    >>> verifier = verifier_of_sum(6.0, 6.0, limit=5.0, guarantee=AtYield(target=0.9))
-    >>> design = verifier.verify(verifier.space.uniform(1.0), "as drawn")
-    >>> round(unit_quantile(design, design.checks[0], *design.checks[0].constraints), 1)
-    1.8
     """
     asked, tested = check.requirement, design.independent
     if not isinstance(asked.guarantee, AtYield):

@@ -160,14 +160,6 @@ def capability(sample: Float[np.ndarray, " unit"], limits: Limits, subgroup: int
     References
     ----------
     ISO 22514-2, indices Cp, Cpk (within) and Pp, Ppk (overall); Montgomery 2012, Statistical Quality Control, ch. 8.
-
-    Examples
-    --------
-    Mean 10 and overall deviation 1 between the limits 7 and 13: Pp = 6/6 = 1.
-
-    >>> found = capability(np.array([9.0, 10.0, 11.0]), Limits(lower=7.0, upper=13.0))
-    >>> found.pp, found.ppk, found.outside
-    (1.0, 1.0, 0)
     """
     if sample.size < 2 or not np.isfinite(sample).all():
         raise InputError.at("capability", "sample", f"{sample.size} values", "at least 2 values, all finite")

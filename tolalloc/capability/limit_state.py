@@ -61,13 +61,7 @@ class CountedLimitState:
         return self.limit_state.variables
 
     def values(self, u: Float[np.ndarray, "sample variable"]) -> Float[np.ndarray, " sample"]:
-        """Return the values of the points, infinite where the sample failed.
-
-        Raises
-        ------
-        SolveError
-            Of all calls so far, a hundred at least, more than allowed failed.
-        """
+        """Return the values of the points, infinite where the sample failed."""
         values = self.limit_state(u)
         good = np.isfinite(values)
         self.calls += good.size
@@ -275,15 +269,6 @@ def level(chains: Chains, inside: Bool[np.ndarray, "chain state"], bound: float)
     References
     ----------
     Au & Beck 2001, δ² = (1 − P) / (P·N) · (1 + γ), γ = 2·Σ (1 − k/L)·ρ(k).
-
-    Examples
-    --------
-    Half of 4 independent samples are inside: δ = √(0.5 / (0.5·4)) = 0.5.
-
-    >>> chains = Chains.independent(lambda u: u[:, 0], np.random.default_rng(1), 4, 1)
-    >>> found = level(chains, np.array([[True], [True], [False], [False]]), 0.0)
-    >>> found.share, found.coefficient_of_variation
-    (0.5, 0.5)
     """
     share, length = float(inside.mean()), inside.shape[1]
     correlation = 0.0

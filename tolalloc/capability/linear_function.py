@@ -337,17 +337,6 @@ class NearPlane:
     of its values are regressed on the deviations, and the curve is a polynomial of degree 5 through what the plane says
     over the values (one step of alternating conditional expectations, Breiman & Friedman 1985). Nothing is believed of
     it (`tolalloc.allocation.space.output_sample.Control`).
-
-    Examples
-    --------
-    An output that is a plane behind a curve is found again.
-
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> experiment = sum_of_sizes(6.0, 12.0)
-    >>> x = np.random.default_rng(0).standard_normal((20_000, 2)) * experiment.zones / 6
-    >>> near = NearPlane.of(x, np.exp(x.sum(axis=1) / 20), experiment.errors, experiment.zones)
-    >>> round(near.share_above(1, np.exp(0.25)), 3)  # P(√5·z > 5)
-    0.013
     """
 
     law: LinearLaw  # Of the plane

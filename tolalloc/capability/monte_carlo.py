@@ -399,11 +399,6 @@ def monte_carlo(
     design
         How the units are spread; all intervals assume the first one.
 
-    Raises
-    ------
-    SolveError
-        More units failed.
-
     Notes
     -----
     The deviations are kept, the uniform numbers behind them only for one chunk at a time. The response takes all units
@@ -412,14 +407,6 @@ def monte_carlo(
     References
     ----------
     Quantiles x = F⁻¹(u) of uniform numbers u: Devroye 1986, Non-Uniform Random Variate Generation, ch. 2.
-
-    Examples
-    --------
-    A sum with σ of 1 and 2 has √(1 + 4) = 2.24.
-
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> round(float(monte_carlo(sum_of_sizes(6.0, 12.0), 10_000).values.std()), 1)
-    2.2
     """
     errors, seeds = experiment.errors, experiment.seeds
     x = np.empty((units, len(errors.columns)))
@@ -544,13 +531,6 @@ def quantile_change(
     References
     ----------
     Efron & Tibshirani 1993, ch. 13: percentile interval of a paired bootstrap.
-
-    Examples
-    --------
-    >>> x = np.linspace(0.0, 1.0, 101)
-    >>> change = quantile_change(x, x + 0.5, 0.9, np.random.default_rng(1))
-    >>> round(change.estimate, 12), round(change.low, 12), round(change.high, 12)
-    (0.5, 0.5, 0.5)
     """
     from scipy.stats import bootstrap
 
@@ -621,15 +601,6 @@ def kept_at_once(
     References
     ----------
     The interval is that of `proportion`, Clopper & Pearson 1934.
-
-    Examples
-    --------
-    Two units of four keep the first limit and two the second one, one of them both:
-
-    >>> values = np.array([[1.0, 1.0], [1.0, 3.0], [3.0, 1.0], [3.0, 3.0]])
-    >>> own = Evaluation(values=values, status=np.zeros(4, np.uint8))
-    >>> kept_at_once(own, ("a [mm]", "b [mm]"), {"a [mm]": Limits(upper=2.0), "b [mm]": Limits(upper=2.0)}).estimate
-    0.25
     """
     kept = [own.kept_by(evaluation.values[:, outputs.index(name)]) for name, own in limits.items()]
     good = evaluation.good & np.all(kept, axis=0)

@@ -48,11 +48,6 @@ def subset_simulation(
     largest_failed_share
         Share of the samples that may fail [-].
 
-    Raises
-    ------
-    SolveError
-        More samples than allowed have no usable answer.
-
     References
     ----------
     Au & Beck 2001, P = P₁·Π Pᵢ; Papaioannou et al. 2015, conditional sampling v = √(1 − σ²)·u + σ·ξ with adapted σ.
@@ -145,11 +140,6 @@ def scaled_sigma_sampling(
         Share of the samples that may fail [-].
     known
         Failing states that another method has met; they change nothing but the share that is seen of them [-].
-
-    Raises
-    ------
-    SolveError
-        More samples than allowed have no usable answer.
 
     Notes
     -----

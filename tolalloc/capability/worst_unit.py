@@ -53,13 +53,6 @@ def worst_unit(
     sense
         1 where large outputs are bad, for an upper limit; −1 where small ones are, for a lower limit [-].
 
-    Raises
-    ------
-    InputError
-        Sources without a zone, or no start or step.
-    SolveError
-        More units failed.
-
     Notes
     -----
     Conditional gradient (Frank–Wolfe): the k-th step goes 2/(k + 1) of the way to the unit that is worst by the

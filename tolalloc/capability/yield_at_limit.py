@@ -76,11 +76,6 @@ def agreement(
     largest_failed_share
         Share of the samples that may fail [-].
 
-    Raises
-    ------
-    SolveError
-        More samples than allowed have no usable answer.
-
     References
     ----------
     Subset simulation: Au & Beck 2001; widened sampling: Bucher 2009; how they are joined: `judged`, Birge 1932.
@@ -289,13 +284,6 @@ def yield_at_limit(
     runs
         Independent runs of either, two or more [-].
 
-    Raises
-    ------
-    InputError
-        Fewer than two runs.
-    SolveError
-        More samples than allowed have no usable answer.
-
     Notes
     -----
     The interval from random units holds for independent ones, those of the Monte Carlo design.
@@ -366,17 +354,6 @@ def log_normal_interval(failure: RareFailure, runs: int, confidence: float = CON
     p·exp(±t·√(ln(1 + δ²))) with δ the coefficient of variation and t Student's quantile of one degree of freedom less
     than runs, because few runs know little of their own spread; unlike p ± t·s it cannot fall below zero (own
     derivation).
-
-    Examples
-    --------
-    A share of 1e-4 with a standard error of 1e-5 from 5 runs: within a factor of exp(2.776·0.0998) = 1.319.
-
-    >>> failure = RareFailure(
-    ...     probability=1e-4, standard_error=1e-5, calls=1, failed=0, method="", cautions=(), effective_samples=100.0
-    ... )
-    >>> found = log_normal_interval(failure, runs=5)
-    >>> round((1 - found.low) / 1e-4, 3), round((1 - found.high) / 1e-4, 3)
-    (1.319, 0.758)
     """
     spread = np.sqrt(np.log1p(failure.coefficient_of_variation**2))
     factor = float(np.exp(student.isf((1 - confidence) / 2, runs - 1) * spread))

@@ -142,11 +142,6 @@ def parsed_shapes(text: str) -> tuple[float, ...]:
 
     >>> parsed_shapes("2 5"), parsed_shapes("0.4"), parsed_shapes("")
     ((2.0, 5.0), (0.4,), ())
-
-    Raises
-    ------
-    ValueError
-        The text does not read like that.
     """
     if not all(re.fullmatch(NUMBER, item) for item in text.split()):
         raise ValueError("allowed is a number with a decimal point, or for beta two such as '2 5'")
@@ -154,13 +149,7 @@ def parsed_shapes(text: str) -> tuple[float, ...]:
 
 
 def require_shapes(distribution: Distribution, stated: tuple[float, ...]) -> None:
-    """Raise unless a distribution has the shapes that it needs, and no other has any.
-
-    Raises
-    ------
-    ValueError
-        What is wrong, for the record that holds both.
-    """
+    """Raise unless a distribution has the shapes that it needs, and no other has any."""
     own = distribution.form.shapes
     if own is None:
         if stated:
@@ -334,13 +323,7 @@ class Batch:
 
 
 def parsed_batches(text: str) -> tuple[Batch, ...]:
-    """Return batches such as ``0.7:-0.3:0.8 0.3:0.5:0.6``: weight, shift and spread.
-
-    Raises
-    ------
-    ValueError
-        The text does not read like that.
-    """
+    """Return batches such as ``0.7:-0.3:0.8 0.3:0.5:0.6``: weight, shift and spread."""
     batches = []
     for item in text.split():
         match = re.fullmatch(rf"({NUMBER}):(-?{NUMBER}):({NUMBER})", item)

@@ -102,15 +102,6 @@ class Drawing:
         ------
         InputError, UnknownNameError
             The row, field and value that are not allowed.
-
-        Examples
-        --------
-        A hub of 55.29 ± 0.1 mm is one source with one column, in metres:
-
-        >>> zone = {"plus": 0.1, "minus": -0.1, "unit": "mm", "min": 0.02, "max": 0.5, "cost": 3.0}
-        >>> hub = Drawing.of_rows([{"id": "hub", "nominal": 55.29, **zone}])
-        >>> hub.errors.columns, hub.sources[0].zone
-        (('hub',), 0.0002)
         """
         listed = list(rows) if isinstance(rows, Iterable) and not isinstance(rows, str | Mapping) else [rows]
         if not all(isinstance(row, Mapping) and "id" in row for row in listed):

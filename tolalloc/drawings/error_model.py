@@ -18,13 +18,7 @@ from tolalloc.exceptions import InputError, UnknownNameError
 
 @dataclass(frozen=True)
 class ErrorModel:
-    """All sources of a reducer: each random column is its zone times a standard value.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        Correlations that name no source or cannot hold together.
-    """
+    """All sources of a reducer: each random column is its zone times a standard value."""
 
     sources: tuple[Source, ...]  # The rows of the tolerance table
     # What varies besides and stands on no drawing, such as a stiffness that is not known; its columns come last and its
@@ -48,13 +42,7 @@ class ErrorModel:
                     raise InputError.at(own.called, "source", name, "one that is correlated with no other")
 
     def at_places(self, names: Sequence[str]) -> ErrorModel:
-        """Return the model with, of a row for several like places, each of these names without a row of its own.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            A row for no place, or for another number of them than it says.
-        """
+        """Return the model with, of a row for several like places, each of these names without a row of its own."""
         found: dict[str, tuple[Source, ...]] = {own.name: (own,) for own in self.sources}
         for row in (own for own in self.sources if own.is_of_places):
             place = f"tolerance table {self.table} ({row.own_id or row.name})"

@@ -76,13 +76,7 @@ class Heads:
         return max(found, key=lambda at: found[at], default=0)
 
     def require_in(self, path: Path, rows: Sequence[Sequence[str]]) -> None:
-        """Raise unless a row has a head for each column that is needed, and a column each head that is said to be one.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            The row that looks most like one of heads, with what to write of them; or the head that is not there.
-        """
+        """Raise unless a row has a head for each column that is needed, and a column each head that is said so."""
         at = max(range(len(rows[:MOST_TITLES])), key=lambda at: sum(map(_is_word, rows[at])), default=0)
         seen = [cell for cell in (rows[at] if rows else ()) if cell]
         # Of a table that has most of its heads it is said which one is missing.

@@ -135,11 +135,6 @@ def fit_deviations(fit: str, nominal: float) -> tuple[float, float]:
     A grade alone is taken to both sides alike. Of holes K, M, N and P the mirrored deviation is raised by the grade
     less the one below it; M6 from 250 to 315 mm is the standard's exception.
 
-    Raises
-    ------
-    InputError
-        A letter or grade that is not known, or a nominal size outside 0 to 500 mm.
-
     Examples
     --------
     >>> [[round(one * 1e6, 1) for one in fit_deviations(fit, 0.040)] for fit in ("h6", "H7", "g6", "K7", "js9")]
@@ -188,13 +183,7 @@ number of a radius, a grade would be one of a feature half as large."""
 
 @dataclass(frozen=True, kw_only=True)
 class Ladder:
-    """Increasing zones with the grade or the series of each.
-
-    Raises
-    ------
-    InputError
-        No zones, or zones that are not finite, above 0 and increasing.
-    """
+    """Increasing zones with the grade or the series of each."""
 
     zones: Float[np.ndarray, " step"]  # The zones, tightest first [m]
     labels: tuple[str, ...]  # Where each comes from: a grade, or the series of preferred numbers
@@ -237,11 +226,6 @@ def group_ladder(sources: Sequence[Source]) -> Ladder:
     ----------
     sources
         Sources of one group, none of them locked.
-
-    Raises
-    ------
-    InputError
-        A member is locked, or no step lies in the range of every member.
 
     Notes
     -----

@@ -20,13 +20,7 @@ _SOBOL_BITS = 32
 
 
 def require_seed(work: str, seed: int) -> None:
-    """Raise unless a seed is 0 or a positive integer.
-
-    Raises
-    ------
-    InputError
-        It is not.
-    """
+    """Raise unless a seed is 0 or a positive integer."""
     if seed < 0:
         raise InputError.of_argument(work, "seed", seed, "0 or a positive integer")
 

@@ -95,11 +95,6 @@ PHASE = Characteristic("position", "a phase of a journal is drawn as its positio
 def parsed_spectrum(text: str) -> tuple[Spectrum, int]:
     """Return a spectrum such as ``1:9.2 2:4.3 random:1.0/40`` and the number of its random teeth, or 0.
 
-    Raises
-    ------
-    ValueError
-        The text does not read like that.
-
     Notes
     -----
     Independent deviations of Z teeth with standard deviation σ are white noise: both waves of every order up to
@@ -144,11 +139,6 @@ def parsed_systematic(text: str) -> Systematic:
     """Return systematic waves such as ``2:5.0@30``, order:amplitude@direction, in the unit of the text and rad.
 
     A wave is amplitude·cos(order·(θ − direction)), half as high as its indicator reading.
-
-    Raises
-    ------
-    ValueError
-        The text does not read like that.
 
     Examples
     --------

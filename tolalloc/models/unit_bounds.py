@@ -90,15 +90,6 @@ def least_by_slopes(
     -----
     Theory page, equation (103), own derivation: with a ≤ ∂y/∂r ≤ b, a⁻ = min(a, 0) and b⁺ = max(b, 0),
     y ≥ y(p) + Σ a⁻·b⁺/(b⁺ − a⁻)·(upper − lower) at p = (b⁺·lower − a⁻·upper)/(b⁺ − a⁻), the best point to start from.
-
-    Examples
-    --------
-    A slope between −1 and 3 over 0 to 4: from 1, nothing falls by more than 3 to either side.
-
-    >>> low, high = np.array([[-1.0]]), np.array([[3.0]])
-    >>> start, fall = least_by_slopes((low, high), np.zeros(1), np.full(1, 4.0))
-    >>> float(start[0, 0]), float(fall[0, 0])
-    (1.0, -3.0)
     """
     falling, rising = np.minimum(slopes[0], 0.0), np.maximum(slopes[1], 0.0)
     span = np.where(rising > falling, rising - falling, 1.0)

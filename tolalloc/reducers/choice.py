@@ -56,11 +56,6 @@ def bind(
 
     The model stands at the reducer's own modification and has the orders of the unit that is to be shown, if any; the
     arguments are those of `ReducerChoice`, and the place is who asks, for messages.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        A source or torque that is not allowed, or a column of the model that nobody gives.
     """
     require_small_zones(errors.sources, _LARGEST_ZONE, place)
     orders = tuple(sorted({*errors.orders, *(unit.orders if unit else ())}))
@@ -99,13 +94,7 @@ def _taken(pattern: str, columns: Sequence[str]) -> str:
 
 
 def _absent_orders(errors: ErrorModel, model: EquivalentModel, place: str) -> list[str]:
-    """Return the columns of listed sources whose orders their spectra do not have.
-
-    Raises
-    ------
-    InputError
-        Sources that list more or fewer pins or teeth than there are.
-    """
+    """Return the columns of listed sources whose orders their spectra do not have."""
     own = {source.name: list[str]() for source in errors.sources}
     for column in model.columns:
         own.get(source_name(column), []).append(column)
@@ -116,13 +105,7 @@ def _absent_orders(errors: ErrorModel, model: EquivalentModel, place: str) -> li
 
 
 def _require_each(errors: ErrorModel, own: Mapping[str, Sequence[str]], reducer: Reducer, place: str) -> None:
-    """Raise unless every source has as many like features as its columns say, one line for all that have not.
-
-    Raises
-    ------
-    InputError
-        The sources of single pins and teeth, and how many there are.
-    """
+    """Raise unless every source has as many like features as its columns say, one line for all that have not."""
     wrong: dict[int, list[str]] = {}
     for source in errors.sources:
         kind = SOURCES.of(source.name)
@@ -204,13 +187,7 @@ class ReducerChoice:
         return self.rotation_clearance, self.flank_clearance, self.radial_clearance
 
     def set_to(self, settings: Mapping[str, float]) -> ReducerChoice:
-        """Return the reducer with a tooth modification that leaves other clearances [µm], or other conditions [N·m, K].
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            A setting that it does not have, a clearance outside its bounds, or a condition that is not allowed.
-        """
+        """Return the reducer with a modification that leaves other clearances [µm], or other conditions [N·m, K]."""
         place, torque = f"reducer {self.name}", settings.get(TORQUE, self.torque)
         self.reducer.torque_on_carrier(torque, place)
         warmer = settings.get(DISC_TEMPERATURE, self.disc_temperature)
@@ -239,13 +216,7 @@ class ReducerChoice:
         return SOURCES.shared_lines(stated)
 
     def bound(self, errors: ErrorModel, place: str) -> ReducerModel:
-        """Return the model at the sources of a drawing; nothing is solved.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            A source or torque that is not allowed, or a column of the model that nobody gives.
-        """
+        """Return the model at the sources of a drawing; nothing is solved."""
         from tolalloc.reducers.model import ReducerModel
 
         kernel, assumptions = bind(self.reducer, errors, self.torque, place, self.neglected, self.unit)

@@ -59,21 +59,9 @@ def contact_of(
     phases
         Phases of the crank within one pin pitch [-].
 
-    Raises
-    ------
-    InputError
-        The profile cannot be ground, interferes with the pins, or the torque is beyond any contact.
-
     References
     ----------
     Li Lixing's linear method as xi2015 has it; Hertz's line contact of steel on steel.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> found = contact_of(load_reducer("rv40e_xi2015"), -572.0, phases=1)
-    >>> round(float(found.assessment.single.force.max()))  # largest pin force on the more loaded disc [N]
-    1144
     """
     found = assess(reducer, torque, law=law, exact=exact, phases=phases)
     yielding = None if found.clearance.exact else _yielding(perfect_reducer(found.reducer, torque))

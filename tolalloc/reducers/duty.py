@@ -109,13 +109,7 @@ def _angular(case: LoadCase) -> float:
 
 
 def require_cycle(cases: Sequence[LoadCase], reducer: Reducer) -> None:
-    """Refuse load cases that are no duty cycle.
-
-    Raises
-    ------
-    InputError
-        No load case, one without torque or speed, a part of the turn, or a torque that the reducer does not take.
-    """
+    """Refuse load cases that are no duty cycle."""
     if not cases:
         raise InputError("a duty cycle has no load case; one or more with torque and speed are needed.")
     for case in cases:
@@ -143,13 +137,6 @@ def duty_of(reducer: Reducer, cases: Sequence[LoadCase], resistance: float | Non
     resistance
         Temperature of the discs above the ring over the lost power; unless given 0.05 K/W at an RV-20E's pin circle and
         less as the square of a larger one, an assumption [K/W].
-
-    Raises
-    ------
-    InputError
-        What is no duty cycle.
-    SolveError
-        The temperature runs away: warmer discs rub more than the resistance takes away.
 
     References
     ----------
@@ -252,12 +239,6 @@ def lever(reducer: Reducer) -> float:
 
     Theory page equation (95), own derivation. One row stands on each side of the discs, which are w wide together, and
     their contact lines meet outside: an assumption.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> round(1e3 * lever(load_reducer("rv20e")), 1)  # 12 mm + 10 mm + 93.6 mm·tan 40° [mm]
-    100.5
     """
     bearing, stage = _known(reducer)[MAIN], reducer.cycloid_stage
     apart = (reducer.disc_count - 1) * stage.disc_spacing + stage.face_width

@@ -106,13 +106,7 @@ class LoadCase(NamedFields):
 
 
 def _split(place: str, output: Any) -> tuple[str, str]:
-    """Return what an output is and its unit.
-
-    Raises
-    ------
-    InputError
-        What is no output with a unit.
-    """
+    """Return what an output is and its unit."""
     what, found, unit = output.rpartition(" [") if isinstance(output, str) else ("", "", "")
     if not found:
         raise InputError.of_argument(place, "output", output, "an output of a reducer, such as ta.PEAK_TO_PEAK")
@@ -240,13 +234,7 @@ def combined_outputs(cases: Sequence[LoadCase], outputs: Sequence[str]) -> Mappi
 
 
 def require_load_cases(place: str, cases: Any) -> tuple[LoadCase, ...]:
-    """Return the load cases of a reducer.
-
-    Raises
-    ------
-    InputError
-        What is no list of load cases of different names.
-    """
+    """Return the load cases of a reducer."""
     good = isinstance(cases, Sequence) and all(isinstance(case, LoadCase) for case in cases)
     if not good:
         allowed = "a list of load cases, such as [ta.LoadCase('warm', disc_temperature=5)]"
@@ -278,11 +266,6 @@ def load_cycle(path: Path) -> tuple[LoadCase, ...]:
     """Return the load cases of a duty cycle's file, a CSV of ``case,torque [N·m],speed [rpm],share [%]``.
 
     A column ``disc_temperature [K]`` and one ``moment [N·m]`` may stand there too.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        The file, row, field and value that are not allowed.
     """
     cases = []
     for place, row in read_rows(path, CycleRow, "case", _UNITS):
@@ -295,13 +278,7 @@ def load_cycle(path: Path) -> tuple[LoadCase, ...]:
 
 
 def require_duty(place: str, cases: Sequence[LoadCase]) -> tuple[LoadCase, ...]:
-    """Return those that state a speed: the duty cycle that wears a reducer.
-
-    Raises
-    ------
-    InputError
-        None of them does.
-    """
+    """Return those that state a speed: the duty cycle that wears a reducer."""
     duty = tuple(case for case in cases if case.speed is not None)
     if not duty:
         allowed = "a list in which one states the speed that wears, such as ta.LoadCase('work', torque=-167, speed=15)"

@@ -179,13 +179,7 @@ class ReducerModel(Model):
         return tuple(name for name in self._own_outputs if name not in WITH_FRICTION)
 
     def reading(self, outputs: tuple[str, ...]) -> Response:
-        """Return the response of these outputs, waves of `spectra` among them if need be.
-
-        Raises
-        ------
-        UnknownNameError
-            An output that the model does not have.
-        """
+        """Return the response of these outputs, waves of `spectra` among them if need be."""
         waves = {name for names in self.spectra.values() for name in names}
         for name in outputs:
             if name not in self.outputs and name not in waves:

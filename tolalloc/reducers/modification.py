@@ -147,13 +147,6 @@ def reference(problem: ModificationProblem) -> Optimum:
     constraints need no care, and an optimum is missed only if it hides between the points of the first grid, 33 × 33.
 
     Own derivation: min over Δr_rp of the min over Δr_p, to 1e-4 of a grid's cell [m].
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> found = reference(residual_gap(load_reducer("rv40e_xi2015").cycloid_stage, 15e-6))
-    >>> f"{found.objective / 1e-6:.4f} µm after {found.evaluations} points"  # mean gap, see `closed_form`
-    '0.4554 µm after 57600 points'
     """
     best = BestPoint(problem)
 
@@ -205,13 +198,6 @@ def residual_gap(
     formula's, good for amounts up to 50 µm.
 
     Mean over φ of Δr_rp·(1 − S) − Δr_p·(C − q·S) ≥ 0, Δr_rp − Δr_p ≥ j (own derivation).
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> problem = residual_gap(load_reducer("rv40e_xi2015").cycloid_stage, 15e-6)
-    >>> [round(float(row), 7) for row in problem.constraints(np.array([[40e-6, 20e-6]]))[0]]  # both met [m]
-    [5e-06, 3.3e-06]
     """
     angle, (first, last) = np.linspace(*interval, intervals + 1), (end / DEGREE for end in interval)
     units = (Modification(equidistant=1.0, shift=0.0), Modification(equidistant=0.0, shift=1.0))
@@ -242,13 +228,6 @@ def closed_form(stage: CycloidStage, radial_clearance: float) -> Modification:
     itself at u = 0, and C is concave from 1 at S = 0 to q at S = 1, so it lies above its chord 1 − (1 − q)S. So both v
     and u are best at their least, whatever the work interval and the number of its points. It holds for 0 < q < 1,
     which every stage that can be ground has, and as long as both amounts lie in the box of the problem.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> found = closed_form(load_reducer("rv40e_xi2015").cycloid_stage, 15e-6)
-    >>> f"{found.equidistant / 1e-6:.4f} µm, {found.shift / 1e-6:.4f} µm"
-    '35.9679 µm, 20.9679 µm'
     """
     ratio = stage.flank_ratio
     return Modification(
@@ -290,11 +269,6 @@ def rotated_profile_fit(
     radial_clearance, require_gap
         As in `ModificationProblem` [m].
 
-    Raises
-    ------
-    InputError
-        A rotation that is not above 0 and up to a sixteenth of a tooth pitch.
-
     Notes
     -----
     ``same_angle`` is mostly slip along the profile, which is no error of the profile. ``nearest`` carries the modified
@@ -305,13 +279,6 @@ def rotated_profile_fit(
     References
     ----------
     song2019, equation (10).
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> problem = rotated_profile_fit(load_reducer("rv40e_xi2015").cycloid_stage)
-    >>> f"{problem.objective(np.zeros((1, 2)))[0] / 1e-6:.1f} µm"  # of the exact profile from the rotated one
-    '308.0 µm'
     """
     name = f"rotated profile, {'positive' if shift_sign > 0 else 'negative'} shift, {metric}"
     largest, shift = np.pi / (8 * stage.disc_teeth), np.array([0.0, np.sign(shift_sign) * MILLIMETRE])
@@ -349,11 +316,6 @@ def rotated_profile_fit(
 def wanted_clearances(stage: CycloidStage, flank: float, radial: float) -> ModificationProblem:
     """Return the problem of the amounts that leave a flank clearance F and a radial clearance J [m].
 
-    Raises
-    ------
-    InputError
-        Another pin would touch before the flank is closed, so that no amounts leave these clearances.
-
     Notes
     -----
     F = Δr_rp − q·Δr_p and J = Δr_rp − Δr_p are linear in both amounts, so Δr_p = (F − J)/(1 − q) and Δr_rp = J + Δr_p.
@@ -363,13 +325,6 @@ def wanted_clearances(stage: CycloidStage, flank: float, radial: float) -> Modif
     References
     ----------
     xi2015, equation (3), for F and J; the bound is an own derivation.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> problem = wanted_clearances(load_reducer("rv20e").cycloid_stage, 3.5e-6, 8e-6)
-    >>> f"{problem.wanted.equidistant / 1e-6:.4f} µm, {problem.wanted.shift / 1e-6:.4f} µm"
-    '-8.1639 µm, -16.1639 µm'
     """
     ratio = stage.flank_ratio
     most = (1 + ratio) * radial
@@ -416,13 +371,7 @@ PUBLISHED_RADIAL = 15 * MICROMETRE
 
 @dataclass(frozen=True, kw_only=True)
 class ModificationRequest:
-    """What is to be chosen.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        An unknown method or metric, or a clearance out of range.
-    """
+    """What is to be chosen."""
 
     # ``clearances``: those that are wanted; ``song2019``: closest to a rotated profile; ``li2018``: least gap
     method: str = "clearances"
@@ -511,11 +460,6 @@ def choose(request: ModificationRequest, reducer: Reducer, torque: float) -> Mod
 
     The reducer's own modification is replaced; the torque on the carrier is that of the contact, negative resists
     [N·m].
-
-    Raises
-    ------
-    InputError
-        No amounts meet the constraints or leave the wanted clearances, or the best ones cannot be ground or mounted.
 
     References
     ----------

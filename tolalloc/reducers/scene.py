@@ -35,11 +35,6 @@ from tolalloc.reducers.reducer.design import Reducer
 def place_of(source: str) -> str:
     """Return the id of the place that a source sits at.
 
-    Raises
-    ------
-    UnknownNameError
-        A name that no reducer has.
-
     Examples
     --------
     >>> place_of("disc2.each_tooth.pitch"), place_of("crank1.journal2.phase"), place_of("carrier.tilt")
@@ -59,13 +54,7 @@ def is_placed(source: str) -> bool:
 
 
 def places_of(reducer: Reducer, sources: Iterable[str] = ()) -> tuple[Place, ...]:
-    """Return all places of a reducer with the sources of a drawing, from the inside of the housing to the input.
-
-    Raises
-    ------
-    UnknownNameError
-        A source that sits at no part of the reducer.
-    """
+    """Return all places of a reducer with the sources of a drawing, from the inside of the housing to the input."""
     found = {place.id: place for place in family_of(reducer).places(reducer)}
     for source in sources:
         own = place_of(source)
@@ -86,13 +75,6 @@ def _tooth(reducer: Reducer) -> dict[str, list[Any]]:
     unit vector into the disc [-]; the last point is left out, as it is the next space's first.
 
     Points of theory page (34), own derivation, x + iy for 0 ≤ φ ≤ π and mirrored [mm].
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> found = _tooth(load_reducer("rv40e_xi2015"))
-    >>> len(found["exact"]), round(max(x for x, _ in found["exact"]), 3), round(min(x for x, _ in found["exact"]), 3)
-    (22, 62.098, 59.7)
     """
     stage = reducer.cycloid_stage
     exact, modified = ToothProfile(stage=stage), ToothProfile.of(reducer)
@@ -160,13 +142,7 @@ def _turn_of(model: EquivalentModel, count: int) -> Turn:
 
 
 def _solved_states(turn: Turn, errors: Float[np.ndarray, " column"], torque: float) -> States:
-    """Return the equilibria of one unit [m, angles rad] under a torque on the carrier [N·m].
-
-    Raises
-    ------
-    SolveError
-        An angle without equilibrium.
-    """
+    """Return the equilibria of one unit [m, angles rad] under a torque on the carrier [N·m]."""
     equilibria = turn.model.equilibria_of(turn.tables, errors[np.newaxis], torque, turn.carrier_angle)
     worst = Status(int(equilibria.status.max()))
     if worst is not Status.CONVERGED:
@@ -187,18 +163,6 @@ def _compressions(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]
     Summed in the order of the solver, so that no digit differs from what it balances.
 
     δ = D·q + H·ε, own derivation, theory page (17) and (21).
-
-    Examples
-    --------
-    Under no errors those that carry are force over stiffness:
-
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
-    >>> solved = model.equilibria(np.zeros((1, len(model.columns))), -167.0, np.zeros(1))
-    >>> found = _compressions(solved)
-    >>> ratio = forces(solved).pins[0].max() / found.max()
-    >>> f"{ratio / model.reducer.stiffness.pin_contact:.6f}"
-    '1.000000'
     """
     tables, layout = equilibria.tables, equilibria.columns.layout
     values = _values(equilibria)
@@ -235,16 +199,6 @@ def _displacements(turn: Turn, equilibria: Equilibria, carried: Forces) -> Float
     The others follow from the ways of the springs, force over stiffness, theory page equation (5).
 
     q_rest = A⁺·(F/K − b·ε − A_d·q_d), own derivation.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> turn = _turn_of(EquivalentModel(load_reducer("rv20e_liu2020")), 1)
-    >>> errors = np.zeros((1, len(turn.model.columns)))
-    >>> solved = turn.model.equilibria_of(turn.tables, errors, -167.0, turn.carrier_angle)
-    >>> found = _displacements(turn, solved, forces(solved))
-    >>> f"{found[0, -1] / solved.transmission_error[0, 0]:.6f}"  # the last one is the carrier's rotation
-    '1.000000'
     """
     found = np.zeros((equilibria.carrier_angle.size, turn.scale.size))
     found[:, turn.retained] = equilibria.retained[0] * turn.scale[turn.retained]
@@ -328,13 +282,6 @@ def scene_of(
         Names of the drawing's sources.
     per_crank_turn
         Angles per turn of the cranks [-].
-
-    Raises
-    ------
-    SolveError
-        An angle without equilibrium.
-    UnknownNameError
-        A source that sits at no part of the reducer.
     """
     own = dict(zip(model.columns, (float(value) for value in errors), strict=True))
     reducer = _as_modified(model.reducer, own)
@@ -438,14 +385,6 @@ def _magnification(reducer: Reducer, *states: States) -> float:
     A gap of 20 µm beside pins of 2 mm radius is drawn 50 times larger, 1 mm wide.
 
     Own derivation: m = r_rp/(2·largest gap), rounded down to 1, 2 or 5 times a power of ten.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> pins, none = np.zeros((1, 1, 1)), np.zeros((1, 1))
-    >>> state = States(torque=1.0, force=pins, gap=pins + 20e-6, displacement=none, transmission_error=none[0])
-    >>> _magnification(load_reducer("rv20e_liu2020"), state)
-    50.0
     """
     widest = max(float(np.abs(state.gap).max()) for state in states)
     most = 0.5 * reducer.cycloid_stage.pin_radius / max(widest, 1e-9)

@@ -51,14 +51,6 @@ def corrected(response: Response, evaluation: Evaluation, y: Float[np.ndarray, "
     """Return the response with the line of least squares that brings what it said to the answers ``y``.
 
     min Σ (y − a − b·ŷ)², least squares; fitted where both are good (own derivation).
-
-    Examples
-    --------
-    >>> from unittest.mock import Mock
-    >>> said = Evaluation(values=np.array([[1.0], [2.0], [3.0]]), status=np.zeros(3, np.uint8))
-    >>> line = corrected(Mock(spec=Response), said, np.array([3.0, 5.0, 7.0]))
-    >>> round(line.offset, 9), round(line.factor, 9)
-    (1.0, 2.0)
     """
     offset, factor = polynomial.polyfit(evaluation.values[evaluation.good, 0], y[evaluation.good], 1)
     return Corrected(response=response, offset=float(offset), factor=float(factor))

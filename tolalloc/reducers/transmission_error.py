@@ -72,11 +72,6 @@ def transmission_error(
     attributed
         Whether it is said which source makes how much of each order.
 
-    Raises
-    ------
-    SolveError
-        An angle without equilibrium.
-
     Notes
     -----
     TE(θc) = θ(θc) − θc, the rotation of the carrier beyond that of ideal gears, in the equilibrium of all springs at
@@ -85,14 +80,6 @@ def transmission_error(
     References
     ----------
     liu2020, whose unit of Table 4 the example is.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> from tolalloc.reducers.unit_file import load_unit
-    >>> found = transmission_error(load_reducer("rv20e_liu2020"), load_unit("table4"), -1.0)
-    >>> round(float(found.extremes.peak_to_peak[0]) * 206264.8, 1)  # [arcsec]
-    96.6
     """
     reducer = unit.as_built(reducer)
     model = EquivalentModel(at_torque(reducer, torque), orders=unit.orders or HARMONICS)

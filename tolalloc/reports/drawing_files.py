@@ -69,13 +69,7 @@ WRITERS = {".csv": _write_csv, ".dxf": _write_dxf}
 
 
 def require_profile_file(path: Path, per_tooth: int) -> None:
-    """Raise unless a profile of so many points per tooth can be written to a new ``.csv`` or ``.dxf`` file.
-
-    Raises
-    ------
-    InputError
-        An unknown kind of file, one that exists, or a number of points that no drawing can use.
-    """
+    """Raise unless a profile of so many points per tooth can be written to a new ``.csv`` or ``.dxf`` file."""
     require_points(per_tooth)
     if path.suffix.lower() not in WRITERS:
         raise InputError.at("profile file", "ending", path.name, " or ".join(WRITERS))
@@ -83,13 +77,7 @@ def require_profile_file(path: Path, per_tooth: int) -> None:
 
 
 def write_profile(profile: ToothProfile, per_tooth: int, path: Path) -> ProfilePoints:
-    """Write the sound profile of a whole disc in millimetres and return its points.
-
-    Raises
-    ------
-    InputError
-        An unknown kind of file, one that exists or cannot be written, or a number of points that no drawing can use.
-    """
+    """Write the sound profile of a whole disc in millimetres and return its points."""
     require_profile_file(path, per_tooth)
     points = profile_points(profile, per_tooth)
     try:

@@ -117,11 +117,6 @@ class HeatMap:
 def chart(figure: object) -> dict[str, Any]:
     """Return what ``page/chart.js`` draws a figure from; it can be written as JSON.
 
-    Raises
-    ------
-    TypeError
-        It is no figure.
-
     Examples
     --------
     >>> line = Series(label="unit 1", kind="line", x=[0.0, 1.0], y=[2.0, float("nan")])

@@ -149,13 +149,7 @@ def common_currency(runs: Iterable[FinishedRun]) -> str:
 
 
 def read_run(folder: Path) -> FinishedRun:
-    """Return what a finished run's folder says.
-
-    Raises
-    ------
-    InputError
-        A file of the run is missing, broken or of another layout.
-    """
+    """Return what a finished run's folder says."""
     if not folder.is_dir():
         raise InputError(f"{folder}: no such run folder.")
     said, manifest = _read_json(folder / "summary.json"), _read_json(folder / "manifest.json")

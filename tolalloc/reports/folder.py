@@ -21,13 +21,7 @@ _UNFINISHED = ".unfinished"
 
 
 def require_usable(folder: Path | None) -> None:
-    """Raise unless the folder is new or empty, or none is wanted.
-
-    Raises
-    ------
-    RunFolderError
-        Something is in the way.
-    """
+    """Raise unless the folder is new or empty, or none is wanted."""
     if folder is None:
         return
     if folder.is_file():
@@ -56,11 +50,6 @@ def claimed(folder: Path) -> Iterator[Path]:
 
     The wanted folder is made before anything long runs; if the work fails, nothing of either is left. What a killed
     process of this machine left beside the same folder is cleared.
-
-    Raises
-    ------
-    RunFolderError
-        Something is in the way, or the folder cannot be made.
     """
     require_usable(folder)
     named, folder = folder, folder.absolute()  # what is run inside may go to another folder

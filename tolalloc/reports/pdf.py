@@ -19,13 +19,7 @@ _LONGEST = 120.0
 
 
 def browser() -> str:
-    """Return the browser that prints.
-
-    Raises
-    ------
-    InputError
-        None is installed.
-    """
+    """Return the browser that prints."""
     for name in BROWSERS:
         if found := which(name):
             return found
@@ -36,13 +30,7 @@ def browser() -> str:
 
 
 def require_printable(paper: str) -> None:
-    """Raise unless a report can be printed on a paper.
-
-    Raises
-    ------
-    InputError
-        No browser is installed, or an unknown paper.
-    """
+    """Raise unless a report can be printed on a paper."""
     if paper not in PAPERS:
         raise InputError.of_argument("report", "paper", paper, " or ".join(PAPERS))
     browser()
@@ -59,11 +47,6 @@ def write_pdf(page: Path, path: Path, paper: str = PAPERS[0]) -> None:
         The PDF file, replaced if it is there.
     paper
         One of `PAPERS`.
-
-    Raises
-    ------
-    InputError
-        No browser is installed, an unknown paper, or the browser did not print.
     """
     require_printable(paper)
     program, size = browser(), f"<style>@page {{ size: {paper} portrait; }}</style></head>"

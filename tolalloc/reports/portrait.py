@@ -161,13 +161,7 @@ class Portrait(Generic[Own]):
         unit: str,  # noqa: ARG002
         sources: tuple[str, ...],  # noqa: ARG002
     ) -> dict[str, Any] | None:
-        """Return a unit as a moving picture needs it, with a place for each source; none unless a model has one.
-
-        Raises
-        ------
-        SolveError
-            The unit does not come to rest somewhere.
-        """
+        """Return a unit as a moving picture needs it, with a place for each source; none unless a model has one."""
         return None
 
     def moving(

@@ -39,13 +39,7 @@ _PLACE = "NUMBA_CACHE_DIR"
 
 
 def _place() -> Path | None:
-    """Return the folder that compiled functions are kept in; nothing where no folder can be written.
-
-    Raises
-    ------
-    InputError
-        The folder that the environment names cannot be written.
-    """
+    """Return the folder that compiled functions are kept in; nothing where no folder can be written."""
     folder = f"compiled-{_DIGEST[:16]}"
     if stated := str(nb.config.CACHE_DIR):
         if not _can_be_written(Path(stated) / folder):

@@ -41,13 +41,7 @@ class Workers:
         solve: Callable[[Float[np.ndarray, "chunk column"]], Any],
         chunks: Iterable[Float[np.ndarray, "chunk column"]],
     ) -> Iterator[Any]:
-        """Yield the answers in the order of the chunks.
-
-        Raises
-        ------
-        SolveError
-            A chunk whose workers were lost again and again.
-        """
+        """Yield the answers in the order of the chunks."""
         under_way: deque[Any] = deque()
         for chunk in chunks:
             if len(under_way) >= AHEAD * max(len(self.client.nthreads()), 1):
@@ -68,13 +62,7 @@ class Workers:
 
 @contextmanager
 def workers_at(address: str) -> Iterator[Workers]:
-    """Give the workers of a scheduler at an address, or those of this machine at ``local``.
-
-    Raises
-    ------
-    InputError
-        Dask is not installed, nobody answers, or a worker has another version of this package.
-    """
+    """Give the workers of a scheduler at an address, or those of this machine at ``local``."""
     try:
         from distributed import Client, LocalCluster
         from distributed.comm import get_address_host_port

@@ -30,18 +30,6 @@ class LocalDerivatives:
         """Return what all places of one line of a drawing do, whose errors are independent of each other.
 
         √(Σ rᵢ²) over the places, with the root mean square change rᵢ of each (own derivation).
-
-        Examples
-        --------
-        >>> two = np.array([3.0, 4.0])
-        >>> own = LocalDerivatives(
-        ...     sources=("a", "b"),
-        ...     slope=np.array([-1.0, 1.0]),
-        ...     by_zone=two,
-        ...     per_micrometre=two,
-        ... )
-        >>> own.of_line(("a", "b")).by_zone, own.of_line(("a",)).slope
-        (5.0, (-1.0, -1.0))
         """
         at = [self.sources.index(name) for name in members]
         return LineDerivatives(
@@ -83,11 +71,6 @@ def mean_slope(slopes: Float[np.ndarray, "unit column"]) -> float:
 def local_derivatives(experiment: Experiment[ResponseWithDerivatives], units: int = 1024) -> LocalDerivatives:
     """Return the derivatives by each source over random units; joint sources are no lengths.
 
-    Raises
-    ------
-    SolveError
-        More of the random units failed.
-
     Notes
     -----
     A peak-to-peak has a kink wherever two angles share its maximum or minimum, and symmetry makes the nominal such a
@@ -96,14 +79,6 @@ def local_derivatives(experiment: Experiment[ResponseWithDerivatives], units: in
     An error has no steepest direction but its own: by a source's zone the output changes by √(Σ E[(∂y/∂xᵢ)²]·σᵢ²), and
     divided by √(Σ σᵢ²) by a micrometre of one of its features, which is the distance from the true position, or the
     amplitude of a wave (own derivation).
-
-    Examples
-    --------
-    A sum in metres changes by 1e-6 m with a micrometre of either size.
-
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> local_derivatives(sum_of_sizes(6.0, 12.0), 64).slope.tolist()
-    [1e-06, 1e-06]
     """
     errors = experiment.errors
     sample, by_column = _sampled(experiment, units)
@@ -160,11 +135,6 @@ class ClassicalEstimate:
 def classical_estimate(experiment: Experiment[Response]) -> ClassicalEstimate:
     """Return worst case and root-sum-square from one error at a time.
 
-    Raises
-    ------
-    SolveError
-        The unit without errors failed, or more of the others than allowed.
-
     Notes
     -----
     Both sums assume that single errors add up, which contact switching denies; they stand beside Monte Carlo for
@@ -176,15 +146,6 @@ def classical_estimate(experiment: Experiment[Response]) -> ClassicalEstimate:
     References
     ----------
     Evans 1975, J. Quality Technology 7(1), 1–12.
-
-    Examples
-    --------
-    Sizes with zones of 6 and 8 may be 3 and 4 off: worst case 7, root sum square 5.
-
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> found = classical_estimate(sum_of_sizes(6.0, 8.0))
-    >>> found.worst_case, found.root_sum_square
-    (7.0, 5.0)
     """
     errors = experiment.errors
     middle = experiment.deviations(np.zeros((1, len(errors.columns))))

@@ -70,13 +70,6 @@ def inverse_sensitivity(
     units
         Units of every trial [-].
 
-    Raises
-    ------
-    InputError
-        Too few units for the target.
-    SolveError
-        Too many units of a trial failed, or the quantile jumps over the limit.
-
     Notes
     -----
     All trials use the same uniform numbers, so the quantile is a continuous function of each factor. A zone is opened

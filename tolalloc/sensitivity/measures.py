@@ -201,15 +201,7 @@ def _first(sample: MonteCarlo, units: int) -> MonteCarlo:
 
 
 def rank(asked: Measures, record: RunRecord) -> RankingResult:
-    """Return what drives the outputs of a model at the zones of its drawing.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        What is not allowed.
-    SolveError
-        Too many units failed.
-    """
+    """Return what drives the outputs of a model at the zones of its drawing."""
     measures, model, effort = replace(asked, model=asked.model.observed(record.observe)), asked.model, asked.effort
     spectra, own = model.spectra, measures.experiment
     with one_blas_thread():

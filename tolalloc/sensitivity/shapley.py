@@ -58,11 +58,6 @@ def shapley_effects(experiment: Experiment[Response], permutations: int) -> Shap
     permutations
         Random orders of the sources; the response is called (sources + 1) times as often [-].
 
-    Raises
-    ------
-    SolveError
-        More samples than allowed failed, or fewer than two permutations without a failed one are left.
-
     Notes
     -----
     The worth of a set of sources is the variance that they leave when all others are known, E[Var(Y | others)]; the

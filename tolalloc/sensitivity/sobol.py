@@ -135,13 +135,7 @@ class SobolAnalysis:
         return _overall_ranking(self.sources, self.outputs, self.ranked, self.indices)
 
     def position(self, output: str | int) -> int:
-        """Return the position of an output [-].
-
-        Raises
-        ------
-        UnknownNameError, InputError
-            There is no such output.
-        """
+        """Return the position of an output [-]."""
         if isinstance(output, str):
             if output not in self.outputs:
                 raise UnknownNameError.among("Sobol indices", "output", output, self.outputs)
@@ -155,13 +149,7 @@ class SobolAnalysis:
         return float(np.median(self.indices.narrowed[self.position(output)]))
 
     def of(self, output: str | int) -> SobolIndices:
-        """Return the indices of one output.
-
-        Raises
-        ------
-        SolveError
-            The output is the same for all samples.
-        """
+        """Return the indices of one output."""
         at, counts = self.position(output), self.outputs[self.position(output)] in self.ranked
         blocks = self.blocks if counts else self.blocks_of_others
         return _indices_of(self.indices, at, self.outputs[at], self.sources, blocks, self.samples)
@@ -170,13 +158,7 @@ class SobolAnalysis:
 def _indices_of(
     found: SaltelliIndices, at: int, output: str, sources: tuple[str, ...], blocks: int, samples: int
 ) -> SobolIndices:
-    """Return the indices at one place, of an output from so many blocks of an analysis with so many samples [-].
-
-    Raises
-    ------
-    SolveError
-        The output is the same for all samples.
-    """
+    """Return the indices at one place, of an output from so many blocks of an analysis with so many samples [-]."""
     if not found.varies[at]:
         raise ConstantOutputError(f"Sobol indices: {output} is the same for all samples; no source can be ranked.")
     return SobolIndices(
@@ -198,13 +180,7 @@ def _indices_of(
 def _overall_ranking(
     sources: tuple[str, ...], outputs: tuple[str, ...], ranked: tuple[str, ...], indices: SaltelliIndices
 ) -> SourceRanking:
-    """Return the ranking over those outputs that count and vary: the total index of a source is its largest one.
-
-    Raises
-    ------
-    SolveError
-        None of them varies.
-    """
+    """Return the ranking over those outputs that count and vary: the total index of a source is its largest one."""
     varying = np.flatnonzero(indices.varies & np.isin(outputs, ranked))
     if not varying.size:
         raise ConstantOutputError(
@@ -342,11 +318,6 @@ def sobol_indices(
         a stable order. All outputs are asked for in all blocks unless it is given.
     cheap
         Model of some of the outputs, learnt from units of other random numbers, as a control variate.
-
-    Raises
-    ------
-    SolveError
-        Too many samples failed, or no output varies.
 
     Notes
     -----
@@ -514,24 +485,9 @@ def regrouped(
     cheap
         That of the analysis, if it had one.
 
-    Raises
-    ------
-    SolveError
-        Too many samples failed, or the output does not vary.
-
     References
     ----------
     As `sobol_indices`; a group of columns has the index of all that happens inside it: Saltelli et al. 2010.
-
-    Examples
-    --------
-    The first two of three parts with the variances 1, 1 and 4 have 2/6 together.
-
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> experiment = sum_of_sizes(6.0, 6.0, 12.0)
-    >>> found = sobol_indices(experiment, SobolEffort(start=4096, limit=4096, places=1))
-    >>> regrouped(experiment, found, ("both", "both", "last")).total.round(2).tolist()
-    [0.33, 0.67]
     """
     assert analysis.solved is not None
     before, answers = analysis.solved.design, analysis.solved.answers

@@ -90,13 +90,6 @@ def target_sensitivity(
     largest_failed_share
         Share of the units that may fail [-].
 
-    Raises
-    ------
-    InputError
-        The worst 5 % are fewer units than needed.
-    SolveError
-        More units failed, or the output is the same for all units.
-
     Notes
     -----
     The index of a vector is that given its length, so it leaves out what the vector's direction adds. The lift of a
@@ -162,12 +155,6 @@ def limited_measures(errors: ErrorModel, x: Float[np.ndarray, "sample column"]) 
 
     Position 2·√(x² + y²) and run-out max − min: ISO 1101:2017; pitch max − min, its total cumulative deviation: ISO
     1328-1:2013.
-
-    Examples
-    --------
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> limited_measures(sum_of_sizes(6.0, 12.0).errors, np.array([[1.0, -2.0], [-1.0, 2.0]])).tolist()
-    [[1.0, -2.0], [-1.0, 2.0]]
     """
     where = np.array(errors.source_of_column)
     zoned = [limited_measure(source, x[:, where == source.name]) for source in errors.active]

@@ -66,20 +66,6 @@ def uncertain_effect(
     -----
     σ² = gᵀ·C·g to first order, g the gradient by the uncertain columns, C their covariance: JCGM 100:2008, eq. (13). It
     holds where `FirstOrderError.fails` is false.
-
-    Examples
-    --------
-    y = x·(1 + k) with σ(k) = 0.1 at x = 2:
-
-    >>> from unittest.mock import Mock
-    >>> from tolalloc.models.model import Evaluation, Model
-    >>> answer = lambda x, k: Evaluation(values=(x[:, :1] * k), status=np.zeros(len(x), np.uint8))
-    >>> k = CorrelatedSource(name="k", columns=("k",), covariance=np.eye(1) / 100)
-    >>> model = Mock(spec=Model, uncertain=(k,), accuracy={}, reading=lambda _: lambda x: answer(x, 1.0))
-    >>> model.with_uncertain = lambda _: lambda x: answer(x, 1.0 + x[:, 1:])
-    >>> model.changed = lambda by: Mock(reading=lambda _: lambda x: answer(x, 1.0 + by[0]))
-    >>> round(uncertain_effect(model, "y [mm]", np.array([[2.0]]), SeedTree(1)).sigma, 6)
-    0.2
     """
     factor = _factor(model.uncertain)
     gradient = _gradient(model, output, x[:_UNITS])
@@ -100,11 +86,6 @@ def first_order_error(
     """Return how far the first order is from the model whose uncertain columns have changed.
 
     For each of the joint changes of these columns the model is made anew.
-
-    Raises
-    ------
-    SolveError
-        No unit has an answer at any of the changes.
 
     Notes
     -----

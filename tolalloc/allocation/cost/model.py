@@ -20,13 +20,7 @@ Expression = Any
 
 @dataclass(frozen=True, kw_only=True)
 class _FallingCost:
-    """Parameters that all closed forms have.
-
-    Raises
-    ------
-    InputError
-        A parameter with which the cost would not fall with the zone.
-    """
+    """Parameters that all closed forms have."""
 
     fixed: float = 0.0  # What the feature costs however wide its zone, a [cost units]
     factor: float  # What the falling part is multiplied by, b [cost units × (unit of the zone)ⁿ]
@@ -243,13 +237,7 @@ class CostModel(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Process:
-    """One way to make a feature.
-
-    Raises
-    ------
-    InputError
-        Contradictory bounds, or a cost that grows with the zone.
-    """
+    """One way to make a feature."""
 
     name: str  # Name of the process
     cost: CostModel  # Cost of the feature made in this way

@@ -29,13 +29,7 @@ MOST_POINTS = 200
 
 @dataclass(frozen=True, kw_only=True)
 class Points:
-    """Zones and what they cost, the smallest zone first.
-
-    Raises
-    ------
-    InputError
-        Fewer than two zones, not in order, or a number that is not above 0.
-    """
+    """Zones and what they cost, the smallest zone first."""
 
     zones: tuple[float, ...]  # Zones, ascending; equal ones are the same zone priced more than once [unit of the zone]
     costs: tuple[float, ...]  # Their costs [cost units]
@@ -104,11 +98,6 @@ def load_shop_points(path: Path) -> ShopPoints:
     """Return the points of a CSV file with the columns process, tolerance [unit], unit and cost [cost units].
 
     A column ``feature`` may say for which kind of callout a price is; without it the price is for every kind.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        The file, row, field and value that are not allowed, or a process with less than two tolerances.
     """
     prices: dict[tuple[str, Feature | None], list[tuple[float, float]]] = {}
     for place, row in read_rows(path, ShopPrice, "process", _UNITS):
@@ -147,11 +136,6 @@ class Tabulated:
 
     >>> float(Tabulated(Points(zones=(10.0, 20.0), costs=(8.0, 5.0))).value(np.array(15.0)))
     6.5
-
-    Raises
-    ------
-    InputError
-        Points that rise with the zone.
     """
 
     points: Points  # The points, falling
@@ -195,11 +179,6 @@ class Tabulated:
 @dataclass(frozen=True)
 class Spline:
     """Cost on a monotone cubic spline through points; the tangents at both ends go on beyond them.
-
-    Raises
-    ------
-    InputError
-        Points that rise with the zone.
 
     Notes
     -----
@@ -370,11 +349,6 @@ def fits(points: Points) -> tuple[CostFit, ...]:
     Least Σ (c(tᵢ)/cᵢ − 1)² of c(t) = A + B/t, A + B/tᵏ, A + B·exp(−t/T), A + B/tᵏ·exp(−t/T) [cost units] (own
     derivation); valid from the smallest to the largest zone of the points.
 
-    Raises
-    ------
-    InputError
-        There are fewer points than the simplest form needs, or every form would have to rise with the zone.
-
     Notes
     -----
     For a given exponent and scale the fixed cost and the factor are a linear problem with both at least 0, solved
@@ -405,11 +379,6 @@ def fits(points: Points) -> tuple[CostFit, ...]:
 def best_fit(points: Points) -> CostFit:
     """Return the form with the fewest parameters that predicts as well as the best one.
 
-    Raises
-    ------
-    InputError
-        As `fits`.
-
     Notes
     -----
     As well as the best one: its mean square error at points left out is within one standard error of the smallest.
@@ -417,14 +386,6 @@ def best_fit(points: Points) -> CostFit:
     References
     ----------
     T. Hastie, R. Tibshirani, J. Friedman, The Elements of Statistical Learning, 2nd ed., Springer (2009), section 7.10.
-
-    Examples
-    --------
-    Costs of 2 + 30/t are told by the form with two parameters.
-
-    >>> points = Points(zones=(10.0, 20.0, 40.0, 60.0), costs=(5.0, 3.5, 2.75, 2.5))
-    >>> type(best_fit(points).model).__name__
-    'Reciprocal'
     """
     candidates = fits(points)
     best = min(candidates, key=lambda fit: fit.leave_one_out)
@@ -530,13 +491,7 @@ class ShopFit:
 
 
 def shop_fits(shop: ShopPoints) -> tuple[ShopFit, ...]:
-    """Return the fits of every process of a shop, each alone for a kind of callout where it is priced so.
-
-    Raises
-    ------
-    InputError
-        As `fits`.
-    """
+    """Return the fits of every process of a shop, each alone for a kind of callout where it is priced so."""
     return tuple(
         ShopFit(
             process=process if feature is None else f"{process}, {feature}",

@@ -143,15 +143,6 @@ def today(source: Source) -> Process:
     """Return the one way to make a feature that the tolerance table knows: its cost falls as 1/zone.
 
     c(t) = cost·zone/t [cost units]: the reciprocal form of Chase & Greenwood 1988, Manuf. Rev. 1, 50–59.
-
-    Examples
-    --------
-    Half of a zone that costs 9 costs 18.
-
-    >>> from tolalloc.drawings.zones import Feature
-    >>> hub = Source(name="hub", part="hub", feature=Feature.SIZE, zone=0.2e-3, minimum=0.03e-3, maximum=0.5e-3, cost=9)
-    >>> round(float(today(hub).total(np.array(0.1e-3))), 6)
-    18.0
     """
     return Process(
         name=source.process or "as today",
@@ -177,18 +168,6 @@ def priced(
     tolerance
         Whether t is the whole zone, or half of it as in ± t.
 
-    Raises
-    ------
-    InputError, UnknownNameError
-        A source or value that is not allowed, a process that stands twice, or a feature that no process can hold.
-
-    Examples
-    --------
-    >>> from tolalloc.drawings.zones import Feature
-    >>> hub = Source(name="hub", part="hub", feature=Feature.SIZE, zone=0.2e-3, minimum=0.03e-3, maximum=0.5e-3, cost=9)
-    >>> [turned] = priced({"hub": [("turned", 5, 0.5, 0.06, 0.15)]}, [hub], tolerance="half zone")["hub"]
-    >>> float(turned.total(np.array(0.2e-3)))
-    10.0
     """
     unit = MILLIMETRE * {"zone": 1.0, "half zone": 2.0}[tolerance]
     free = {source.name: source for source in sources if source.zone > 0 and not source.locked}
@@ -221,11 +200,6 @@ def load_process_costs(name: str | Path, sources: Sequence[Source]) -> Processes
     ----------
     name
         Shipped name, or path of the user's CSV file; files of points stand beside it.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        The file, row, field and value that are not allowed, or a feature that no process can hold.
     """
     path = shipped_or_path(name, DATA, ".process_costs.csv", "process cost table")
     rows = read_rows(path, ProcessCostRow, "sources", UNITS)

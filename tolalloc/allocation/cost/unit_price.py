@@ -93,11 +93,6 @@ class UnitPrice(NamedFields):
     def good_share(self, target: float) -> float:
         """Return the share of good units after rework, y + (1 − y)·r of the yield y before it [-].
 
-        Raises
-        ------
-        InputError
-            A yield outside 0 to 1, or one that leaves no good unit.
-
         Examples
         --------
         >>> UnitPrice(rework_share=0.5).good_share(0.9)
@@ -168,11 +163,6 @@ def best_yield(cost_of_yield: Callable[[float], float], price: UnitPrice, yields
         What becomes of the units beyond the limit.
     yields
         Yield targets to choose from [-].
-
-    Raises
-    ------
-    InputError
-        There is no target, or one is no share.
 
     Examples
     --------

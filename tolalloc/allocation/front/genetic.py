@@ -133,11 +133,6 @@ def search(
     checkpoint
         Where the answers are kept, so that an interrupted search goes on with the same bits.
 
-    Raises
-    ------
-    InputError
-        One objective alone, too small a search, or a checkpoint of something else.
-
     Notes
     -----
     A generation forgets good designs where its front is crowded; the front of all designs never gets worse.
@@ -146,23 +141,6 @@ def search(
     ----------
     Deb, Pratap, Agarwal & Meyarivan 2002, IEEE Trans. Evol. Comput. 6:182–197; Deb & Jain 2014, ibid. 18:577–601;
     distances between neighbours renewed after every removal: Kukkonen & Deb 2006, CEC, 1179–1186.
-
-    Examples
-    --------
-    The first generation begins with the design of the drawing, ln 1 = 0, which costs 2.
-
-    >>> from tolalloc.allocation.front.pareto_problem import DesignProblem
-    >>> from tolalloc.allocation.front.what_if import QuantileResponse
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
-    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
-    >>> standard = np.random.default_rng(1).normal(size=(50, 2)) / 6
-    >>> quantile = QuantileResponse(
-    ...     space=verifier.space, model=verifier.model, output="y [mm]", standard=standard, spread=3.0
-    ... )
-    >>> problem = DesignProblem(space=verifier.space, quantile=quantile)
-    >>> found = search(problem, np.zeros((1, 2)), SeedTree(1), population=8, generations=2)
-    >>> len(found.designs), float(found.answers.values[0, 0])
-    (16, 2.0)
     """
     count = len(problem.objectives)
     if count < 2:
@@ -199,24 +177,6 @@ def best_front(found: SearchedDesigns, number: int) -> SearchedDesigns:
     Where there are more than the number [-], those in the densest places are left out.
 
     Pareto order and thinning as `nondominated` and `thinned`: Deb et al. 2002; Kukkonen & Deb 2006.
-
-    Examples
-    --------
-    Along a front the quantile falls as the cost rises.
-
-    >>> from tolalloc.allocation.front.pareto_problem import DesignProblem
-    >>> from tolalloc.allocation.front.what_if import QuantileResponse
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
-    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
-    >>> standard = np.random.default_rng(1).normal(size=(50, 2)) / 6
-    >>> quantile = QuantileResponse(
-    ...     space=verifier.space, model=verifier.model, output="y [mm]", standard=standard, spread=3.0
-    ... )
-    >>> problem = DesignProblem(space=verifier.space, quantile=quantile)
-    >>> found = search(problem, np.zeros((1, 2)), SeedTree(1), population=8, generations=2)
-    >>> front = best_front(found, 3).losses
-    >>> len(front), bool((np.diff(front[:, 0]) > 0).all()), bool((np.diff(front[:, 1]) < 0).all())
-    (3, True, True)
     """
     allowed = found.at(np.flatnonzero(found.answers.kept))
     front = allowed.at(np.flatnonzero(nondominated(allowed.losses)))

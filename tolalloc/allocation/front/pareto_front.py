@@ -109,11 +109,6 @@ def pareto_front(
         Settings that shall be large, further objectives.
     others
         Limits of other requirements, kept by their local models.
-
-    Raises
-    ------
-    SolveError
-        More than 5 % of the kernel's designs failed, each with the first of its units, or none is allowed.
     """
     from tolalloc.allocation.front.genetic import search
 

@@ -18,13 +18,7 @@ from tolalloc.models.model import Response
 
 @dataclass(frozen=True, kw_only=True)
 class Genes:
-    """What the search may change.
-
-    Raises
-    ------
-    InputError
-        Bounds that contradict each other.
-    """
+    """What the search may change."""
 
     names: tuple[str, ...]  # Names of the genes
     # Their bounds [unit of the gene]
@@ -143,15 +137,7 @@ def from_genes(genes: Float[np.ndarray, "*designs variable"], groups: int) -> Fl
 
 @dataclass(frozen=True, kw_only=True)
 class DesignProblem:
-    """Cost against the quantile of the leading output, and whatever else is asked for.
-
-    Raises
-    ------
-    InputError
-        A ladder that does not rise or leaves the bounds of its group.
-    UnknownNameError
-        A ladder of no group.
-    """
+    """Cost against the quantile of the leading output, and whatever else is asked for."""
 
     space: DesignSpace  # The design variables
     quantile: Response  # Quantile of designs: the real kernel or what stands in for it

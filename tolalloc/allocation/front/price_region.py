@@ -56,11 +56,6 @@ def price_ranges(problem: AllocationProblem, optimum: Solution) -> tuple[PriceRa
     optimum
         Its cheapest design; processes stay as they are.
 
-    Raises
-    ------
-    SolveError
-        A convex program was not solved.
-
     Notes
     -----
     With V(z) the least cost of all other zones where this one is z, the cheapest z at a price t makes t·c(z) + V(z)
@@ -71,21 +66,6 @@ def price_ranges(problem: AllocationProblem, optimum: Solution) -> tuple[PriceRa
     ----------
     Own derivation; A. V. Fiacco, Introduction to sensitivity and stability analysis in nonlinear programming (1983),
     for V′.
-
-    Examples
-    --------
-    Two zones of 1/z each, the sum of them 4: a zone of 2 grows to 2.2 where its cost is (2.2/1.8)² times as high.
-
-    >>> from tolalloc.allocation.cost.model import Reciprocal
-    >>> made = Process(name="ground", cost=Reciprocal(factor=1.0), minimum=0.1, maximum=9.0)
-    >>> from tolalloc.allocation.space.problem import Stack
-    >>> stack = Stack(name="gap", worst_case=np.ones(2), root_sum_square=np.zeros(2), budget=4.0)
-    >>> problem = AllocationProblem(
-    ...     features=tuple(PricedFeature(name=name, processes=(made,)) for name in "ab"), stacks=(stack,)
-    ... )
-    >>> found = price_ranges(problem, process_choice.allocate(problem))[0]
-    >>> round(found.high, 3), round((2.2 / 1.8) ** 2, 3)
-    (1.494, 1.494)
     """
     program = ConvexProgram(problem.features, optimum.processes, len(problem.stacks), problem.shared)
     found = []
@@ -120,11 +100,6 @@ def graded_price_ranges(problem: DiscreteProblem, optimum: DiscreteSolution) -> 
         The choice among the steps, with the local models.
     optimum
         The cheapest choice.
-
-    Raises
-    ------
-    SolveError
-        A choice was not proven to be the cheapest within its nodes.
 
     Notes
     -----
@@ -214,11 +189,6 @@ def worst_prices(problem: AllocationProblem, optimum: Solution, nodes: int = 100
     nodes
         Most nodes of the search; with few the proven loss is further from the one found [-].
 
-    Raises
-    ------
-    SolveError
-        A convex program was not solved.
-
     Notes
     -----
     max over prices t and zones z of Σ tᵢ·(cᵢ(zᵢ*) − cᵢ(zᵢ)): a zone that costs less than in the answer has its cost
@@ -229,21 +199,6 @@ def worst_prices(problem: AllocationProblem, optimum: Solution, nodes: int = 100
     References
     ----------
     Own derivation, as minimax regret with interval costs: I. Averbakh, V. Lebedev, Eur. J. Oper. Res. 154 (2004).
-
-    Examples
-    --------
-    Of two zones of 1/z each whose sum is 4, one gets dearer by a fifth and one cheaper: (√1.2 + √0.8)²/4 for 1.
-
-    >>> from tolalloc.allocation.cost.model import Reciprocal
-    >>> made = Process(name="ground", cost=Reciprocal(factor=1.0), minimum=0.1, maximum=9.0)
-    >>> from tolalloc.allocation.space.problem import Stack
-    >>> stack = Stack(name="gap", worst_case=np.ones(2), root_sum_square=np.zeros(2), budget=4.0)
-    >>> problem = AllocationProblem(
-    ...     features=tuple(PricedFeature(name=name, processes=(made,)) for name in "ab"), stacks=(stack,)
-    ... )
-    >>> found = worst_prices(problem, process_choice.allocate(problem))
-    >>> round(found.lost, 4), round(1 - (1.2**0.5 + 0.8**0.5) ** 2 / 4, 4)
-    (0.0101, 0.0101)
     """
     costs = _costs(problem.features, optimum)
     cut = tuple(

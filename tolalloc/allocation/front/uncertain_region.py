@@ -142,11 +142,6 @@ def uncertain_region(verifier: Verifier, allocation: ZoneAllocation) -> Uncertai
     UncertainRegion or None
         None of a model of which nothing is uncertain.
 
-    Raises
-    ------
-    SolveError
-        A convex program was not solved.
-
     Notes
     -----
     A parametric program: the local models at either end of a column's span come from the changed model itself, on the
@@ -221,14 +216,6 @@ def changed_stack(
     -----
     w + (w₊ − w₋) and q² + (q₊² − q₋²), not below 0; load − budget at the design is that of `aimed` + rise (own
     derivation).
-
-    Examples
-    --------
-    >>> stack = Stack(name="gap", worst_case=np.ones(1), root_sum_square=np.zeros(1), budget=4.0)
-    >>> wider = replace(stack, worst_case=np.array([1.5]))
-    >>> found = changed_stack(stack, stack, wider, np.array([2.0]), np.empty(0), 0.7)
-    >>> found.worst_case.tolist(), round(float(found.load(np.array([2.0]), np.empty(0))) - found.budget, 6)
-    ([1.5], -1.3)
     """
     squares = aimed.root_sum_square**2 + after.root_sum_square**2 - before.root_sum_square**2
     moved = replace(

@@ -55,11 +55,6 @@ class ConvexProgram:
     shared
         Variables that belong to no feature.
 
-    Raises
-    ------
-    InputError
-        A cost is not convex.
-
     Notes
     -----
     Zones are counted in the geometric middle of their process's range, stacks in their budget, costs in what they
@@ -120,11 +115,6 @@ class ConvexProgram:
             Bounds of the zones, inside those of the processes unless they are given [unit of the zone].
         shared
             The shared variables with other bounds.
-
-        Raises
-        ------
-        SolveError
-            The solver ended neither with a design nor with the proof that there is none.
         """
         problem = self._restricted(stacks, lower, upper, shared)
         if not least_infeasible(problem).feasible:
@@ -260,23 +250,9 @@ def choose_whole_numbers(
     most_nodes
         Nodes of branch and bound, after which it ends with what it has [-].
 
-    Raises
-    ------
-    SolveError
-        The solver gave up.
-
     References
     ----------
     Branch and bound on the relaxation 0 ≤ z ≤ 1: Land & Doig 1960, Econometrica 28, 497–520; solved by HiGHS.
-
-    Examples
-    --------
-    The cheap choice of two would take more than the limit.
-
-    >>> one = np.ones((1, 2))
-    >>> found = choose_whole_numbers(np.array([3.0, 1.0]), np.array([[1.0, 4.0]]), np.array([2.0]), one, 100)
-    >>> found.is_optimal, found.values.round().astype(int).tolist()
-    (True, [1, 0])
     """
     import cvxpy as cp
 

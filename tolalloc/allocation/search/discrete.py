@@ -43,22 +43,9 @@ def feature_options(
 ) -> tuple[Option, ...]:
     """Return every step of a ladder made by every process of a feature that can hold it.
 
-    Raises
-    ------
-    InputError
-        No process of the feature can hold a step.
-
     Notes
     -----
     cost = A + c(t) + loss·t² of every step t within the range of the process (own derivation) [cost units].
-
-    Examples
-    --------
-    >>> from tolalloc.allocation.cost.model import Process, Reciprocal
-    >>> made = Process(name="bored", cost=Reciprocal(factor=8.0), minimum=2.0, maximum=9.0)
-    >>> bore = PricedFeature(name="bore", processes=(made,))
-    >>> [option.cost for option in feature_options(bore, np.array([1.0, 2.0, 4.0]), ("a", "b", "c"))]
-    [4.0, 2.0]
     """
     options = tuple(
         Option(
@@ -108,13 +95,7 @@ class DiscreteSolution:
 
 @dataclass(frozen=True, kw_only=True)
 class DiscreteProblem:
-    """An allocation problem in which every feature takes one of its options.
-
-    Raises
-    ------
-    InputError
-        A feature without an option, or a grid without a value inside the bounds.
-    """
+    """An allocation problem in which every feature takes one of its options."""
 
     problem: AllocationProblem  # Features, stacks and shared variables
     options: tuple[tuple[Option, ...], ...]  # Options of every feature; a locked one has a single option
@@ -295,16 +276,6 @@ def with_shared_zones(space: DesignSpace) -> DesignSpace:
     Notes
     -----
     zone = exp(mean of ln zoneᵢ) (own derivation), which keeps the product of the zones; for zones above 0.
-
-    Examples
-    --------
-    Zones of 6 and 8 mm become √48 = 6.928 mm.
-
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
-    >>> errors = verifier_of_sum(6.0, 8.0, limit=5.0).space.errors
-    >>> together = tuple(replace(source, group="both") for source in errors.sources)
-    >>> with_shared_zones(DesignSpace(errors=replace(errors, sources=together))).errors.zones.round(6).tolist()
-    [0.006928, 0.006928]
     """
     active = [source for source in space.errors.active if not source.locked]
     shared = {
@@ -323,24 +294,13 @@ def group_options(space: DesignSpace) -> tuple[tuple[Option, ...], ...]:
     ----------
     space
         Groups whose members share one zone.
-
-    Raises
-    ------
-    InputError
-        No step lies in the range of every member, or no process holds one.
     """
     ladders = zip(space.features, group_ladders(space), space.first_zones, strict=True)
     return tuple(feature_options(feature, ladder.zones / first, ladder.labels) for feature, ladder, first in ladders)
 
 
 def group_ladders(space: DesignSpace) -> tuple[Ladder, ...]:
-    """Return the ladder of every group [m].
-
-    Raises
-    ------
-    InputError
-        No step lies in the range of every member.
-    """
+    """Return the ladder of every group [m]."""
     active = [source for source in space.errors.active if not source.locked]
     return tuple(group_ladder([source for source in active if source.dimension == group]) for group in space.groups)
 
@@ -416,13 +376,6 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
         The best of these, around which choices are looked for.
     steps
         Largest number of verified choices, 1 or more [-].
-
-    Raises
-    ------
-    InputError
-        A zone that has no step of its ladder between min and max, or none that a process holds.
-    SolveError
-        Too many units failed, or no choice was found within the nodes allowed.
 
     Notes
     -----

@@ -66,15 +66,6 @@ class LeastPriced:
         A convex function lies above its tangents at any two zones, so the crossing of the two bounds it from below
         wherever they stand; that they stand on both sides of the minimum and close together only makes the bound tight.
         For b/t + p·t the minimum is known: it is reached at √(b/p), or at the nearer end of the range.
-
-        Examples
-        --------
-        The least of 4/t + t, which is 4 at t = 2:
-
-        >>> made = Process(name="turned", cost=Reciprocal(factor=4.0), minimum=1.0, maximum=9.0)
-        >>> least, zone = LeastPriced.of([0], [made]).found(np.ones(1), np.zeros(1))
-        >>> float(least[0]), float(zone[0])
-        (4.0, 2.0)
         """
         if isinstance(self.cost, Reciprocal) and not square.any():
             best = np.sqrt(np.ravel(self.cost.factor) / np.where(linear > 0, linear, np.nan))
@@ -142,11 +133,6 @@ class LagrangeDual:
     ----------
     problem
         The allocation; every feature may be made by any of its processes.
-
-    Raises
-    ------
-    InputError
-        A cost is not convex.
 
     Notes
     -----
@@ -277,20 +263,6 @@ def ascend(
     References
     ----------
     max over λ ≥ 0 of the dual, Boyd & Vandenberghe 2004, ch. 5; by L-BFGS-B, Byrd, Lu, Nocedal & Zhu 1995.
-
-    Examples
-    --------
-    Zones of 1/t each that add up to 2 cost 2; the price is 1.
-
-    >>> from tolalloc.allocation.space.problem import PricedFeature, Stack
-    >>> made = Process(name="turned", cost=Reciprocal(factor=1.0), minimum=0.5, maximum=9.0)
-    >>> features = tuple(PricedFeature(name=name, processes=(made,)) for name in ("bore", "pin"))
-    >>> stack = Stack(name="play", worst_case=np.ones(2), root_sum_square=np.zeros(2), budget=2.0)
-    >>> problem = AllocationProblem(features=features, stacks=(stack,))
-    >>> dual = LagrangeDual(problem)
-    >>> start = dual.price(np.array([0.2]), dual.planes(np.ones(2)))
-    >>> round(max(dual.bound(priced, np.ones(2, bool)) for priced in ascend(dual, start, np.ones(2, bool))), 6)
-    2.0
     """
     from scipy.optimize import minimize
 
@@ -344,11 +316,6 @@ def cost_bound(
         Zones whose directions make the norms' planes tight; any give a valid bound [unit of the zone].
     enough
         Bound at which nothing more is asked for [cost units].
-
-    Raises
-    ------
-    InputError
-        A cost is not convex.
 
     Notes
     -----

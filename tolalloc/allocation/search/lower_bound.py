@@ -118,17 +118,6 @@ def least_cost(design: VerifiedDesign, cheapest: Cheapest, near_by: Callable[[tu
 
     Of limits that are kept at once, every design divides the failures in some way: the least of all ways is taken, by
     branch and bound (`_least_of_divisions`).
-
-    Examples
-    --------
-    What chooses nothing cheaper leaves the cost of the design itself.
-
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
-    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
-    >>> design = verifier.verify(verifier.space.uniform(1.0), "as drawn")
-    >>> none = lambda stacks: 0.0
-    >>> least_cost(design, lambda stacks: (1.9, design.design), none), least_cost(design, lambda stacks: None, none)
-    (1.9, 2.0)
     """
     free = design.cost - design.space.locked_cost
     weaker, last = _weaker(design), design.checks[-1]

@@ -116,18 +116,6 @@ def exchanged(program: MultipleChoice, values: Float[np.ndarray, " choice"]) -> 
     The exchanges start from the dearest of the choices of which the relaxation takes some value [-].
 
     An exchange of two of groups a and b changes the cost by Δa + Δb < 0 (own derivation); it need not end at the best.
-
-    Examples
-    --------
-    >>> program = MultipleChoice(
-    ...     group=np.array([0, 0, 1, 1]),
-    ...     cost=np.array([9.0, 4.0, 6.0, 3.0]),
-    ...     worst_case=np.array([[0.2, 0.6, 0.2, 0.6]]),
-    ...     squares=np.zeros((1, 4)),
-    ...     budget=np.ones(1),
-    ... )
-    >>> exchanged(program, np.ones(4)).tolist()
-    [1, 2]
     """
     liking = np.where(values > 1e-9, program.cost + 1e-9 * (1.0 + np.ptp(program.cost)) * values, -np.inf)
     parts = np.split(liking, program.starts[1:])
@@ -328,25 +316,6 @@ def best_choice(program: MultipleChoice, most_nodes: int) -> ProvenChoice | None
 
     After so many nodes of the mixed-integer programs together [-] it is the best allowed one so far with its bound.
 
-    Raises
-    ------
-    SolveError
-        No allowed choice was found within these nodes, or the solver gave up.
-
-    Examples
-    --------
-    Two groups of a dear and a cheap choice, of which the cheap ones together take more than the budget:
-
-    >>> program = MultipleChoice(
-    ...     group=np.array([0, 0, 1, 1]),
-    ...     cost=np.array([9.0, 4.0, 6.0, 3.0]),
-    ...     worst_case=np.array([[0.2, 0.6, 0.2, 0.6]]),
-    ...     squares=np.zeros((1, 4)),
-    ...     budget=np.ones(1),
-    ... )
-    >>> taken, cost, bound = best_choice(program, most_nodes=100)
-    >>> taken, cost, round(float(bound), 6)
-    (array([1, 2]), 10.0, 10.0)
     """
     kept = program.undominated & program.possible
     if np.unique(program.group[kept]).size < program.starts.size:

@@ -27,13 +27,6 @@ def allocate(problem: AllocationProblem, most_nodes: int = 500) -> Solution | Le
 
     After so many nodes [-] the search ends with what it has; the gap of the solution says what is left.
 
-    Raises
-    ------
-    InputError
-        A cost is not convex.
-    SolveError
-        The search ended before it found a design, or a convex program was not solved.
-
     References
     ----------
     K. W. Chase, W. H. Greenwood, B. G. Loosli, L. F. Hauglund, Least cost tolerance allocation for mechanical
@@ -60,13 +53,7 @@ def allocate(problem: AllocationProblem, most_nodes: int = 500) -> Solution | Le
 def front(
     problem: AllocationProblem, at: int, budgets: Float[np.ndarray, " point"], most_nodes: int = 500
 ) -> tuple[Solution | LeastInfeasible, ...]:
-    """Return what `allocate` finds for every budget of the stack at a position.
-
-    Raises
-    ------
-    InputError, SolveError
-        As of `allocate`.
-    """
+    """Return what `allocate` finds for every budget of the stack at a position."""
     series, rows = BudgetSeries(problem), np.tile([stack.budget for stack in problem.stacks], (budgets.size, 1))
     rows[:, at] = budgets
     return tuple(series.allocate(row, most_nodes) for row in rows)
@@ -90,11 +77,6 @@ class BudgetSeries:
 
     def allocate(self, budgets: Float[np.ndarray, " stack"], most_nodes: int = 500) -> Solution | LeastInfeasible:
         """Return what `allocate` finds for other budgets [unit of each stack].
-
-        Raises
-        ------
-        InputError, SolveError
-            As of `allocate`.
 
         Examples
         --------
@@ -122,20 +104,6 @@ def second_best(problem: AllocationProblem, best: Solution, most_nodes: int = 50
     it has after so many nodes [-].
 
     Branch and bound over all sets but one: Lawler 1972, Management Science 18, 401–405.
-
-    Examples
-    --------
-    A bore 4 wide is ground for 3 or honed for 5.
-
-    >>> from tolalloc.allocation.cost.model import Process, Reciprocal
-    >>> from tolalloc.allocation.space.problem import PricedFeature, Stack
-    >>> ground = Process(name="ground", cost=Reciprocal(factor=12.0), minimum=1.0, maximum=9.0)
-    >>> honed = Process(name="honed", cost=Reciprocal(fixed=2.0, factor=12.0), minimum=1.0, maximum=9.0)
-    >>> stack = Stack(name="play", worst_case=np.ones(1), root_sum_square=np.zeros(1), budget=4.0)
-    >>> bore = PricedFeature(name="bore", processes=(ground, honed))
-    >>> problem = AllocationProblem(features=(bore,), stacks=(stack,))
-    >>> round(second_best(problem, allocate(problem)).cost, 6)
-    5.0
     """
     search = _BranchAndBound(problem)
     others, free = [], np.ones(search.dual.feature.size, dtype=bool)

@@ -224,20 +224,6 @@ def cheapest_box(space: DesignSpace, conditions: Conditions, units: int, cost: f
     References
     ----------
     A. H. Land, A. G. Doig, Econometrica 28 (1960) 497–520.
-
-    Examples
-    --------
-    y = 3·s₁ + 4·s₂ of one unit shall not exceed 5, zones cost 1/s each: least (√3 + √4)²/5.
-
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
-    >>> from tolalloc.models.unit_bounds import SlopeBounds
-    >>> space = verifier_of_sum(6.0, 8.0, limit=5.0).space
-    >>> unit = ScaledUnits(middle=np.zeros(2), standard=np.array([[3.0, 4.0]]), group=np.arange(2), groups=2)
-    >>> bounds = SlopeBounds(units=unit, respond=lambda x, _: x.sum(axis=1), low=np.ones(2), high=np.ones(2))
-    >>> limit = BoundedLimit(bounds=bounds, sign=1, limit=5.0, accuracy=0.0)
-    >>> found, _ = cheapest_box(space, Conditions(limits=(limit,), allowed=(((0,), 0),)), 1, np.inf, 3000)
-    >>> round(found, 3), round((3**0.5 + 2) ** 2 / 5, 3)
-    (2.786, 2.786)
     """
     costs, looked = CostBox(space=space), 0
 
@@ -286,13 +272,7 @@ def _counted(model: Model, requirements: Sequence[Requirement]) -> tuple[Require
 
 
 def require_bounded(model: Model, space: DesignSpace, requirements: Sequence[Requirement], place: str) -> None:
-    """Raise unless a bound can be proven.
-
-    Raises
-    ------
-    InputError
-        Parts are chosen at assembly, or no limited output has bounds.
-    """
+    """Raise unless a bound can be proven."""
     called = f"{place}, boxes"
     if space.errors.compensators:
         raise InputError(f"{called}: no bound is proven where parts are chosen at assembly; take 0.")
@@ -323,11 +303,6 @@ class BoundSearch:
             Designs near which it should be sharpest.
         cost
             Cost of a drawing that keeps the limits, infinite if there is none [cost units].
-
-        Raises
-        ------
-        ValueError
-            The model has no bounds, which `require_bounded` says before.
         """
         bounded = self.model
         if not isinstance(bounded, BoundedModel):

@@ -116,15 +116,6 @@ def scale_in_proportion(verifier: Verifier, steps: int) -> tuple[VerifiedDesign,
 
     sₖ₊₁ = sₖ·clip(1 + left/rise, 0.4, 2.5) (own derivation); exact in one step where a quantile is in
     proportion to the zones. Where too many units of a scale have no answer, half of the way to it is gone.
-
-    Examples
-    --------
-    Half of the limit that the drawing keeps asks for half of its zones.
-
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
-    >>> verifier = verifier_of_sum(6.0, 8.0, limit=2.5)
-    >>> [design.scales.tolist() for design in scale_in_proportion(verifier, 3)]
-    [[1.0, 1.0], [0.5, 0.5]]
     """
     space, scale, factor = verifier.space, 1.0, 1.0
     widest = float(space.upper[: len(space.groups)].max())  # beyond it no zone lies inside its range
@@ -191,16 +182,6 @@ def aimed(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float = 1.0
     corrects them, each with the weight of its units, so the noise averages out. The law of a linear output has none.
 
     budget′ = budget − margin·standard error − mean deviation (own derivation) [unit of the output].
-
-    Examples
-    --------
-    A root sum square has no error, so all of the limit is left.
-
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
-    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
-    >>> design = verifier.verify(verifier.space.uniform(1.0), "as drawn")
-    >>> [stack.budget for stack in aimed(design, [design])]
-    [5.0]
     """
     similar = [item.divided(last.parts) for item in tried if _is_similar(item, last)]
     stacks = []
@@ -243,17 +224,6 @@ def model_range(chosen: VerifiedDesign, tried: Iterable[VerifiedDesign]) -> Mode
     ----------
     tried
         Designs that were verified, whatever their members and steps are.
-
-    Examples
-    --------
-    Root sums of squares are exact, so a design 10 % tighter is predicted and one 50 % tighter is not asked.
-
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
-    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
-    >>> chosen, near, far = (verifier.verify(verifier.space.uniform(scale), "scaled") for scale in (1.0, 0.9, 0.5))
-    >>> found = model_range(chosen, (chosen, near, far))
-    >>> found.designs, [round(value, 9) for value in found.off]
-    (1, [0.0])
     """
     zones, groups, sides = chosen.space.zones(chosen.design), chosen.scales.size, chosen.alone
     compared = []
@@ -284,16 +254,6 @@ def kept_stacks(chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margi
     Notes
     -----
     budget′ = max(aimed budget, load of the design) (own derivation), so that the design itself is always allowed.
-
-    Examples
-    --------
-    A design that takes 5 of a limit of 4 keeps its 5.
-
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
-    >>> verifier = verifier_of_sum(6.0, 8.0, limit=4.0)
-    >>> design = verifier.verify(verifier.space.uniform(1.0), "as drawn")
-    >>> [stack.budget for stack in kept_stacks(design, (design,), 0.0)]
-    [5.0]
     """
     loads = [float(constraint.stack.load(chosen.scales, chosen.settings)) for constraint in chosen.constraints]
     stacks = aimed(chosen, list(tried), margin)
@@ -519,13 +479,7 @@ class ZoneAllocation:
 
 
 def require_groups(space: DesignSpace, place: str) -> None:
-    """Raise unless a zone may change.
-
-    Raises
-    ------
-    InputError
-        None may.
-    """
+    """Raise unless a zone may change."""
     if not space.groups:
         raise InputError(f"{place}, tolerance table: every zone is locked or zero, so there is nothing to allocate.")
 
@@ -560,11 +514,6 @@ def allocate(
     start
         A verified design to start from, the best of proportional scaling if there is none; with the reducer's own
         modification it tells tolerances alone from tolerances and modification together.
-
-    Raises
-    ------
-    FailedUnitsError
-        Of every design inside the ranges that was tried too many units have no answer.
     """
     first, space = start or cheapest_met(proportional_tried), verifier.space
     # Proportional scaling has no bounds; a start that keeps them is an answer like any other.

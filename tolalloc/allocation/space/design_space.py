@@ -29,11 +29,6 @@ _ROUNDING = 1e-9
 class DesignSpace:
     """Design variables: the scale of each group's zones and the settings of the model.
 
-    Raises
-    ------
-    InputError
-        Members of a group that have no process in common, or none that can hold the ratios of their zones.
-
     Notes
     -----
     A design is a vector: the scale of every group [-], then every setting [unit of its name].
@@ -193,18 +188,6 @@ class DesignSpace:
         ones where the model's drawings round (`DrawnAmounts.finest`), or else stay as they were found.
         Members of a group that have one zone keep one; others are rounded one by one, in a space whose table has them
         at the rounded ratio. So the design costs what its rounded zones cost, and units of it lie in them.
-
-        Examples
-        --------
-        >>> from tolalloc.allocation.verify.verification import verifier_of_sum
-        >>> space = verifier_of_sum(6.0, 8.0, limit=5.0).space
-        >>> _, design = space.rounded_down(np.array([1.0, 0.51234]))
-        >>> (design * [6.0, 8.0]).round(6).tolist()
-        [6.0, 4.09872]
-        >>> stated = replace(space, errors=replace(space.errors, sources=tuple(
-        ...     replace(own, step=5e-7) for own in space.errors.sources)))
-        >>> (stated.rounded_down(np.array([1.0, 0.51234]))[1] * [6.0, 8.0]).round(6).tolist()
-        [6.0, 4.098]
         """
         usual = STEPS if drawn is not None and drawn.finest else ()
         found, zones = design.copy(), {own.name: own.zone for own in self.errors.sources}
@@ -319,13 +302,7 @@ _REPRICED = 1e-6
 
 
 def named_zones(errors: ErrorModel, zones: Mapping[str, float]) -> dict[str, float]:
-    """Return source → zone [m] of names and patterns with zones [µm]; later patterns take over from earlier ones.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        No zone, a pattern that fits no source or only neglected ones, a zone that is not above 0.
-    """
+    """Return source → zone [m] of names and patterns with zones [µm]; later patterns take over from earlier ones."""
     found: dict[str, float] = {}
     if not zones:
         raise InputError("difference: no zone is given; give one or more, such as pin.diameter=3.")
@@ -355,13 +332,7 @@ def outside_range(source: Source) -> str:
 
 
 def repriced(space: DesignSpace, zones: Mapping[str, float]) -> tuple[Source, ...]:
-    """Return the sources that vary, some at other zones [m], with what they cost by the processes that make them.
-
-    Raises
-    ------
-    InputError
-        A zone that no process holds.
-    """
+    """Return the sources that vary, some at other zones [m], with what they cost by the processes that make them."""
     sources = space.errors.active
     costs = space.cost_of_sources(space.uniform(1.0)) if space.processes else {}
     costs = {name: cost for name, cost in costs.items() if name in space.processes}

@@ -146,13 +146,6 @@ class Tail:
     Of a linear output it is that of its law. Of any other e(f) = e(f₀) + s·(z(f) − z(f₀)), with z(f) = Φ⁻¹(1 − f) and
     the slope s of the outermost values over their normal scores; exact for a normal output, where s is its standard
     deviation. So the quantile of a smaller share is no less certain than that of f₀ (own derivation).
-
-    Examples
-    --------
-    >>> units = LimitedSample.all_of(np.random.default_rng(0).standard_normal(100_000), Limits(upper=3.0))
-    >>> tail = Tail.of(units, 0.0027)
-    >>> round(tail.slope, 1), [round(tail.excess(share), 1) for share in (0.0027, 0.00135)]
-    (1.0, [-0.2, 0.0])
     """
 
     share: float  # f₀ [-]

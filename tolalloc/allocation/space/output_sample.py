@@ -414,13 +414,7 @@ class DesignSample:
         return found.value, np.append(self.space.by_scale(found.by_zone), self._by_setting(output, found.x))
 
     def linear(self, output: str) -> tuple[float, Float[np.ndarray, " source"], Float[np.ndarray, " setting"]]:
-        """Return the output of the nominal unit, what each source adds to it at its limit, and its change by settings.
-
-        Raises
-        ------
-        InputError
-            A source whose zone is neither a size nor a position, which has no single limit.
-        """
+        """Return the output of the nominal unit, what each source adds at its limit, and its change by settings."""
         errors, zones = self.space.errors, self.space.zones(self.design)
         for source in errors.active:
             if source.feature not in (Feature.SIZE, Feature.POSITION):

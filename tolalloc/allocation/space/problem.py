@@ -20,13 +20,7 @@ _TIE = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class PricedFeature:
-    """One zone to be chosen: of one callout, or of a group of callouts that change together.
-
-    Raises
-    ------
-    InputError
-        There is no process, or the loss is negative.
-    """
+    """One zone to be chosen: of one callout, or of a group of callouts that change together."""
 
     name: str  # Name of the feature or group
     processes: tuple[Process, ...]  # Ways to make it, one of which is chosen
@@ -44,11 +38,6 @@ class Stack:
     """A tolerance stack: Σ wᵢ·zᵢ + √Σ(qᵢ·zᵢ)² + Σ sⱼ·vⱼ ≤ budget, of zones z and shared variables v.
 
     Worst-case stacks have q = 0, root-sum-square stacks w = 0.
-
-    Raises
-    ------
-    InputError
-        A zone would relieve the stack.
 
     References
     ----------
@@ -188,26 +177,10 @@ def least_infeasible(problem: AllocationProblem) -> LeastInfeasible:
 
     min max (load − budget)/scale over all stacks [-] (own derivation); exact.
 
-    Raises
-    ------
-    SolveError
-        The linear program of the shared variables has not been solved.
-
     Notes
     -----
     A larger zone never relieves a stack, so the smallest zones are best for all stacks at once and only the shared
     variables are left: a linear program, or nothing.
-
-    Examples
-    --------
-    >>> from tolalloc.allocation.cost.model import Reciprocal
-    >>> bore = PricedFeature(
-    ...     name="bore", processes=(Process(name="bored", cost=Reciprocal(factor=1.0), minimum=4.0, maximum=9.0),)
-    ... )
-    >>> stack = Stack(name="play", worst_case=np.ones(1), root_sum_square=np.zeros(1), budget=3.0)
-    >>> found = least_infeasible(AllocationProblem(features=(bore,), stacks=(stack,)))
-    >>> found.blocking, found.feasible, round(found.largest, 3)
-    (('play',), False, 0.333)
     """
     processes = np.array([np.argmin([made.minimum for made in feature.processes]) for feature in problem.features])
     zones = np.array([feature.processes[at].minimum for feature, at in zip(problem.features, processes, strict=True)])

@@ -63,15 +63,6 @@ def _order_statistic(sample: LimitedSample, sign: Literal[1, -1], limit: float, 
     A one-sided confidence bound on a quantile is an order statistic: of n units the k-th largest, with k the most
     rejects for which P(rejects ≤ k | share rejected) is at most one minus the confidence (binomial distribution):
     C. J. Clopper, E. S. Pearson, Biometrika 26 (1934) 404–413; G. J. Hahn, W. Q. Meeker, Statistical Intervals (1991).
-
-    Examples
-    --------
-    Of 100 units 1, 2, … 100 none but the one beyond 99 may be rejected:
-
-    >>> units = LimitedSample.all_of(np.arange(1.0, 101), Limits(upper=90.0))
-    >>> bound = _order_statistic(units, 1, 90.0, beyond=9.0)
-    >>> bound.value, bound.excess, round(bound.standard_error, 2)
-    (99.0, 9.0, 1.4)
     """
     turned = np.where(np.isfinite(sample.values), sign * sample.values, np.inf)
     further = min(int(np.count_nonzero(turned - sign * limit > beyond)), turned.size - 1)
@@ -107,19 +98,6 @@ def bounds_of_law(sample: LimitedSample, law: LinearLaw, beyond: float) -> tuple
     With two limits both move by the same excess, outwards where it is above zero, until just that share lies beyond.
 
     The excess e solves P(y > upper + e) + P(y < lower − e) = beyond (own derivation) [unit of the output].
-
-    Examples
-    --------
-    A normal sum of σ = √5 lies beyond 2.326·√5 = 5.20 with 1 %.
-
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> from tolalloc.capability.linear_function import LinearFunction
-    >>> experiment = sum_of_sizes(6.0, 12.0)
-    >>> plane = LinearFunction(offset=0.0, slopes=np.ones(2), rounding=0.0)
-    >>> law = LinearLaw.of(plane, experiment.errors, experiment.zones)
-    >>> [bound] = bounds_of_law(LimitedSample.all_of(np.zeros(1), Limits(upper=4.0)), law, 0.01)
-    >>> round(bound.value, 2)
-    5.2
     """
     excess = law.excess(sample.limits, beyond)
     error = _ACCURACY * law.half_width
@@ -236,20 +214,7 @@ class AtYield(NamedFields):
         return f"{100 * self.target:.2f} % of units"
 
     def require_enough(self, units: int, confidence: float = CONFIDENCE) -> None:
-        """Raise unless so many units can show it.
-
-        Raises
-        ------
-        InputError
-            Fewer than ln(1 − confidence)/ln(target) units: too few for the target, even if none is rejected.
-
-        Examples
-        --------
-        >>> AtYield(0.99).require_enough(299)
-        >>> AtYield(0.99).require_enough(298)
-        Traceback (most recent call last):
-        tolalloc.exceptions.InputError: a yield of 99.0000%: units is 298; allowed is 299 or more.
-        """
+        """Raise unless so many units can show it."""
         if allowed_rejections(units, self.target, confidence) < 0:
             needed = int(np.ceil(np.log(1 - confidence) / np.log(self.target)))
             raise InputError.at(f"a yield of {self.target:.4%}", "units", units, f"{needed} or more")
@@ -329,13 +294,7 @@ class AtCpk(NamedFields):
         return f"Cpk {self.target:g}"
 
     def require_enough(self, units: int, confidence: float = CONFIDENCE) -> None:  # noqa: ARG002
-        """Raise unless so many units can show it.
-
-        Raises
-        ------
-        InputError
-            Too few units for the normal approximation.
-        """
+        """Raise unless so many units can show it."""
         if units < 100:
             raise InputError.at(f"a Cpk of {self.target:g}", "units", units, "100 or more")
 
@@ -514,13 +473,7 @@ class RootSumSquare:
         """Accept every number of units; none is asked."""
 
     def constraints(self, sample: OutputSample, limits: Limits) -> tuple[OneSidedConstraint, ...]:
-        """Return every one-sided constraint, the upper one first.
-
-        Raises
-        ------
-        InputError
-            A source that is neither a size nor a position.
-        """
+        """Return every one-sided constraint, the upper one first."""
         value, locked, added, by_setting = sample.linear()
         spread = float(np.hypot(locked, np.linalg.norm(added)))
         scales, settings = sample.design[: sample.groups], sample.design[sample.groups :]

@@ -132,19 +132,6 @@ def accept_cheapest(
     one that is accepted only cheaper ones are. One of which too many units have no answer is none.
 
     A design may err by α·¾·¼ᵐ, m of those before it not accepted; Σ ≤ α: Bretz et al. 2009, as `AlphaSpending`.
-
-    Examples
-    --------
-    Of a design at 5 of 5 and a dearer one at 4 of 5 the cheaper one is drawn.
-
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
-    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
-    >>> scales = {"wide": 1.0, "narrow": 0.8}
-    >>> designs = {name: verifier.verify(verifier.space.uniform(scale), name) for name, scale in scales.items()}
-    >>> test = AcceptanceTest(model=verifier.model, seeds=SeedTree(2), units=1000, error=0.05)
-    >>> found = accept_cheapest(test, designs, lambda *_: None, gain=0.01)
-    >>> found.drawn[0], round(found.drawn[1].cost, 6)
-    ('wide', 2.0)
     """
     waiting, tested, doubtful = dict(candidates), list[tuple[str, VerifiedDesign]](), set[str]()
     drawn: tuple[str, VerifiedDesign] | None = None
@@ -231,11 +218,6 @@ class AcceptanceTest:
             A design with the local models of its search.
         spending
             Which of the answer's designs it is, and so what it may err.
-
-        Raises
-        ------
-        SolveError
-            More units failed.
 
         Notes
         -----

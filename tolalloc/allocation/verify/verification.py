@@ -192,13 +192,7 @@ class VerifiedDesign:
 
 @dataclass(frozen=True, kw_only=True)
 class Verifier:
-    """Verifies designs, each on random units of its own.
-
-    Raises
-    ------
-    InputError
-        There are too few units for a guarantee.
-    """
+    """Verifies designs, each on random units of its own."""
 
     space: DesignSpace  # The design variables
     model: Model  # The real model
@@ -225,13 +219,7 @@ class Verifier:
         return replace(self, requirements=tuple(check.requirement for check in design.checks))
 
     def verify(self, design: Float[np.ndarray, " variable"], name: str) -> VerifiedDesign:
-        """Return the design with what random units of its own say of it.
-
-        Raises
-        ------
-        SolveError
-            More units failed.
-        """
+        """Return the design with what random units of its own say of it."""
         seeds, errors = self.seeds.child(name), self.space.errors
         settings = self.space.settings_of(design)
         requirements = tuple(own.at(self.model, settings, self.space.setting_steps) for own in self.requirements)

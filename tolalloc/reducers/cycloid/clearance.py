@@ -33,13 +33,6 @@ def is_large(stage: CycloidStage, modification: Modification) -> bool:
 
     Own derivation: max(|Δr_rp|, |Δr_p|, |δ|·r_d) > 50 µm, where the linear formula misses exact distances by more
     than about 0.3 µm.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> stage = load_reducer("rv40e_xi2015").cycloid_stage
-    >>> [is_large(stage, Modification(equidistant=amount, shift=0.0)) for amount in (4.9e-5, 5.1e-5)]
-    [False, True]
     """
     amounts = (modification.equidistant, modification.shift, modification.rotation * stage.disc_pitch_radius)
     return max(abs(amount) for amount in amounts) > LARGE
@@ -77,13 +70,6 @@ def removed(profile: ToothProfile, pin_angle: Angles) -> Float[np.ndarray, "*ang
     """Return the material that a drawing's profile removes, `linear_clearance` less a free form, theory page (83) [m].
 
     Own derivation, first order in amounts and form.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> profile = ToothProfile.of(load_reducer("rv40e_xi2015"))
-    >>> round(1e6 * float(removed(profile, np.zeros(1))[0]), 3)  # at the root [µm]
-    6.0
     """
     found = linear_clearance(profile.stage, profile.modification, pin_angle)
     return found if profile.form is None else found - profile.form.at(pin_angle)
@@ -118,14 +104,6 @@ def exact_clearance(
 
     Own derivation: the nearest point lies where (P − w)·w′ = 0 on the path w of the grinding pin's centre; exact to
     rounding.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> design = load_reducer("rv40e_xi2015")
-    >>> profile = ToothProfile(stage=design.cycloid_stage, modification=design.modification)
-    >>> round(1e6 * float(exact_clearance([profile], np.zeros(1))[0, 0]), 3)  # a pin at the root: Δr_rp − Δr_p [µm]
-    6.0
     """
     from tolalloc.reducers.cycloid.solvers.pins import FIELDS, pin_clearances
 
@@ -153,15 +131,6 @@ def gap_of(profile: ToothProfile, exact: bool) -> Gap:
     A free form of the profile is taken off along the normal at the pin's φ in either case, theory page (83).
 
     Linear: `linear_clearance` − β·r_d·S (own derivation), β the disc's rotation [rad], φ [rad], within `is_large`.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> stage = load_reducer("rv40e_xi2015").cycloid_stage
-    >>> gap = gap_of(ToothProfile(stage=stage), exact=False)
-    >>> closed = gap(np.array([np.arccos(stage.shortening)]), 1e-6)  # S = 1: −β·e·zc
-    >>> round(1e9 * float(closed[0]), 2)  # [nm]
-    -50.7
     """
     stage, lever, form = profile.stage, profile.stage.disc_pitch_radius, profile.form
 
@@ -222,21 +191,6 @@ def clearance_of(profile: ToothProfile, exact: bool | None = None) -> Clearance:
 
     Distances are exact by default only where the modification is too large for the linear formula.
 
-    Raises
-    ------
-    InputError
-        A pin overlaps the tooth before any load.
-
-    Own derivation: β of the first contact is the least of L/(r_d·S) over φ, L of `linear_clearance` or exact; at φ0 it
-    is Li Lixing's (Δr_rp − q·Δr_p)/r_d.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> design = load_reducer("rv40e_xi2015")
-    >>> found = clearance_of(ToothProfile(stage=design.cycloid_stage, modification=design.modification))
-    >>> round(1e6 * found.radial, 3), round(float(np.degrees(found.free_rotation)) * 60, 4)  # [µm, arcmin]
-    (6.0, 0.3612)
     """
     from scipy.optimize import brentq
 

@@ -50,14 +50,6 @@ def contact_stiffness(
 
     1/K = 1/C + 1/k for the linear laws; ln λ + c/k with c = 2C for the logarithmic one, which has the same effect on
     F/c·ln(cλ/F) (own derivation); k the bending of a pin.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> design = load_reducer("rv40e_xi2015")
-    >>> bent = replace(design.stiffness, pin_contact=2e8, pin_bending=2e8, pin_contact_law="constant")
-    >>> float(contact_stiffness(design.cycloid_stage, bent, np.array([1.0]))[0][0])  # two alike in series [N/m]
-    100000000.0
     """
     contact, law = np.full_like(pin_angle, stiffness.pin_contact), stiffness.pin_contact_law
     if law == "table2":
@@ -84,15 +76,6 @@ def crowned_contact(
     References
     ----------
     Own derivation, theory page (31); within 7 % of Hertz's ellipse under the logarithmic law.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> design = load_reducer("rv20e")
-    >>> crowned = replace(design, cycloid_stage=replace(design.cycloid_stage, crowning=5e-6))
-    >>> found = crowned_contact(crowned, np.array([1.0]), np.array([600.0]), np.zeros(1))
-    >>> round(float(found.peak[0]) / 60e3, 2)  # beside the even load of 60 N/mm
-    1.81
     """
     stage, shape = reducer.cycloid_stage, np.broadcast_shapes(pin_angle.shape, force.shape)
     stiffness, log_length = contact_stiffness(stage, replace(reducer.stiffness, pin_bending=inf), pin_angle)
@@ -120,13 +103,6 @@ def pin_contact_table2(stage: CycloidStage, convex_stiffness: float, pin_angle: 
     liu2020, Table 2 (K_djk).
 
     K = C/(1 + 2·r_rp·max(κ, 0)), C and K in N/m, for 0 < K1 < 1.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> found = pin_contact_table2(load_reducer("rv20e_liu2020").cycloid_stage, 1.0, np.array([0.0, np.pi]))
-    >>> found.round(4).tolist()  # K/C at the root, concave, and at the tip, convex
-    [0.0441, 1.0]
     """
     return np.asarray(convex_stiffness / (1 + 2 * stage.pin_radius * np.maximum(path_curvature(stage, pin_angle), 0.0)))
 
@@ -256,12 +232,6 @@ def default_phases(reducer: Reducer, count: int = 72) -> Float[np.ndarray, " pha
     """Return equally spaced phases over one pin pitch, the first with a pin in the crank direction [rad].
 
     Phase k is 2π·k/(zp·count), own derivation: after one pin pitch everything repeats.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> np.degrees(default_phases(load_reducer("rv40e_xi2015"), 3)).round(6).tolist()  # a pitch of 9° [°]
-    [0.0, 3.0, 6.0]
     """
     return 2 * pi / reducer.cycloid_stage.pin_count * np.arange(count) / count
 
@@ -297,15 +267,6 @@ def _loaded(
     the pins [N].
 
     Own derivation: the disc has turned by β + δ_max/r_d, β that of the first contact; the torque is r_d·Σ S·F.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> discs, phase = PressedDiscs(reducer=load_reducer("rv40e_xi2015"), torque=100.0), np.zeros(1)
-    >>> force = np.zeros((1, 1, 40))
-    >>> force[0, 0, 4] = 1000.0  # the pin at 36°, where S is almost 1: r_d = 50.7 mm
-    >>> round(float(_loaded(discs, "one pin", phase, np.array([1e-5]), force).torque[0, 0]), 2)  # [N·m]
-    50.7
     """
     reducer, stage, closed, angles = (
         discs.reducer,
@@ -344,13 +305,6 @@ def pressed_linear(
     law with the curvature at φ0.
 
     Theory page equation (36): F_i = F_max·(δ_max·S_i − gap_i)/δ_max with F_max from the balance of torques.
-
-    Raises
-    ------
-    InputError
-        The deflection reaches no pin.
-    SolveError
-        The iteration does not settle.
 
     References
     ----------
@@ -463,13 +417,7 @@ class _Balance:
         return np.asarray((self._lever[phase] * self.forces(deflection, phase)).sum(axis=1))
 
     def deflection(self) -> Float[np.ndarray, " phase"]:
-        """Return the deflections at which the torques balance [m].
-
-        Raises
-        ------
-        InputError
-            A pin would be pressed in by more than its radius.
-        """
+        """Return the deflections at which the torques balance [m]."""
         from scipy.optimize import elementwise
 
         wanted, deepest = self.discs.torque, self.discs.reducer.cycloid_stage.pin_radius
@@ -496,13 +444,6 @@ def pressed(discs: PressedDiscs, phase: Float[np.ndarray, " phase"]) -> LoadedCo
     """Return the contact of every pin by the reducer's own law, the rotation bracketed until the torques balance.
 
     Theory page equation (37). All discs turn by the same angle; a single one carries the whole torque.
-
-    Raises
-    ------
-    InputError
-        The torque would press a pin in by more than its radius.
-
-    Σ r_d·S·F(δ_max·S − gap) = T; F of the law at each tooth's own curvature.
 
     References
     ----------
@@ -603,14 +544,6 @@ def pin_moment(reducer: Reducer, torque: float) -> float:
     References
     ----------
     Own derivation, from the balance of moments about the housing's centre.
-
-    Examples
-    --------
-    The RV-20E, i = 105, zc = 39, zp = 40, at its rated 167 N·m: 167·104/105·39/40 N·m.
-
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> round(pin_moment(load_reducer("rv20e"), 167.0), 3)
-    161.274
     """
     stage = reducer.cycloid_stage
     return torque * (1.0 - 1.0 / reducer.sun_ratio) * stage.disc_teeth / stage.pin_count
@@ -626,18 +559,9 @@ def assess(
     where the
     modification is too large for the linear formula.
 
-    Raises
-    ------
-    InputError
-        The profile cannot be ground, interferes with the pins, or the torque is beyond any contact.
-
     References
     ----------
     xi2015 for Li Lixing's method and 572 N·m; the law at every pin and the discs together are own derivations.
-
-    Examples
-    --------
-    See `tolalloc.reducers.contact.contact_of`.
     """
     reducer = replace(reducer, stiffness=replace(reducer.stiffness, pin_contact_law=law))
     profile, torque = ToothProfile.of(reducer), abs(torque)

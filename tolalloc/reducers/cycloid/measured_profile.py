@@ -75,13 +75,7 @@ class MeasuredProfile:
 
     @cached_property
     def columns(self) -> tuple[str, ...]:
-        """Columns of the file.
-
-        Raises
-        ------
-        InputError
-            Columns that are none of the three kinds, or settings that do not belong to them.
-        """
+        """Columns of the file."""
         names = {split_header(header)[0] for header in read_text_table(self.path).headers}
         kind = next((kind for kind in _KINDS if names & set(kind)), _KINDS[0])
         along = kind == _KINDS[-1]
@@ -96,13 +90,7 @@ class MeasuredProfile:
         return kind
 
     def form(self, drawn: ToothProfile, number: int) -> tuple[FlankForm, Movement | None]:
-        """Return what the disc has beyond its drawing, and the movement that was taken out.
-
-        Raises
-        ------
-        InputError
-            The file, column, row and value that are not allowed, or points that do not lie on such a disc.
-        """
+        """Return what the disc has beyond its drawing, and the movement that was taken out."""
         stage, moved = drawn.stage, None
         found = read_profile(self.path, self.columns, ("z",))
         if "space" in found:
@@ -169,11 +157,6 @@ def normal_deviations(
     grinding pin's centre, (P − w)·w′ = 0, the point stands out by r_rp − (P − w)·n: own derivation, theory page (83);
     exact to rounding.
 
-    Raises
-    ------
-    InputError
-        Points that lie far from the profile of such a disc.
-
     Examples
     --------
     A profile ground with a pin that is 2 µm too large is 2 µm too small everywhere.
@@ -215,23 +198,9 @@ def aligned(
     Gauss–Newton steps: a movement by (x, y) and a turn by ψ about the disc's centre let a point stand out by
     −n·(x, y) − ψ·r_d·S less. What is taken out is no error of the disc any more.
 
-    Raises
-    ------
-    InputError
-        Points that lie far from the profile of such a disc.
-
     References
     ----------
     Own derivation, least squares; levers r_d·S of theory page (14).
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> stage = load_reducer("rv20e").cycloid_stage
-    >>> x, y = ToothProfile(stage=stage).points(np.linspace(0.0, 245.0, 900)).T  # all around
-    >>> _, moved = aligned(stage, (x + 1j * y) * np.exp(2e-4j) + 5e-5, "disc")
-    >>> round(float(abs(moved.place)) / 1e-6, 6), round(float(moved.turn) / 1e-6, 6)  # [µm, µrad]
-    (50.0, 200.0)
     """
     start, scale = place, stage.disc_pitch_radius
     shift, turn = 0j, 0.0

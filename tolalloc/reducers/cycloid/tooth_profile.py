@@ -49,14 +49,6 @@ def normals(shortening: float, pin_angle: Angles) -> Normals:
     ----------
     liu2020 for the angle a (its α_jk); xi2015, equation (3), for S and cos κ. Exact for 0 < K1 < 1, where
     cos²κ + K1²·S² = 1.
-
-    Examples
-    --------
-    A quarter of a turn from the crank direction cos κ and S are alike, 1/√(1 + K1²).
-
-    >>> found = normals(0.75, np.array([np.pi / 2]))
-    >>> float(found.lever[0]), float(found.along_radius[0])
-    (0.8, 0.8)
     """
     cosine, sine = np.cos(pin_angle), np.sin(pin_angle)
     root = np.sqrt(1 + shortening**2 - 2 * shortening * cosine)
@@ -97,12 +89,6 @@ def flank_angle(stage: CycloidStage) -> float:
     References
     ----------
     xi2015 and Li Lixing, who close the gap there; there S = 1, for 0 < K1 < 1.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> round(float(np.degrees(flank_angle(load_reducer("rv20e").cycloid_stage))), 3)
-    46.187
     """
     return acos(stage.shortening)
 
@@ -111,13 +97,6 @@ def pin_angles(stage: CycloidStage, phase: Float[np.ndarray, " phase"]) -> Float
     """Return φ of every pin, from −π up to π, for phases: angles of the pin that was in the crank direction [rad].
 
     φ_k = 2πk/zp + phase, own derivation: pins are equally spaced.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> found = pin_angles(load_reducer("rv40e_xi2015").cycloid_stage, np.array([0.0]))
-    >>> np.degrees(found[0, :3]).round(6).tolist()  # 40 pins [°]
-    [0.0, 9.0, 18.0]
     """
     pins = 2 * np.pi * np.arange(stage.pin_count) / stage.pin_count
     return np.asarray(np.remainder(pins + phase[:, np.newaxis] + np.pi, 2 * np.pi) - np.pi)
@@ -226,27 +205,7 @@ class ToothProfile:
 
 
 def require_sound(profile: ToothProfile, place: str) -> None:
-    """Raise unless the profile can be ground and mounted.
-
-    Raises
-    ------
-    InputError
-        K1 is not below 1, the grinding pin undercuts the tooth, or tip and root or flank interfere with the pins.
-
-    Own derivation: K1 < 1; 0 < r < the smallest convex radius of the path; Δr_rp − Δr_p ≥ 0 at tip and root, and
-    Δr_rp − q·Δr_p ≥ 0 at φ0 with q = √(1 − K1²).
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> stage = load_reducer("rv40e_xi2015").cycloid_stage
-    >>> shifted = ToothProfile(stage=stage, modification=Modification(equidistant=0.0, shift=1e-5))
-    >>> try:
-    ...     require_sound(shifted, "x")
-    ... except InputError as error:
-    ...     print(str(error)[:50])
-    x: the modification is an interference of 10 µm at
-    """
+    """Raise unless the profile can be ground and mounted."""
     ground = profile.ground
     if not 0 < ground.shortening < 1:
         raise InputError.at(place, "K1 = eccentricity·pin_count/pin_circle_radius", ground.shortening, "below 1")
@@ -283,14 +242,6 @@ def nearest_angles(
 
     There (P − w)·w′ of a point P and the path w falls through zero; profile and path share their normals. Newton's
     method from the angles given, which are at most a quarter of a turn of φ away; own derivation.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> stage = load_reducer("rv20e").cycloid_stage
-    >>> place = ToothProfile(stage=stage).points(np.array([0.8]))[0]
-    >>> nearest_angles(stage, np.array([complex(*place)]), np.array([0.9]), np.zeros((1, 2))).round(9).tolist()
-    [[0.8]]
     """
     angle = np.tile(angles, (len(amounts), 1))
     low, high = angle - _REACH, angle + _REACH
@@ -315,13 +266,6 @@ def path_of(
 
     The normal into the disc is the direction of its derivative, turned by −90°: theory page (34) for many modifications
     at once, where `ToothProfile` is one; own derivation.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> path, slope, _ = path_of(load_reducer("rv20e").cycloid_stage, np.zeros((1, 2)), np.zeros((1, 1)))
-    >>> round(1e3 * float(path[0, 0].real), 3), round(1e3 * float(slope[0, 0].imag), 3)  # at the root [mm, mm/rad]
-    (51.1, -0.41)
     """
     pin = (stage.pin_circle_radius + amounts[:, 1:]) * np.exp(-1j * angle / stage.disc_teeth)
     crank = stage.eccentricity * np.exp(-1j * angle * (stage.pin_count / stage.disc_teeth))
@@ -366,35 +310,13 @@ def _chord_error(profile: ToothProfile, angle: Float[np.ndarray, " point"]) -> f
 
 
 def require_points(per_tooth: int) -> None:
-    """Raise unless a drawing can use so many points per tooth.
-
-    Raises
-    ------
-    InputError
-        Too few, too many, or an odd number.
-    """
+    """Raise unless a drawing can use so many points per tooth."""
     if not FEWEST <= per_tooth <= MOST or per_tooth % 2:
         raise InputError.at("profile", "points per tooth", per_tooth, f"an even number from {FEWEST} to {MOST}")
 
 
 def profile_points(profile: ToothProfile, per_tooth: int) -> ProfilePoints:
-    """Return the points of a whole disc with a sound profile, an even number of them per tooth.
-
-    Raises
-    ------
-    InputError
-        A number of points that no drawing can use.
-
-    Own derivation: points at equal steps of ∫√|curvature|·ds from root to tip, since a chord of length s misses a curve
-    by curvature·s²/8; the error falls with the square of their number.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> found = profile_points(ToothProfile(stage=load_reducer("rv40e_xi2015").cycloid_stage), 40)
-    >>> found.place.shape, round(1e6 * found.chord_error, 1)  # 39 teeth; [µm]
-    ((1560, 2), 3.8)
-    """
+    """Return the points of a whole disc with a sound profile, an even number of them per tooth."""
     require_points(per_tooth)
     angle = _flank_angles(profile, per_tooth // 2 + 1)
     flank = profile.points(angle)

@@ -62,13 +62,6 @@ def spring_groups(
     """Return all spring groups with all their columns, pin contact last: plain and large, for proofs.
 
     Rows δ = a·q + b·ε, theory page (5) to (18), liu2020 as read there.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> groups = spring_groups(load_reducer("rv20e_liu2020"), np.zeros(1))
-    >>> [group.stiffness.shape[1] for group in groups]  # rows; 2 discs times 40 pins at last
-    [2, 2, 8, 4, 2, 80]
     """
     at = Positions(reducer, carrier_angle, orders)
     return [*bilateral_groups(at), dense_rows(at)]
@@ -83,14 +76,6 @@ def rotation_scale(reducer: Reducer, coordinates: Coordinates) -> Float[np.ndarr
     """Return the lever by which each coordinate is divided so that all are lengths [m or 1].
 
     Own derivation: x = ℓ·θ with ℓ = r_b2, r_d, and a_sp or a; any lever gives the same equilibrium.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> design = load_reducer("rv20e_liu2020")
-    >>> scale = rotation_scale(design, Coordinates.of(design))
-    >>> round(1e3 / float(scale[-1]), 3)  # crank circle radius a_sp [mm]
-    27.0
     """
     scale = np.ones(coordinates.count)
     if reducer.centre_gear:

@@ -104,13 +104,6 @@ def sliding_ways(reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"]) -
     References
     ----------
     Own derivation, theory page (69): R_p·√S is the distance of pin and pole, S = 1 + K1² − 2K1·cos φ.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> found = sliding_ways(load_reducer("rv40e_xi2015"), np.zeros(1))
-    >>> round(1e3 * float(found.min()), 3)  # R_p·(1 − K1) − r_rp, at the root [mm/rad]
-    9.0
     """
     stage, angle = reducer.cycloid_stage, angles_of_pins(reducer, carrier_angle)
     root = np.sqrt(1.0 + stage.shortening**2 - 2.0 * stage.shortening * np.cos(angle))
@@ -260,12 +253,6 @@ def loop_torques(reducer: Reducer, shares: Sequence[float]) -> Float[np.ndarray,
     """Return the torques at shares of the rated one in both directions, ascending [N·m].
 
     T = ±share·T_rated, own derivation.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> loop_torques(load_reducer("rv20e"), (0.5, 1.0)).tolist()  # rated at 167 N·m
-    [-167.0, -83.5, 83.5, 167.0]
     """
     return np.asarray(reducer.load.rated_torque * np.array([*(-share for share in reversed(shares)), *shares]))
 
@@ -283,14 +270,6 @@ def hysteresis_loop(
     References
     ----------
     Own derivation; lost motion at ±3 % of the rated torque as catalogues define it.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> model = EquivalentModel(load_reducer("rv20e"))
-    >>> found = hysteresis_loop(model, np.zeros((1, len(model.columns))), TURN_ANGLES, (0.03, 1.0))
-    >>> round(float(np.degrees(found.lost_motion[0]) * 60), 2)  # teeth without modification [arcmin]
-    0.26
     """
     torque = loop_torques(model.reducer, shares)
     twist = [
@@ -310,16 +289,6 @@ def both_directions(
     What reversing adds is the second minus the first. The sign of the torque does not matter, as it resists both ways.
 
     Own derivation: turning backwards against T is turning forwards under −T.
-
-    Examples
-    --------
-    Teeth and parts without errors yield alike either way:
-
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
-    >>> forward, backward = both_directions(model, np.zeros((1, len(model.columns))), 167.0, np.zeros(1))
-    >>> f"{float(forward[0, 0] / backward[0, 0]):.4f}"
-    '-1.0000'
     """
     forward, backward = (
         model.at_torque(torque).equilibria(errors, resisting, carrier_angle).transmission_error
@@ -364,25 +333,9 @@ def friction_loop(
 ) -> FrictionLoop:
     """Return the loop with friction at the carrier angles [rad].
 
-    Raises
-    ------
-    ValueError
-        A reducer whose bearings or gears are not stated by their dimensions.
-
-    T(S) = S ± f(S) at every spring behind friction; loss and lost motion as catalogues read them.
-
     References
     ----------
     Own derivation, theory page (72) to (74).
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.equivalent.perfect import exact_unit
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> model = EquivalentModel(load_reducer("rv20e"))
-    >>> found = friction_loop(model, exact_unit(model), TURN_ANGLES[:3])
-    >>> round(float(found.rated.efficiency[0]), 2)  # at rated torque, seals left out
-    0.9
     """
     if unknown := model.reducer.friction_dimensions.unknown:
         raise ValueError(f"{model.reducer.name}: no dimensions of {', '.join(unknown)}")

@@ -482,12 +482,6 @@ def pin_terms(reducer: Reducer, orders: tuple[int, ...]) -> Terms:
     ``each_pin.diameter.{k}``, ``each_pin.groove.{k}``.
 
     Signs are an own derivation, theory page (17) and (18): the effective radius error of a pin is d_k − r_k − Δr_rp.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> pin_terms(load_reducer("rv20e_liu2020"), (1,))["housing.groove.radius"][:2]
-    [(80, -1.0), (81, -1.0)]
     """
     pins = reducer.cycloid_stage.pin_count
     radial, tangential, radius = (range(first, first + pins) for first in (0, pins, 2 * pins))
@@ -613,12 +607,6 @@ def dense_rows(at: Positions) -> SpringGroup:
     """Return the pin contacts with all columns but the tilt as one plain spring group: large, for proofs only.
 
     Rows δ = a·q + b·ε of `pin_contact`, own derivation.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> dense_rows(Positions(load_reducer("rv20e_liu2020"), np.zeros(1))).displacement.shape  # angle, 2·40 rows, q
-    (1, 80, 17)
     """
     contact, reducer = pin_contact(at), at.reducer
     angles, discs, pins = contact.stiffness.shape

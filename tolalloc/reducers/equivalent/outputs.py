@@ -65,14 +65,6 @@ def forces(equilibria: Equilibria) -> Forces:
     elements with play by equation (28).
 
     F = k·δ, own derivation; NaN where nothing converged.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
-    >>> found = forces(model.equilibria(np.zeros((1, len(model.columns))), -167.0, np.zeros(1)))
-    >>> round(float(found.of("crank_carrier_bearing").mean()))  # by statics 167 N·m/(2·27 mm) = 3093 N
-    3093
     """
     from tolalloc.reducers.equivalent.solvers.turn import solve_forces
 
@@ -266,16 +258,6 @@ def radial_clearance(
     that stands out most meets the tooth that stands out most, and the rows of one pin give the gaps of all.
 
     Of errors without waves: −Δr_p + Δr_rp − d_k + r_k (own derivation) [m].
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
-    >>> errors = np.zeros((1, len(model.columns)))
-    >>> errors[0, model.columns.index("modification.equidistant")] = 20e-6
-    >>> errors[0, model.columns.index("modification.shift")] = 12e-6
-    >>> round(1e6 * float(radial_clearance(model, errors)[0]), 6)  # Δr_rp − Δr_p [µm]
-    8.0
     """
     discs = _standing_out(model, errors)
     return np.asarray(-np.max([own.pin.max(axis=1) + own.tooth.max(axis=1) for own in discs], axis=0))
@@ -288,15 +270,6 @@ def radial_clearance_derivatives(
 
     Those of the gap between the pin and the tooth that stand out most, which is linear in the errors: own derivation.
     They hold while these stand out most.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
-    >>> found = radial_clearance_derivatives(model, np.zeros((1, len(model.columns))))
-    >>> amounts = [model.columns.index(f"modification.{name}") for name in ("equidistant", "shift")]
-    >>> found[0, amounts].round(9).tolist()  # Δr_rp − Δr_p
-    [1.0, -1.0]
     """
     discs, layout = _standing_out(model, errors), model.error_columns.layout
     disc = np.argmax([own.pin.max(axis=1) + own.tooth.max(axis=1) for own in discs], axis=0)
@@ -369,17 +342,6 @@ def line_contact(equilibria: Equilibria, forces: Forces) -> LineContact:
     A tilt γ moves a tooth at height z by z·(γy, −γx) in the housing's plane; the tilt turns with the disc.
 
     Slope γ = γ_y·n_x − γ_x·n_y [rad], own derivation, theory page (31).
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
-    >>> errors = np.zeros((1, len(model.columns)))
-    >>> errors[0, model.columns.index("disc1.tilt.x")] = 1e-4
-    >>> solved = Solved.of(model.equilibria(errors, -167.0, np.zeros(1)))
-    >>> found = line_contact(solved.equilibria, solved.forces)
-    >>> round(1e4 * float(np.abs(found.slope[0, 0, 0]).max()), 2)  # all of the tilt where the normal lies along y
-    1.0
     """
     tables, layout = equilibria.tables, equilibria.columns.layout
     tilt = (equilibria.columns.matrix[layout.tilt : layout.end] @ equilibria.errors.T).T
@@ -403,15 +365,6 @@ def peak_line_load(equilibria: Equilibria, forces: Forces) -> Float[np.ndarray, 
     """Return the largest line load of every pin and disc, the even one where nothing is tilted or crowned [N/m].
 
     F/b + C|γ|/2, own derivation; without tilt F/b; of crowned teeth that of `LineContact`.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
-    >>> solved = Solved.of(model.equilibria(np.zeros((1, len(model.columns))), -167.0, np.zeros(1)))
-    >>> found = peak_line_load(solved.equilibria, solved.forces)
-    >>> round(float(solved.forces.pins.max() / found.max()), 6)  # face width [m]
-    0.01
     """
     layout, stage = equilibria.columns.layout, equilibria.reducer.cycloid_stage
     if not (stage.crowning or np.any(equilibria.columns.matrix[layout.tilt : layout.end] @ equilibria.errors.T)):
@@ -427,14 +380,6 @@ def unit_pressure(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]
     References
     ----------
     Hertz's line contact, as `peak_pressure`.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
-    >>> found = unit_pressure(model.equilibria(np.zeros((1, len(model.columns))), -1.0, np.zeros(1)))
-    >>> f"{found.max():.2e}"  # at the tip, where the tooth is most convex [Pa]
-    '5.63e+06'
     """
     reducer, pin_angle = equilibria.reducer, angles_of_pins(equilibria.reducer, equilibria.carrier_angle)
     even = np.full_like(pin_angle, reducer.cycloid_stage.face_width)
@@ -445,13 +390,6 @@ def angles_of_pins(reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"])
     """Return the angle of every pin from the crank direction of every disc [rad].
 
     φ_k − β_j, theory page (2) and (13), own derivation.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> found = angles_of_pins(load_reducer("rv20e_liu2020"), np.zeros(1))
-    >>> np.degrees(found[0, :, 0]).round(6).tolist()  # disc 1's crank points at pin 1, disc 2's away from it [°]
-    [0.0, -180.0]
     """
     crank, apart = -reducer.cycloid_stage.disc_teeth * carrier_angle, 2.0 * np.pi / reducer.disc_count
     discs = range(reducer.disc_count)
@@ -493,26 +431,9 @@ def contact_pattern(
     positions
         Places along the width [-].
 
-    Raises
-    ------
-    InputError
-        A disc that the reducer does not have, or a contact law that knows no load along the width.
-    SolveError
-        No equilibrium at one of the angles.
-
-    Line load q(z) = C/b·max(0, s + γz − c(2z/b)²) [N/m] and pressure √(q·E*/(πR)) [Pa], slice by slice (assumed).
-
     References
     ----------
     Own derivation, theory page (31) and (60); Hertz's line contact for the pressure.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
-    >>> found = contact_pattern(model, np.zeros(len(model.columns)), -167.0, carrier_angle=0.0)
-    >>> bool(np.ptp(found.line_load, axis=1).max() == 0.0)  # even without tilt
-    True
     """
     reducer, law = model.reducer, model.reducer.stiffness.pin_contact_law
     if not 1 <= disc <= reducer.disc_count:

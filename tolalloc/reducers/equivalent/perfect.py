@@ -36,13 +36,6 @@ def exact_loop(reducer: Reducer) -> HysteresisLoop:
     """Return torque against twist of the unit whose parts are exact.
 
     Loop of `hysteresis_loop` with all errors 0 and the modification, own derivation.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> found = exact_loop(load_reducer("rv20e"))
-    >>> round(float(found.torsional_stiffness[0]) * np.pi / 180 / 60)  # the catalogue states 49 [N·m/arcmin]
-    45
     """
     model = EquivalentModel(reducer)
     return hysteresis_loop(model, exact_unit(model), TURN_ANGLES)
@@ -60,13 +53,6 @@ def perfect_reducer(reducer: Reducer, torque: float) -> Solved:
         Torque on the carrier, negative where it resists the rotation [N·m].
 
     Own derivation: everything repeats after 2π/(zp·zc) of the carrier, over which 72 equilibria are solved.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> found = perfect_reducer(load_reducer("rv20e"), -167.0)
-    >>> round(float(found.forces.pins.max()))  # largest pin force at rated torque [N]
-    582
     """
     model, stage = EquivalentModel(at_torque(reducer, torque)), reducer.cycloid_stage
     span = 2.0 * pi / (stage.pin_count * stage.disc_teeth)
@@ -132,18 +118,6 @@ def pin_force_derivatives(model: EquivalentModel, errors: Float[np.ndarray, "sam
 
     Those of that pin's force at that angle, own derivation, theory page (23): the adjoint of the equilibrium with the
     force in place of the rotation. They hold while the same pins touch and the same one is pressed most.
-
-    Examples
-    --------
-    Teeth 1 µm tighter than their pins press them harder:
-
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> model = EquivalentModel(load_reducer("rv20e"))
-    >>> tight = np.zeros((1, len(model.columns)))
-    >>> tight[0, model.columns.index("modification.equidistant")] = -1e-6
-    >>> _, slopes = pin_force_derivatives(model, tight)
-    >>> round(1e-6 * float(slopes[0, model.columns.index("modification.equidistant")]))  # [N/µm]
-    -841
     """
     solved = _without_torque(model, errors)
     pins = solved.forces.pins
@@ -158,16 +132,6 @@ def friction_torque_derivatives(model: EquivalentModel, errors: Float[np.ndarray
 
     As `pin_force_derivatives`, own derivation, of the sum of forces times sliding ways at the angle where it is
     largest.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> model = EquivalentModel(load_reducer("rv20e"))
-    >>> tight = np.zeros((1, len(model.columns)))
-    >>> tight[0, model.columns.index("modification.equidistant")] = -1e-6
-    >>> _, slopes = friction_torque_derivatives(model, tight)
-    >>> round(1e-6 * float(slopes[0, model.columns.index("modification.equidistant")]), 1)  # [N·m/µm]
-    -50.7
     """
     solved = _without_torque(model, errors)
     by_force = model.reducer.friction.pins * sliding_ways(model.reducer, TURN_ANGLES)
@@ -198,12 +162,6 @@ def rated_pin_force(reducer: Reducer) -> float:
     """Return the largest force of a pin of exact parts under their rated torque [N].
 
     Largest force of `perfect_reducer`, own derivation; sign of the torque: it resists.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> round(rated_pin_force(load_reducer("rv20e")))  # [N]
-    582
     """
     return float(perfect_reducer(reducer, -reducer.load.rated_torque).forces.pins.max())
 

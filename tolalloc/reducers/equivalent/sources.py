@@ -139,16 +139,6 @@ class ErrorSources:
         ----------
         stated
             Source → what the table states of it; copies of which it states different things have lines of their own.
-
-        Examples
-        --------
-        The bores of disc 1 are finer than those of disc 2, and both discs have one pitch:
-
-        >>> from tolalloc.reducers.families.rv import RV
-        >>> bores = {"disc1.bore1.position": 4, "disc1.bore2.position": 4, "disc2.bore1.position": 6}
-        >>> lines = RV.sources.shared_lines({**bores, "disc1.pitch": 8, "disc2.pitch": 8})
-        >>> [*dict.fromkeys(lines.values())]
-        ['disc1.bore.position', 'disc2.bore1.position', 'disc.pitch']
         """
         copies: dict[tuple[ErrorSource, Hashable], list[str]] = {}
         for name, own in stated.items():
@@ -162,13 +152,7 @@ class ErrorSources:
         }
 
     def of_column(self, column: str) -> ErrorSource:
-        """Return the kind of the source that a column belongs to.
-
-        Raises
-        ------
-        UnknownNameError
-            A column that nothing declares.
-        """
+        """Return the kind of the source that a column belongs to."""
         for kind in self.kinds:
             if kind.column_pattern.fullmatch(column):
                 return kind

@@ -174,13 +174,6 @@ def support(at: Positions, first: int, name: str, stiffness_name: str, error: st
         What the springs stand for, and the field of `Stiffness`.
     error
         Source of (a_x, a_y).
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> at = Positions(load_reducer("rv20e_liu2020"), np.zeros(1))
-    >>> support(at, at.coordinates.carrier, "carrier bearing", "carrier_bearing", "carrier.assembly").columns
-    ('carrier.assembly.x', 'carrier.assembly.y')
     """
     angles = at.carrier_angle.size
     displacement = np.zeros((angles, 2, at.coordinates.count))

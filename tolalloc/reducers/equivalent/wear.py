@@ -128,12 +128,6 @@ def pin_depth_per_work(reducer: Reducer) -> float:
     References
     ----------
     Archard (1953); own derivation, theory page (99).
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> round(1e6 * 1e8 * pin_depth_per_work(load_reducer("rv20e")), 4)  # after 100 MN·m [µm]
-    0.0796
     """
     stage = reducer.cycloid_stage
     area = 2.0 * pi * stage.pin_radius * stage.face_width * reducer.disc_count
@@ -170,15 +164,6 @@ def wear_of(
         What a load case has that states none; the test torque unless given [N·m, K].
     step
         Largest wear in one step [m].
-
-    Raises
-    ------
-    InputError
-        No load case that states a speed, or hours that wear more than 50 µm off.
-    SolveError
-        No equilibrium at one of the angles.
-
-    Volume k·ΣF·s, theory page (97) to (99), in h, N, m.
 
     References
     ----------

@@ -33,13 +33,6 @@ def centre_mesh(at: Positions) -> SpringGroup:
     References
     ----------
     Own derivation, as liu2020's of sun and planets.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> group = centre_mesh(Positions(load_reducer("rv27c"), np.zeros(1)))
-    >>> round(1e3 * float(group.displacement[0, 0, 2]), 2)  # −r_b4 = −45 mm·cos 20° [mm/rad]
-    -42.29
     """
     reducer, coordinates, angles = at.reducer, at.coordinates, at.carrier_angle.size
     gear = reducer.centre_pair

@@ -32,12 +32,6 @@ def shaft_support(at: Positions) -> SpringGroup:
     References
     ----------
     Own derivation, as liu2020's of the sun.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> shaft_support(Positions(load_reducer("cd29"), np.zeros(1))).columns
-    ('shaft.assembly.x', 'shaft.assembly.y')
     """
     return support(at, at.coordinates.input, "shaft bearing", "shaft_support", "shaft.assembly")
 
@@ -61,12 +55,6 @@ def eccentric_bearing(at: Positions) -> SpringGroup:
     References
     ----------
     Own derivation.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> eccentric_bearing(Positions(load_reducer("cd29"), np.zeros(1))).stiffness.shape  # angle, 2 discs times x, y
-    (1, 4)
     """
     reducer, coordinates, angles = at.reducer, at.coordinates, at.carrier_angle.size
     discs, shaft = reducer.disc_count, coordinates.input
@@ -116,14 +104,6 @@ def output_pins(at: Positions) -> SpringGroup:
     References
     ----------
     Own derivation; the gap of one pin is the hole's radius less the pin's and the eccentricity.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> design = load_reducer("cd29")
-    >>> group = output_pins(Positions(design, np.zeros(1)))
-    >>> round(1e6 * (group.clearance - group.constants["output.offset"]), 6)  # gap towards the wall [µm]
-    0.5
     """
     reducer, coordinates, angles = at.reducer, at.coordinates, at.carrier_angle.size
     pins, discs, carrier = reducer.holes, reducer.disc_count, coordinates.carrier

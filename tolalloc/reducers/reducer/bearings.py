@@ -162,13 +162,7 @@ class RollingBearing(ABC):
         return np.asarray(self.rows * cos(self.contact_angle) * self.element_loads(displacement, direction) @ cosine)
 
     def radial_displacement(self, force: float, direction: float = 0.0) -> float:
-        """Return the displacement under a radial force [N] [m].
-
-        Raises
-        ------
-        InputError
-            A force that moves the ring by more than a millimetre.
-        """
+        """Return the displacement under a radial force [N] [m]."""
         from scipy.optimize import brentq
 
         if not 0.0 < force < self.radial_force(_LARGEST, direction):
@@ -208,16 +202,7 @@ class RollingBearing(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class RollerBearing(RollingBearing):
-    """Cylindrical, needle or tapered rollers: line contact, c_L = 35,948·L^(8/9) N/mm^(10/9), exponent 10/9.
-
-    Examples
-    --------
-    Twelve rollers of 10 mm without clearance, under 9 N and 1.5 kN:
-
-    >>> needles = RollerBearing(rollers=12, roller_diameter=4e-3, roller_length=10e-3, pitch_diameter=20e-3)
-    >>> [f"{1 / needles.compliance(force):.2e} N/m" for force in (9.0, 1500.0)]
-    ['2.61e+08 N/m', '4.35e+08 N/m']
-    """
+    """Cylindrical, needle or tapered rollers: line contact, c_L = 35,948·L^(8/9) N/mm^(10/9), exponent 10/9."""
 
     rollers: Elements
     roller_diameter: Annotated[Millimetres, Field(alias="roller_diameter_mm")]  # [m]

@@ -128,12 +128,6 @@ def thermal_shift(stage: CycloidStage, warmer: float) -> float:
     References
     ----------
     Own derivation; α is an assumption.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> round(1e6 * thermal_shift(load_reducer("rv20e").cycloid_stage, 5.0), 2)  # [µm]
-    2.99
     """
     return THERMAL_EXPANSION * stage.pin_circle_radius * warmer
 
@@ -167,13 +161,7 @@ class Modification:
 
     @classmethod
     def from_convention(cls, convention: str, equidistant: float, shift: float, rotation: float = 0.0) -> Modification:
-        """Return the modification that a source with the convention ``plus`` or ``minus`` prints [m, m, rad].
-
-        Raises
-        ------
-        KeyError
-            Another convention.
-        """
+        """Return the modification that a source with the convention ``plus`` or ``minus`` prints [m, m, rad]."""
         return cls(equidistant=equidistant, shift=SHIFT_SIGNS[convention] * shift, rotation=rotation)
 
     def flank_clearance(self, stage: CycloidStage) -> float:
@@ -302,13 +290,7 @@ class Reducer:
 
     @property
     def gears(self) -> FirstStage:
-        """Sun and planets.
-
-        Raises
-        ------
-        InputError
-            A reducer without them.
-        """
+        """Sun and planets."""
         if self.first_stage is None:
             raise InputError(
                 f"reducer {self.name}: a single stage has neither sun nor planets; this needs an RV reducer."
@@ -317,26 +299,14 @@ class Reducer:
 
     @property
     def centre_pair(self) -> CentreGear:
-        """Input pinion and centre gear.
-
-        Raises
-        ------
-        InputError
-            A reducer without them.
-        """
+        """Input pinion and centre gear."""
         if self.centre_gear is None:
             raise InputError(f"reducer {self.name}: there is no centre gear; this needs a table [centre_gear].")
         return self.centre_gear
 
     @property
     def holes(self) -> OutputPins:
-        """Output pins and the holes of the discs that they stand in.
-
-        Raises
-        ------
-        InputError
-            A reducer without them.
-        """
+        """Output pins and the holes of the discs that they stand in."""
         if self.output_pins is None:
             raise InputError(f"reducer {self.name}: an RV reducer has no output pins; this needs a single stage.")
         return self.output_pins
@@ -399,11 +369,6 @@ class Reducer:
         """Return the torque to use, the test torque unless one is asked for; negative resists the rotation [N·m].
 
         Commands and files take torques with this sign only, nomenclature page.
-
-        Raises
-        ------
-        InputError
-            Zero, where the play leaves the equilibrium undetermined, or beyond ten times the rated torque.
         """
         torque, largest = self.load.test_torque if asked is None else asked, 10 * self.load.rated_torque
         if not (is_number(torque) and 0 < abs(torque) <= largest):

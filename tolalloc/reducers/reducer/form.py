@@ -98,17 +98,6 @@ def flank_form(
     Points of one φ are taken as their mean, own derivation. Angles φ [rad], deviations outward positive [m]; the place
     is who asks, for messages. Unless spans are stated there are `SMOOTHED` of them where the points are dense enough.
 
-    Raises
-    ------
-    InputError
-        A deviation that is not believed, points too far apart, or more spans than they can tell.
-
-    Examples
-    --------
-    >>> angle = np.radians(np.arange(360.0, -360.0, -30.0))  # two points at every place
-    >>> found = flank_form(angle, 1e-6 * np.cos(angle / 2), 1, 0, "one tooth")
-    >>> len(found.angle), bool(np.abs(found.deviation).max() < 1e-20)  # the mean of +cos φ/2 and −cos φ/2
-    (12, True)
     """
     period = 2 * pi * spaces
     if (most := float(np.abs(deviation).max()) / MICROMETRE) > LARGEST_DEVIATION / MICROMETRE:
@@ -197,11 +186,6 @@ def read_profile(
     """Return a table of numbers by its columns: angles in rad, lengths in m, numbers without a unit as they are.
 
     Other columns may stand there, but need not.
-
-    Raises
-    ------
-    InputError
-        The file, column, row and value that are not allowed.
     """
     table = read_text_table(path)
     stated = [split_header(header) for header in table.headers]
@@ -246,11 +230,6 @@ def load_designed(path: Path) -> FlankForm:
     """Return the free form of a drawing from a CSV file, columns ``phi [deg]`` from 0 to 180 and ``deviation [µm]``.
 
     It stands for both flanks of every tooth and adds to the amounts of the modification.
-
-    Raises
-    ------
-    InputError
-        The file, column, row and value that are not allowed.
     """
     found = read_profile(path, ("phi", "deviation"))
     angle, deviation = found["phi"], found["deviation"]

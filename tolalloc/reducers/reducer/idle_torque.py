@@ -42,13 +42,6 @@ class IdleTorque:
         References
         ----------
         A. Palmgren, Ball and Roller Bearing Engineering, 3rd ed. (1959), for the grease; own derivation.
-
-        Examples
-        --------
-        >>> from tolalloc.reducers.reducer.files import load_reducer
-        >>> found = IdleTorque.of(load_reducer("rv20e"))
-        >>> round(found.seals, 2), round(found.grease, 2), round(found.preload, 3)
-        (0.55, 1.09, 0.049)
         """
         stated, dimensions = reducer.friction, reducer.friction_dimensions
         bearings = {name: (getattr(dimensions, name), *number_and_turns(reducer, name)) for name in _LUBRICATION}
@@ -122,13 +115,6 @@ def grease_torque(factor: float, bearing: RollingBearing, speed: float) -> float
     References
     ----------
     A. Palmgren, Ball and Roller Bearing Engineering, 3rd ed. (1959).
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> needles = load_reducer("rv20e").friction_dimensions.crank_disc_bearing
-    >>> round(1e3 * grease_torque(12.0, needles, 600.0), 2)  # [N·mm]
-    4.43
     """
     flow = _VISCOSITY * speed
     power = flow ** (2.0 / 3.0) if flow >= 2000.0 else 160.0

@@ -81,13 +81,7 @@ def contact_modulus(first: Material, second: Material) -> float:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class IdentifiedStiffness:
-    """Stiffnesses found from measured units, with their standard uncertainty.
-
-    Raises
-    ------
-    InputError
-        What is given is no correlation.
-    """
+    """Stiffnesses found from measured units, with their standard uncertainty."""
 
     source: str  # Where the values come from
     # Field of `Stiffness` → value and standard uncertainty [N/m]
@@ -128,14 +122,7 @@ class IdentifiedStiffness:
 def checked_correlation(
     rows: Sequence[Sequence[float]] | Float[np.ndarray, "row column"], names: tuple[str, ...], place: object
 ) -> Float[np.ndarray, "stiffness stiffness"]:
-    """Return the rows as a correlation of the named stiffnesses.
-
-    Raises
-    ------
-    InputError
-        The rows are not square, not of this size, not symmetric, not 1 on the diagonal, not within −1…1, or have a
-        negative eigenvalue.
-    """
+    """Return the rows as a correlation of the named stiffnesses."""
     size, field_name = len(names), "correlation"
     lengths = [len(row) for row in rows]
     if lengths != [size] * size:

@@ -41,15 +41,7 @@ class WithDerivatives:
 
 @dataclass(frozen=True, kw_only=True)
 class KernelResponse:
-    """Peak-to-peak transmission error on the real model.
-
-    Raises
-    ------
-    UnknownNameError
-        A column that the model does not have.
-    InputError
-        A column of the model that is neither varied nor fixed.
-    """
+    """Peak-to-peak transmission error on the real model."""
 
     model: EquivalentModel  # The equivalent model
     torque: float  # Torque on the carrier, negative resists the rotation [N·m]
@@ -203,24 +195,7 @@ SEEN = 0.05
 
 
 def stiffness_source(identified: IdentifiedStiffness, reducer: Reducer) -> CorrelatedSource:
-    """Return what is not known of the identified stiffnesses as a source of relative changes ln K/K0 [-].
-
-    Raises
-    ------
-    InputError
-        A contact whose uncertainty the derivative does not tell from that of the bending pins.
-
-    Covariance of ln K: s_i·s_j·ρ_ij/(K_i·K_j), to first order (own derivation), for relative uncertainties well
-    below 1.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> found = IdentifiedStiffness(source="x", values={"gear_mesh": 2e8}, standard_uncertainty={"gear_mesh": 1e7})
-    >>> source = stiffness_source(found, load_reducer("rv20e_liu2020"))
-    >>> source.columns, round(float(source.covariance[0, 0]), 6)  # (5 %)²
-    (('stiffness.gear_mesh',), 0.0025)
-    """
+    """Return what is not known of the identified stiffnesses as a source of relative changes ln K/K0 [-]."""
     if reducer.stiffness.pin_bending < inf and identified.standard_uncertainty.get("pin_contact", 0.0) > 0.0:
         raise InputError.at(
             identified.source,

@@ -382,19 +382,6 @@ def output_derivatives(
     Own derivation, theory page (23): the width of a loop is θ(T) − θ(−T), its derivative the difference of the
     adjoints'; of K = 2·0.97·T/(w₁ − w₃) [N·m/arcmin] it is −K/(w₁ − w₃)·∂(w₁ − w₃). They hold while the same pins
     carry.
-
-    Examples
-    --------
-    The larger the pins, the less backlash teeth have that are ground 20 µm deeper [arcmin/µm]:
-
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
-    >>> rest = {name: 0.0 for name in model.columns} | {"modification.equidistant": 20e-6}
-    >>> del rest["pin.diameter"]
-    >>> kernel = KernelResponse(model=model, torque=-1.0, columns=("pin.diameter",), fixed=rest)
-    >>> _, slopes = output_derivatives(kernel, BACKLASH, np.zeros((1, 1)))
-    >>> round(1e-6 * float(slopes[0, model.columns.index("pin.diameter")]), 4)
-    -0.1894
     """
     values, slopes, status = np.empty((len(x), 1)), np.empty((len(x), len(kernel.model.columns))), np.empty(len(x))
     for rows, (value, slope, worst) in map_chunks(partial(_derived, kernel.alone, output), x, kernel.mapper):

@@ -532,13 +532,7 @@ def _scene(
     sources: tuple[str, ...],
     per_crank_turn: int = PER_CRANK_TURN,
 ) -> Scene:
-    """Return the scene of one unit's deviations [m, angles rad], with so many angles per turn of the cranks [-].
-
-    Raises
-    ------
-    SolveError
-        An angle without equilibrium.
-    """
+    """Return the scene of one unit's deviations [m, angles rad], with so many angles per turn of the cranks [-]."""
     kernel, placed = model.kernel, tuple(filter(is_placed, sources))
     errors = kernel.errors(x[np.newaxis])[0]
     return scene_of(kernel.model, errors, kernel.torque, unit=unit, sources=placed, per_crank_turn=per_crank_turn)

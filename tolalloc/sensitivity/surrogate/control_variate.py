@@ -80,15 +80,6 @@ def learnt(experiment: Experiment[Response], blocks: int) -> Regression | None:
     References
     ----------
     Hoerl & Kennard 1970, as `cheap_model`.
-
-    Examples
-    --------
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> found = learnt(sum_of_sizes(6.0, 12.0), 16)
-    >>> (found(np.array([[2.0, 1.0]])).values - found(np.zeros((1, 2))).values).round(2).tolist()
-    [[3.0]]
-    >>> learnt(sum_of_sizes(*60 * [6.0]), 16) is None
-    True
     """
     columns, units = experiment.errors.columns, units_to_learn(experiment.errors, blocks)
     if not units:
@@ -100,12 +91,6 @@ def units_to_learn(errors: ErrorModel, blocks: int) -> int:
     """Return how many units `learnt` draws, 0 where it has no model [-].
 
     n = blocks·(D + 2) of D blocks of dependent sources, as many as the Sobol' blocks have (own derivation).
-
-    Examples
-    --------
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> units_to_learn(sum_of_sizes(6.0, 12.0).errors, 16), units_to_learn(sum_of_sizes(6.0, 12.0).errors, 4096)
-    (64, 0)
     """
     units = blocks * (len(errors.blocks) + 2)
     return units if blocks <= MOST_CONTROLLED and _degree(len(errors.columns), units) else 0

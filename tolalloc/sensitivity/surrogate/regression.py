@@ -60,14 +60,6 @@ def fit_quadratic_form(
     ----------
     Hoerl & Kennard 1970, Technometrics 12, 55–67: w = (TᵀT + strength·I)⁻¹·Tᵀ·y of centred terms T, or
     from the products of units w = Tᵀ·(T·Tᵀ + strength·I)⁻¹·y (Saunders, Gammerman & Vovk 1998).
-
-    Examples
-    --------
-    y = 1 + x + x² is found again.
-
-    >>> x = np.linspace(-1.0, 1.0, 20)[:, np.newaxis]
-    >>> fit_quadratic_form(x, 1.0 + x + x**2, 1e-9)(np.array([[2.0]])).round(6).tolist()
-    [[7.0]]
     """
     middle, deviation = x.mean(axis=0), x.std(axis=0)
     spread = np.where(deviation > 0, deviation, 1.0)
@@ -244,15 +236,6 @@ def fit_box_polynomial(
     ----------
     Least squares min ‖T·c − y‖² over Chebyshev products at x = −cos(π·u), u Sobol' points, which have the density of
     Chebyshev's weight: Narayan & Zhou 2015, Comm. Comput. Phys. 18, 1–36.
-
-    Examples
-    --------
-    A product of two variables is a polynomial of degree 2.
-
-    >>> answers = lambda x: x.prod(axis=1, keepdims=True)
-    >>> found = fit_box_polynomial(answers, np.zeros(2), np.ones(2), 2, SeedTree(1))
-    >>> found(np.array([[0.5, 0.4]])).round(9).tolist(), found.largest_error < 1e-12
-    ([[0.2]], True)
     """
     degrees = total_degrees(lower.size, degree)
     trained = int(np.ceil(_RUNS_PER_TERM * len(degrees)))
@@ -355,13 +338,6 @@ def quadratic_regression() -> Any:
     """Return a ridge regression on all products of two columns.
 
     Hoerl & Kennard 1970, as `fit_quadratic_form`, with the strength of 1 … 1e5 that has the least leave-one-out error.
-
-    Examples
-    --------
-    >>> x = np.random.default_rng(1).normal(size=(200, 2))
-    >>> found = fitted(quadratic_regression(), x, x.prod(axis=1))
-    >>> round(float(found.predict([[1.0, 2.0]])[0]), 1)
-    2.0
     """
     from sklearn.linear_model import RidgeCV
 
@@ -373,13 +349,6 @@ def sparse_quadratic_regression() -> Any:
 
     Tibshirani 1996, J. R. Stat. Soc. B 58, 267–288: weights of the least Σ (y − ŷ)²/2n + α·Σ |w|, with α by
     cross-validation.
-
-    Examples
-    --------
-    >>> x = np.random.default_rng(1).normal(size=(200, 2))
-    >>> found = fitted(sparse_quadratic_regression(), x, x.prod(axis=1))
-    >>> round(float(found.predict([[1.0, 2.0]])[0]), 1)
-    2.0
     """
     return on_products(lasso())
 
@@ -388,15 +357,6 @@ def lasso() -> Any:
     """Return a linear regressor that keeps few columns, how few found by cross-validation.
 
     Least Σ (y − ŷ)²/2n + α·Σ |w|, α by cross-validation: Tibshirani 1996, J. R. Stat. Soc. B 58, 267–288.
-
-    Examples
-    --------
-    Of ten columns the one that matters is kept.
-
-    >>> x = np.random.default_rng(1).normal(size=(200, 10))
-    >>> weights = fitted(lasso(), x, x[:, 0]).regressor_.coef_
-    >>> int(np.abs(weights).argmax()), int(np.count_nonzero(np.abs(weights) > 1e-2))
-    (0, 1)
     """
     from sklearn.compose import TransformedTargetRegressor
     from sklearn.linear_model import LassoCV
@@ -410,14 +370,6 @@ def gaussian_process(columns: int) -> Any:
 
     Kernel c·exp(−Σ (Δuᵢ/lᵢ)²/2) + noise of standardised columns u, its parameters by the largest likelihood: Rasmussen
     & Williams 2006, Gaussian Processes for Machine Learning, ch. 2 and 5. For positive outputs.
-
-    Examples
-    --------
-    y = exp(x) at x = 0.1, between the samples:
-
-    >>> x = np.linspace(-1.0, 1.0, 12)[:, np.newaxis]
-    >>> round(float(fitted(gaussian_process(1), x, np.exp(x[:, 0])).predict([[0.1]])[0]), 2)
-    1.11
     """
     from sklearn.compose import TransformedTargetRegressor
     from sklearn.gaussian_process import GaussianProcessRegressor

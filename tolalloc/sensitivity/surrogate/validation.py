@@ -123,23 +123,9 @@ def answers_of(
     evaluation
         What the response says of the samples, where that is known.
 
-    Raises
-    ------
-    InputError
-        Fewer than two folds, or fewer than two samples for each.
-    SolveError
-        More samples failed.
-
     References
     ----------
     k folds of n/k samples each, drawn without replacement: Stone 1974, J. R. Stat. Soc. B 36, 111–147.
-
-    Examples
-    --------
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> response, x = sum_of_sizes(6.0, 12.0).response, np.random.default_rng(1).normal(size=(100, 2))
-    >>> np.bincount(answers_of(response, x, SeedTree(1)).fold).tolist()
-    [20, 20, 20, 20, 20]
     """
     if not 2 <= folds <= x.shape[0] // FEWEST_OF_FOLD:
         raise InputError.at("surrogate", "folds", folds, f"2 to half of the {x.shape[0]} samples")
@@ -169,30 +155,11 @@ def cross_validate(candidate: Candidate, answers: Answers, quantile: float = 0.9
     quantile
         Share of the units below the quantile that is compared [-].
 
-    Raises
-    ------
-    InputError
-        A quantile outside 0 to 1.
-    SolveError
-        Not one prediction is good.
-
     Notes
     -----
     The clocked speed alone differs from run to run.
 
     Q² = 1 − Σ (y − ŷ)² / Σ (y − ȳ)², with ŷ and ȳ from the other folds: Stone 1974, J. R. Stat. Soc. B 36, 111–147.
-
-    Examples
-    --------
-    A sum is a quadratic form.
-
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> from tolalloc.sensitivity.surrogate.regression import RegressionCandidate, quadratic_regression
-    >>> response, x = sum_of_sizes(6.0, 12.0).response, np.random.default_rng(1).normal(size=(400, 2))
-    >>> made = {"columns": response.columns, "outputs": response.outputs}
-    >>> candidate = RegressionCandidate(name="quadratic", estimator=quadratic_regression, **made)
-    >>> round(cross_validate(candidate, answers_of(response, x, SeedTree(1))).q2, 3)
-    1.0
     """
     if not 0.0 < quantile < 1.0:
         raise InputError.at("surrogate", "quantile", quantile, "a number between 0 and 1")
@@ -274,13 +241,6 @@ def choose(
         Share of samples that may fail in the response [-].
     evaluation
         What the response says of the samples, where that is known.
-
-    Raises
-    ------
-    InputError
-        No candidate, too few samples, or a quantile outside 0 to 1.
-    SolveError
-        Too many samples failed.
 
     Notes
     -----

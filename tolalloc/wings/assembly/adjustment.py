@@ -139,11 +139,6 @@ def prepare_assembly(
     """Return an assembly with its files read and checked: a shipped chain or a file, and measured errors of its parts.
 
     The precision is Q in place of the chain's own [-].
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        The argument, or the file, row, field and value that are not allowed.
     """
     require_seed("assembly", seed)
     if precision is not None and not 0 <= precision <= LARGEST_STATE_WEIGHT:
@@ -157,15 +152,7 @@ def prepare_assembly(
 
 
 def assemble(request: AssemblyRequest, record: RunRecord) -> AssemblyResult:
-    """Return what is to be turned, what it leaves, what that does, and what tolerances cost.
-
-    Raises
-    ------
-    InputError
-        A measurement that tells nothing new, or a column that the reducer does not have.
-    SolveError
-        A unit without equilibrium.
-    """
+    """Return what is to be turned, what it leaves, what that does, and what tolerances cost."""
     plan, seeds = request.plan, SeedTree(request.seed).child("assembly")
     with record.stage("adjustment"):
         gains = tuned_gains(plan, plan.state_weight, plan.tolerances)

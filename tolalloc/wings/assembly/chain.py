@@ -29,16 +29,7 @@ class Part:
 
 @dataclass(frozen=True, kw_only=True)
 class DatumFlowChain:
-    """Parts in the order in which they are mounted, a chain or a tree from one datum.
-
-    Raises
-    ------
-    InputError
-        Two parts of one name or that move one column, parts that hang on each other in a circle, or a part mounted
-        before what it stands on.
-    UnknownNameError
-        A part on something that is neither a part nor the datum.
-    """
+    """Parts in the order in which they are mounted, a chain or a tree from one datum."""
 
     datum: str  # Name of the characteristic that all others are measured against
     parts: tuple[Part, ...]  # The parts in the order of assembly

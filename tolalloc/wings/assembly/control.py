@@ -97,11 +97,6 @@ def kalman_filter(
         Standard deviation of one reading, and of what an adjustment misses, per axis and step [rad].
     place
         File or caller for the sentence.
-
-    Raises
-    ------
-    InputError
-        A reading without noise is known without being taken, from others or from earlier ones.
     """
     identity = np.eye(space.states)
     gains, covariances = list[Float[np.ndarray, "state reading"]](), list[Float[np.ndarray, "state state"]]()

@@ -86,13 +86,7 @@ class Gains:
 
 
 def tuned_gains(plan: AssemblyPlan, state_weight: float, tolerances: Float[np.ndarray, "part 3"]) -> Gains:
-    """Return the gains at a precision Q whose filter expects parts of given tolerances [rad].
-
-    Raises
-    ------
-    InputError
-        A precision that is not 0 or above, or a reading without noise that is known before.
-    """
+    """Return the gains at a precision Q whose filter expects parts of given tolerances [rad]."""
     if not 0 <= state_weight < np.inf:
         raise InputError.at(plan.name, "precision", state_weight, "0 or above")
     # At a precision of 0 nothing is turned, and what is not turned misses nothing.
@@ -149,11 +143,6 @@ class StateWeightSweep:
 
 def state_weight_sweep(plan: AssemblyPlan, state_weights: Float[np.ndarray, " state_weight"]) -> StateWeightSweep:
     """Return what is to be expected of an assembly over the precision weight, ascending [-].
-
-    Raises
-    ------
-    InputError
-        A reading without noise is known without being taken, from others or from earlier ones.
 
     Notes
     -----

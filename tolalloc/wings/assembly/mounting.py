@@ -230,13 +230,6 @@ def best_mounting(
         Starts of the search for several units; for one unit all mountings are tried [-].
     largest_failed_share
         Largest share of units without an answer [-].
-
-    Raises
-    ------
-    InputError
-        No start.
-    SolveError
-        Too many units have no answer, or one of every mounting met.
     """
     if starts < 1:
         raise InputError.at("mounting", "number of starts", starts, "1 or more")
@@ -267,15 +260,7 @@ def best_mounting(
 
 
 def random_mounting(stock: PartStock, response: Response, count: int, seeds: SeedTree) -> RandomMountings:
-    """Return what random mountings of the same parts do; for one unit, all mountings, each once.
-
-    Raises
-    ------
-    InputError
-        No mounting is asked for.
-    SolveError
-        Too many units have no answer.
-    """
+    """Return what random mountings of the same parts do; for one unit, all mountings, each once."""
     if count < 1:
         raise InputError.at("random mounting", "number of mountings", count, "1 or more")
     one, generator = stock.units == 1, seeds.generator()
@@ -344,11 +329,6 @@ def prepare_mounting(
     """Return the parts with their CSV file read and checked, for the reducer of a preset or TOML file.
 
     The torque on the carrier is the reducer's test torque unless given, negative where it resists the rotation [N·m].
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        The argument, or the file, row, field and value that are not allowed.
     """
     require_seed("mounting", seed)
     if not 1 <= starts <= MOST_STARTS:
@@ -367,13 +347,7 @@ def prepare_mounting(
 
 
 def mount(request: MountingRequest, record: RunRecord) -> MountingResult:
-    """Return who goes where, how it is turned there, and what that is worth beside chance.
-
-    Raises
-    ------
-    SolveError
-        Too many units have no answer.
-    """
+    """Return who goes where, how it is turned there, and what that is worth beside chance."""
     seeds = SeedTree(request.seed).child("mounting")
     kernel, stock = replace(request.kernel, observe=record.observe), request.stock
     with record.stage("search"):

@@ -138,13 +138,7 @@ class TransmissionEffect:
 
 @dataclass(frozen=True, kw_only=True)
 class OrientationResponse:
-    """Transmission of a reducer over the final orientations of its parts; every other error is zero.
-
-    Raises
-    ------
-    InputError
-        The chain moves a column that the model does not have, or none at all.
-    """
+    """Transmission of a reducer over the final orientations of its parts; every other error is zero."""
 
     model: EquivalentModel  # The reducer
     chain: DatumFlowChain  # Its parts, and which columns of the model their orientations move
@@ -225,13 +219,6 @@ def transmission_effect(
         Q [-].
     observe
         Told the statuses of each chunk.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        The reducer cannot be read, or does not have a column that the chain moves.
-    SolveError
-        The first assembly or too many others have no answer.
     """
     reducer = load_reducer(plan.reducer)
     torque = reducer.load.test_torque

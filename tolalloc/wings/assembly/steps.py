@@ -137,13 +137,6 @@ def state_space(
 def check_steps(chain: DatumFlowChain, steps: Sequence[AssemblyStep], place: str) -> None:
     """Refuse steps that cannot be carried out, in a sentence about a place, such as their file.
 
-    Raises
-    ------
-    InputError
-        A part is mounted twice or never, or a part is adjusted or measured before it is mounted.
-    UnknownNameError
-        A name that no part has.
-
     Notes
     -----
     Parts that are not there can be turned by `steps_in_order` with ``all`` only, zhang2025's own way.

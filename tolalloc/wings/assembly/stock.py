@@ -30,13 +30,7 @@ Mountings = Int[np.ndarray, "_unit _place 2"]
 
 @dataclass(frozen=True, kw_only=True)
 class PartStock:
-    """Parts that make whole units.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        The parts make no whole units, or one has an error that the response does not take.
-    """
+    """Parts that make whole units."""
 
     reducer: Reducer  # Nominal design
     parts: tuple[MeasuredPart, ...]  # The parts; the first of each kind make the first unit as it comes
@@ -156,13 +150,6 @@ class MeasuredPart:
 def count_units(parts: Sequence[MeasuredPart], places: Sequence[Place], origin: Path | str) -> int:
     """Return how many units the parts make [-].
 
-    Raises
-    ------
-    UnknownNameError
-        A part of a kind that fits nowhere.
-    InputError
-        There is no part, two have one name, or they make no whole number of units.
-
     Notes
     -----
     A kind of which there is no part at all counts as exact.
@@ -188,11 +175,6 @@ def load_parts(path: str | Path, reducer: Reducer) -> tuple[MeasuredPart, ...]:
     """Return the parts of a CSV file with the columns ``part, kind, error, value, unit``, in the order of the file.
 
     A value is in µm, or in arcsec for an angle; the reducer says what kinds of parts there are.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        The file, row, column and value that are not allowed, or the parts make no whole number of units.
     """
     table = read_text_table(Path(path))
     if table.headers != HEADERS:

@@ -46,13 +46,7 @@ class AngularLimits:
 
 
 def requirements_of(plan: AssemblyPlan) -> AngularRequirements:
-    """Return the requirements of a plan.
-
-    Raises
-    ------
-    InputError
-        It states none.
-    """
+    """Return the requirements of a plan."""
     if plan.requirements is None:
         raise InputError.at(plan.name, "requirements", "not stated", "limits and costs of angular tolerances")
     return plan.requirements
@@ -60,11 +54,6 @@ def requirements_of(plan: AssemblyPlan) -> AngularRequirements:
 
 def angular_limits(plan: AssemblyPlan) -> AngularLimits:
     """Return the limits of a plan; what has no limit gets no row.
-
-    Raises
-    ------
-    InputError
-        It states no requirements.
 
     Notes
     -----
@@ -84,11 +73,6 @@ def angular_limits(plan: AssemblyPlan) -> AngularLimits:
 
 def angular_problem(plan: AssemblyPlan, errors: FinalErrors) -> AllocationProblem:
     """Return the allocation with tolerances and stacks in arcseconds, for the gains of given final errors.
-
-    Raises
-    ------
-    InputError
-        The plan states no requirements, or a cost of an unknown form.
 
     Notes
     -----
@@ -162,13 +146,7 @@ class AngularAllocation:
 
 
 def allocated(plan: AssemblyPlan, gains: Gains) -> AngularAllocation | None:
-    """Return the cheapest tolerances for given gains, or None where no tolerances keep the limits.
-
-    Raises
-    ------
-    InputError
-        The plan states no requirements, or costs of an unknown form.
-    """
+    """Return the cheapest tolerances for given gains, or None where no tolerances keep the limits."""
     problem = angular_problem(plan, gains.errors)
     found = allocate(problem)
     if not isinstance(found, Solution):
@@ -189,13 +167,7 @@ def allocated(plan: AssemblyPlan, gains: Gains) -> AngularAllocation | None:
 
 
 def allocate_angles(plan: AssemblyPlan, state_weight: float | None = None) -> AngularAllocation:
-    """Return the cheapest tolerances, at the plan's precision or another Q [-], with the filter that expects its own.
-
-    Raises
-    ------
-    InputError
-        The plan states no requirements, or no tolerances keep its limits.
-    """
+    """Return the cheapest tolerances, at the plan's precision or another Q [-], the filter expecting its own."""
     gains = tuned_gains(plan, plan.state_weight if state_weight is None else state_weight, plan.tolerances)
     found = allocated(plan, gains)
     if found is None:
@@ -299,11 +271,6 @@ def retuned_allocation(plan: AssemblyPlan, most_filters: int = 100) -> RetunedAl
     most_filters
         Filters after which the iteration ends, settled or not [-].
 
-    Raises
-    ------
-    InputError
-        As `allocate_angles`.
-
     Notes
     -----
     Every allocation keeps the limits with its own gains, so each is one that can be built, whether or not the iteration
@@ -355,11 +322,6 @@ def best_state_weight(
         Precisions between which the best one is looked for, above 0 [-].
     points
         Precisions of the curve, evenly spread by their logarithms [-].
-
-    Raises
-    ------
-    InputError
-        The plan states no requirements, its limits are kept at no point, or there is no range to search.
 
     Notes
     -----

@@ -84,13 +84,7 @@ class CatalogueResult:
 
 
 def identify_from_catalogue(reducer: Reducer) -> CatalogueResult:
-    """Return the factor on the stiffness of all rolling bearings that gives the catalogue's torsional rigidity.
-
-    Raises
-    ------
-    InputError
-        The reducer states no catalogue, or no stiffness of its bearings gives that rigidity.
-    """
+    """Return the factor on the stiffness of all rolling bearings that gives the catalogue's torsional rigidity."""
     from scipy.optimize import brentq
 
     stated = reducer.catalogue

@@ -121,13 +121,6 @@ def diagnose(
     vary [m]. The named sources contain the dominant one with the probability ``level`` [-]. Each stage of the work is
     told as it begins. What gauges have read of its parts already narrows them too.
 
-    Raises
-    ------
-    InputError
-        Too few readings, a level that is no probability, or sources that stand on no drawing.
-    SolveError
-        More of the curves failed than may fail.
-
     Notes
     -----
     Bayes' rule with the drawings as prior. The map from errors to curve has kinks wherever a pin takes over, and one
@@ -271,15 +264,7 @@ class DiagnosisResult:
 
 
 def diagnose_unit(request: DiagnosisRequest, record: RunRecord) -> DiagnosisResult:
-    """Return what the curve of a unit tells of its parts, and keep account of the curves that are solved.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        The file, row, field and value that are not allowed.
-    SolveError
-        Too many curves failed.
-    """
+    """Return what the curve of a unit tells of its parts, and keep account of the curves that are solved."""
     kernel, assumed = bind(request.reducer, request.errors, request.torque_nm, PLACE, request.neglected)
     require_torque(request.curve, kernel.torque)
     cleaned = clean_curve(load_readings(request.curve, ANGLE, TRANSMISSION_ERROR), request.angle_offset_deg * DEGREE)

@@ -49,13 +49,7 @@ STARTS = 8
 
 @dataclass(frozen=True, kw_only=True)
 class IdentificationRequest:
-    """What is to be identified.
-
-    Raises
-    ------
-    InputError
-        No unknown besides the bias, one of them twice, or a negative seed.
-    """
+    """What is to be identified."""
 
     parameters: tuple[Parameter, ...]  # The unknowns
     seed: int = 1  # Seed of every random number [-]
@@ -127,13 +121,6 @@ def identify(
     """Return the stiffnesses, their uncertainty, and how simpler explanations compare.
 
     The stiffness of the reducer is where every search begins.
-
-    Raises
-    ------
-    InputError
-        Too few readings or units for the parameters.
-    SolveError
-        A unit has no equilibrium.
     """
     data, seeds = data_of(measurements, request.data), SeedTree(request.seed).child("identification")
     _require_visible(request, data)

@@ -115,13 +115,7 @@ class IdentificationProblem:
 
 
 def require_enough(problem: IdentificationProblem) -> None:
-    """Refuse data that cannot fix so many parameters whatever they read.
-
-    Raises
-    ------
-    InputError
-        Fewer readings, or for peak-to-peaks fewer units, than parameters.
-    """
+    """Refuse data that cannot fix so many parameters whatever they read."""
     asked, units = len(problem.parameters), problem.data.units.size
     names = ", ".join(item.symbol for item in problem.parameters)
     if problem.data.only_peak_to_peak and units <= asked:
@@ -198,11 +192,6 @@ def gauss_newton(
     """Return the least objective that any start leads to.
 
     One row for each start; the seed that they came from is for the record.
-
-    Raises
-    ------
-    SolveError
-        A unit has no equilibrium on the way.
 
     References
     ----------

@@ -114,13 +114,7 @@ class PredictedOrder:
 
 
 def load_lot_curves(folder: Path, model: ReducerModel, errors: ErrorModel, noise: Noise) -> LotCurves:
-    """Return the waves of the curves in a folder, a CSV file per unit; all faults of its files together.
-
-    Raises
-    ------
-    InputError
-        The folder, file, row, field and value that are not allowed.
-    """
+    """Return the waves of the curves in a folder, a CSV file per unit; all faults of its files together."""
     files = sorted(folder.glob("*.csv"))
     least, most = CURVES
     if not least <= len(files) <= most:
@@ -162,11 +156,6 @@ def _require_close(file: Path, curve: Cleaned, highest: float) -> None:
 
 def predicted_orders(curves: LotCurves, lots: int, seed: int) -> tuple[PredictedOrder, ...]:
     """Return what so many simulated lots of the drawing do in every order.
-
-    Raises
-    ------
-    SolveError
-        More of the drawing's units failed to solve than may fail.
 
     Notes
     -----

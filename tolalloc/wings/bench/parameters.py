@@ -101,13 +101,6 @@ def parameter(
         Relative standard deviation that is known beforehand, for the bias in arcseconds [-].
     place
         Where the user wrote it, for errors.
-
-    Raises
-    ------
-    UnknownNameError
-        No such parameter.
-    InputError
-        Bounds in the wrong order or without meaning, the start outside of them, a prior that is not positive.
     """
     known = [own for own in SYMBOLS if own in (BIAS, TORQUE) or getattr(reducer.stiffness, own)]
     if name not in known:

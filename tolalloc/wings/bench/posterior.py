@@ -78,11 +78,6 @@ def thinned(curve: MeasuredCurve, noise: Noise, most: int) -> ThinnedCurve:
     """Return those readings of a measured curve that stand nearest to equally spaced angles.
 
     There are ``most`` such angles in a turn; closer readings share what the model leaves out and tell little more.
-
-    Raises
-    ------
-    InputError
-        Fewer than `FEWEST_READINGS` readings.
     """
     step = TURN / most
     place = np.mod(curve.carrier_angle, TURN) / step

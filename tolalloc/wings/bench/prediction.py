@@ -80,13 +80,7 @@ def centred(values: Float[np.ndarray, "..."], blocks: tuple[ReadingBlock, ...]) 
 
 
 def data_of(measurements: Measurements, place: str) -> AllReadings:
-    """Return the readings of all units in one row; the place where they were read stands in errors.
-
-    Raises
-    ------
-    InputError
-        Some noise is stated and some is not, or kinds are mixed without any: their weights would be a guess.
-    """
+    """Return the readings of all units in one row; the place where they were read stands in errors."""
     parts = list(_parts(measurements))
     stated = [noise for *_, noise in parts]
     if len({part[0] for part in parts}) > 1 or any(noise is not None for noise in stated):

@@ -62,16 +62,7 @@ EXACT = GaugeError()
 
 @dataclass(frozen=True, kw_only=True)
 class NormalLaw:
-    """Of normal readings: z = (x̄ − μ)·√n/σ is normal, t = (x̄ − μ)·√n/s Student's, (n − 1)·s²/σ² is χ².
-
-    Examples
-    --------
-    A mean of 25 parts that is 0.6 σ off is three standard errors off:
-
-    >>> law = NormalLaw(parts=25)
-    >>> round(law.shift_probability(0.6), 4), [round(end, 3) for end in (*law.t_ends, *law.s_ends)]
-    (0.0027, [-2.064, 2.064, 0.719, 1.281])
-    """
+    """Of normal readings: z = (x̄ − μ)·√n/σ is normal, t = (x̄ − μ)·√n/s Student's, (n − 1)·s²/σ² is χ²."""
 
     parts: int  # Of a lot [-]
     seen: float = 1.0  # Standard deviation of a reading over that of the process, above 1 by a gauge that errs [-]

@@ -105,13 +105,7 @@ def _last(prices: Mapping[str, float], source: Source) -> float:
 
 
 def load_repair(path: Path, errors: ErrorModel) -> Repair:
-    """Return the prices of a TOML file.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        The file, field and value that are not allowed, or a name that means none of the sources that vary.
-    """
+    """Return the prices of a TOML file."""
     repair = validated(Repair, read_toml(path), path)
     known, faults = known_as(errors.active), Faults()
     for field in ("change", "minutes", "gauges", "read"):
@@ -188,11 +182,6 @@ def repair_costs(
 
     A unit that is left as it is or has got new parts costs `Repair.missed` if its peak-to-peak is beyond the limit, or
     not known. New parts are drawn from the drawing, `REDRAWN` times for each unit, independently of all others.
-
-    Raises
-    ------
-    SolveError
-        Too many units have a curve that failed.
     """
     owner, names = np.array(errors.source_of_column), tuple(repair.change)
     cases = [units]

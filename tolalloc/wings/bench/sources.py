@@ -124,11 +124,6 @@ def reductions(problem: CurveProblem, deviations: Float[np.ndarray, "unit column
     """Return by how much each unit's peak-to-peak falls when one source is put in the middle of its zone [arcsec].
 
     The readings of the problem play no part.
-
-    Raises
-    ------
-    SolveError
-        Too many units have a curve that failed.
     """
     owner, middle = np.array(problem.errors.source_of_column), problem.deviations(np.zeros((1, problem.size)))
     names = list(dict.fromkeys(problem.errors.source_of_column))

@@ -26,13 +26,7 @@ _Piece = tuple[Int[np.ndarray, " time"], _OverTime, _OverTime, _OverTime, _OverT
 
 @dataclass(frozen=True)
 class SpeedProfile:
-    """A quantity over time: given at some times, blended in between, held before the first and after the last.
-
-    Raises
-    ------
-    InputError
-        Times that do not increase, or not one finite value for each.
-    """
+    """A quantity over time: given at some times, blended in between, held before the first and after the last."""
 
     times: tuple[float, ...]  # Increasing times [s]
     values: tuple[float, ...]  # The quantity at these times [rad/s or N·m]
@@ -112,11 +106,6 @@ def motion_of(
 
     θc = θ0 + ∫Ω dt/i with the reducer's ratio i = 1 + (Z2/Z1)·zp; input speed Ω [rad/s], torque on the carrier [N·m],
     duration of all steps [s], θc at time 0 [rad].
-
-    Raises
-    ------
-    InputError
-        A duration that is not positive, or no step.
 
     Examples
     --------
@@ -199,13 +188,7 @@ ASSUMPTIONS = (
 
 @dataclass(frozen=True, kw_only=True)
 class Inertia:
-    """Masses and moments of inertia of one part of each kind.
-
-    Raises
-    ------
-    InputError
-        A value that is not positive and finite.
-    """
+    """Masses and moments of inertia of one part of each kind."""
 
     # Masses; the planet's with its crankshaft [kg]
     sun: float
@@ -235,11 +218,6 @@ def inertia_of(reducer: Reducer, density: float = 7850.0, output_inertia: float 
 
     Solid cylinders of radius R and width b have m = ρ·π·R²·b and J = m·R²/2. The density ρ is that of all parts
     [kg/m³]; the carrier turns the output inertia besides its own [kg·m²].
-
-    Raises
-    ------
-    InputError
-        A density that is not positive, or a negative output inertia.
 
     Examples
     --------
@@ -279,11 +257,6 @@ class Damping:
 
     A mode of angular frequency ω that strains one damped interface alone has the damping ratio
     mass_proportional/(2ω) + (stiffness_proportional + its own)·ω/2.
-
-    Raises
-    ------
-    InputError
-        A factor that is negative or not finite.
     """
 
     mass_proportional: float = 0.0  # Damping per mass of every coordinate [1/s]
@@ -364,11 +337,6 @@ def generalised_alpha(spectral_radius: float) -> Integrator:
 
     αm = (2ρ − 1)/(ρ + 1), αf = ρ/(ρ + 1), γ = ½ + αf − αm, β = (γ + ½)²/4 with the spectral radius ρ from 0 to 1;
     stable at any step for linear springs, and of second order.
-
-    Raises
-    ------
-    InputError
-        A spectral radius outside 0 … 1.
 
     References
     ----------

@@ -32,13 +32,7 @@ _KNOTS = 513  # of a smooth step: its straight pieces miss the cubic by less tha
 
 @dataclass(frozen=True, kw_only=True)
 class TimeCourse:
-    """A quantity over time: straight between its knots, constant before the first and after the last.
-
-    Raises
-    ------
-    InputError
-        Knots that do not rise, or a number that is not finite.
-    """
+    """A quantity over time: straight between its knots, constant before the first and after the last."""
 
     time: Float[np.ndarray, " knot"]  # Knots, rising [s]
     value: Float[np.ndarray, " knot"]  # Speed or torque at the knots [rad/s or N·m]
@@ -93,19 +87,6 @@ def part_errors(reducer: Reducer, errors: Mapping[str, float]) -> PartErrors:
     ``carrier.assembly``, ``each_pin.position.{k}`` (x radial, y tangential), ``each_pin.diameter.{k}``,
     ``pin.diameter`` and ``housing.groove.radius``.
 
-    Raises
-    ------
-    InputError
-        Another column.
-
-    Own derivation: effective pin radius error = pin deviation − groove deviation, as theory page (18).
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> found = part_errors(load_reducer("rv40e_xi2015"), {"carrier.assembly.x": 4e-6, "pin.diameter": 1e-6})
-    >>> found.carrier.tolist(), float(found.pin_radius[0])
-    ([4e-06, 0.0], 1e-06)
     """
     cranks, discs, pins = reducer.crank_count, reducer.disc_count, reducer.cycloid_stage.pin_count
     found = PartErrors(
@@ -156,25 +137,7 @@ def _forms(reducer: Reducer) -> tuple[Float[np.ndarray, "disc angle"], Float[np.
 
 
 def mesh_of(reducer: Reducer, errors: PartErrors) -> Mesh:
-    """Return the teeth and pins of a reducer whose pins deviate.
-
-    Raises
-    ------
-    InputError
-        A rotation modification.
-
-    Own derivation: pins stand at (Rp + radial + i·tangential)·e^(iφ), teeth are ground by Rp + Δr_p and r_rp + Δr_rp.
-
-    Examples
-    --------
-    xi2015 states a shift of 8 µm with a sign of its own: the circle at grinding is Rp − 8 µm.
-
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> reducer = load_reducer("rv40e_xi2015")
-    >>> mesh = mesh_of(reducer, part_errors(reducer, {}))
-    >>> round((mesh.circle - reducer.cycloid_stage.pin_circle_radius) / 1e-6, 3)  # [µm]
-    -8.0
-    """
+    """Return the teeth and pins of a reducer whose pins deviate."""
     stiffness, stage = reducer.stiffness, reducer.cycloid_stage
     if turned := round(reducer.modification.rotation / MICRORADIAN, 6):
         raise InputError.at(f"virtual prototype of {reducer.name}", "rotation modification [µrad]", turned, "0")
@@ -202,13 +165,7 @@ def mesh_of(reducer: Reducer, errors: PartErrors) -> Mesh:
 
 
 def engine() -> Any:
-    """Return the module of the multibody engine.
-
-    Raises
-    ------
-    InputError
-        It is not installed.
-    """
+    """Return the module of the multibody engine."""
     try:
         return import_module("exudyn")
     except ImportError as missing:
@@ -339,12 +296,6 @@ def with_rigid_bearings(reducer: Reducer) -> Reducer:
     """Return the reducer with bearings that do not yield, as joints of a rigid-body model do not.
 
     Own derivation: K → 1e13 N/m.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> with_rigid_bearings(load_reducer("rv40e_xi2015")).stiffness.carrier_bearing  # [N/m]
-    10000000000000.0
     """
     rigid = replace(reducer.stiffness, crank_disc_bearing=RIGID, crank_carrier_bearing=RIGID, carrier_bearing=RIGID)
     return replace(reducer, stiffness=rigid)
@@ -354,12 +305,6 @@ def _reference_places(reducer: Reducer) -> Float[np.ndarray, "body 2"]:
     """Return the centres of carrier, cranks and discs at the carrier angle 0 [m].
 
     Own derivation: a_sp·e^(iP) of the cranks and e·e^(iβ) of the discs, at θc = 0.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> _reference_places(load_reducer("rv40e_xi2015")).round(6).tolist()[3:]  # discs, e = 1.3 mm off, opposite
-    [[0.0013, 0.0], [-0.0013, 0.0]]
     """
     at = Positions(reducer, np.zeros(1))
     turns = [at.crank_position(crank)[0] for crank in range(reducer.crank_count)]
@@ -542,13 +487,6 @@ def simulate_prototype(
     inertia of how its speed leaves the nominal one; contacts of pins and teeth have none. The speed is the sun's
     [rad/s], the torque that on the carrier, negative against the rotation [N·m]. Errors are columns of
     `tolalloc.wings.motion.prototype.part_errors` [m]; progress is told which share is done.
-
-    Raises
-    ------
-    InputError
-        The engine is not installed, or a design, damping or error that the prototype does not know.
-    SolveError
-        A time step without a solution.
 
     Notes
     -----

@@ -57,13 +57,7 @@ LOAD_TIME = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class SimulationRequest:
-    """What is to be simulated; as it stands, the run of xi2015.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        A number out of range or an unknown engine.
-    """
+    """What is to be simulated; as it stands, the run of xi2015."""
 
     reducer: str = "rv40e"  # Preset or TOML file
     unit: str = "exact"  # Shipped unit or TOML file
@@ -172,21 +166,7 @@ class PreparedSimulation:
 
 
 def prepare_simulation(asked: SimulationRequest) -> PreparedSimulation:
-    """Return a simulation with its files read and checked.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        The file, field or argument that is not allowed, or an engine that is not installed.
-
-    Examples
-    --------
-    The run of xi2015: a crank turn takes 60 s·i/(525·zc), and 0.5 s remain at full speed and load.
-
-    >>> prepared = prepare_simulation(SimulationRequest())
-    >>> f"{prepared.crank_turn:.4f} s, {prepared.crank_turns} whole crank turns"
-    '0.2374 s, 2 whole crank turns'
-    """
+    """Return a simulation with its files read and checked."""
     unit, designed = load_unit(asked.unit), load_reducer(asked.reducer)
     _ = inertia_of(designed)  # a single stage or a centre gear, of which no masses are known, is refused first
     reducer = unit.as_built(designed)
@@ -417,11 +397,6 @@ def simulate(prepared: PreparedSimulation, progress: Progress) -> SimulationResu
     """Return what a reducer does over time, and the static model at the same angles.
 
     The simulated milliseconds are told as progress.
-
-    Raises
-    ------
-    SolveError
-        A time step or an angle without equilibrium.
     """
     asked, motion = prepared.asked, prepared.motion
     progress.begin(f"in motion, {asked.engine}", int(1e3 * asked.duration + 1e-6), "ms")

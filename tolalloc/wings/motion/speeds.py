@@ -87,13 +87,6 @@ def modes(
     first one is zero. The modes hold for vibrations under which the same pins keep touching, at speeds whose forces of
     inertia are small beside the load.
 
-    Raises
-    ------
-    InputError
-        Play, tilted discs or the logarithmic contact law: their stiffness changes with the least vibration.
-    SolveError
-        An angle without a static equilibrium.
-
     Notes
     -----
     Theory page (64).
@@ -145,13 +138,6 @@ def critical_speeds(
     Looked at are output speeds between a slowest and a fastest one [rad/s]. An order n excites with n·Ω/2π at the
     output speed Ω. A mode is told by its rank in frequency at every angle, not by its shape; where two frequencies
     cross over a turn, their bands share the crossing.
-
-    Raises
-    ------
-    InputError
-        An order below 1.
-
-    Own derivation: Ω = 2πf/n, over the lowest and highest f of a mode within a turn.
 
     Examples
     --------
@@ -214,14 +200,6 @@ def orders_against_speed(
     Output speeds [rad/s], waves per output turn, torque on the carrier [N·m], the others as
     in `tolalloc.wings.motion.stepping.simulate`. A wave at resonance needs some twenty time steps; of the turns
     of each run the last is looked at.
-
-    Raises
-    ------
-    InputError
-        A speed that is not positive, fewer than two turns, or too few steps for an order.
-
-    Equations (61) and (63) of the theory page, own derivation: as the speed goes to 0 the orders are those of the
-    static curve.
 
     Examples
     --------

@@ -48,13 +48,7 @@ class StepTables(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Steps:
-    """Everything but the samples of a simulation.
-
-    Raises
-    ------
-    InputError
-        Damping of an interface that is not there or has play.
-    """
+    """Everything but the samples of a simulation."""
 
     # As in `tolalloc.wings.motion.stepping.simulate`; numbers in SI units [-]
     model: EquivalentModel
@@ -246,11 +240,6 @@ def simulate(
 
     Errors are deviations in the order of the model's columns [m, angles rad]. The whole state is given at the steps
     with the numbers to observe, each once.
-
-    Raises
-    ------
-    InputError
-        Damping of an interface that is not there or has play.
 
     Notes
     -----

@@ -328,15 +328,6 @@ def settle(law, discs, tables, v, batch, done, steps):
     References
     ----------
     Own derivation.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.equivalent.model import EquivalentModel
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
-    >>> found = model.equilibria(np.zeros((1, len(model.columns))), -167.0, np.zeros(1))
-    >>> bool(found.residual.max() <= 1e-11)
-    True
     """
     zero, width = spread(0.0), batch.q.shape[1]
     touching, careful = press(law, discs, tables, v, batch)

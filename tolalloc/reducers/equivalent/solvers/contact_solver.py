@@ -81,13 +81,6 @@ def along(by_disc, play_by_retained, vector, compression, play):
     """Set the compressions of pins and elements that a displacement gives.
 
     δ = D·v for pins and elements with play [m], theory page (21), own derivation.
-
-    Examples
-    --------
-    >>> pin, no_play, found = np.array([[[1.0], [0.0], [0.05]]]), np.empty((0, 2, 3)), np.empty(1)
-    >>> along.py_func(pin, no_play, np.array([1e-6, 0.0, 1e-4]), found, np.empty((0, 2)))
-    >>> (1e6 * found).round(6).tolist()  # 1 µm along the normal and 0.1 mrad at a lever of 50 mm [µm]
-    [6.0]
     """
     discs, _, pins = by_disc.shape
     for d in range(discs):
@@ -152,19 +145,6 @@ def assemble(problem, compression, play, q, gradient, tangent):
     """Set gradient and lower tangent at q; return largest force, largest sum of cancelling terms, pins in contact.
 
     ∂V/∂q = S·q − f + Σ D·F and its derivative S + Σ k·D·Dᵀ, theory page (21), own derivation [N, N/m].
-
-    Examples
-    --------
-    >>> empty, two = np.empty(0), np.empty((0, 2))
-    >>> pin, one = np.array([[[1.0], [0.0], [0.05]]]), np.ones(1)
-    >>> own = Problem(
-    ...     LINEAR, np.zeros((3, 3)), np.zeros(3), pin, one, 2e8 * one, one, 0.0 * one,
-    ...     np.empty((0, 2, 3)), two, empty, empty,
-    ... )  # fmt: skip
-    >>> gradient, tangent = np.zeros(3), np.zeros((3, 3))
-    >>> _ = assemble.py_func(own, np.array([5e-7]), two, np.zeros(3), gradient, tangent)
-    >>> gradient.round(6).tolist()  # 0.5 µm at 200 N/µm, and at its lever of 50 mm [N, N, N·m]
-    [100.0, 0.0, 5.0]
     """
     size, pins = problem.force.size, problem.by_disc.shape[2]
     largest, cancelling, touching = 0.0, 0.0, 0
@@ -224,14 +204,6 @@ def solve_tangent(tangent, gradient, step):
 
     LLᵀ·step = −gradient, Cholesky's, for symmetric positive semidefinite tangents; the replaced pivot is an own
     derivation.
-
-    Examples
-    --------
-    >>> step = np.empty(2)
-    >>> solve_tangent.py_func(np.array([[4.0, 0.0], [2.0, 3.0]]), np.array([-8.0, -8.0]), step)
-    False
-    >>> step.round(9).tolist()  # 4·1 + 2·2 = 8, 2·1 + 3·2 = 8
-    [1.0, 2.0]
     """
     size = gradient.size
     largest = 0.0
@@ -413,15 +385,6 @@ def equilibrium(problem, q, work):
     References
     ----------
     Own derivation: Newton's method with an exact line search.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.equivalent.model import EquivalentModel
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
-    >>> found = model.equilibria(np.zeros((1, len(model.columns))), -167.0, np.zeros(1))
-    >>> int(found.status[0, 0]) == CONVERGED, int(found.pins_in_contact.max())  # without errors half of 80 pins
-    (True, 38)
     """
     status, ratio, touching = _newton(problem, q, work)
     if status == NOT_CONVERGED and problem.clearance.size:
@@ -435,16 +398,6 @@ def values_of(errors, torque, layout, mapped, values):
     """Fill the values [sample, value] of all samples; return which samples are finite.
 
     value = nominal + Σ factor·column, own derivation [m, rad].
-
-    Examples
-    --------
-    >>> from types import SimpleNamespace
-    >>> one = SimpleNamespace(nominal=np.zeros(2), value=np.array([1]), column=np.array([0]), factor=np.array([-1.0]))
-    >>> found = np.empty((1, 2))
-    >>> values_of.py_func(np.array([[3e-6]]), -167.0, SimpleNamespace(end=2, torque=0), one, found).tolist()
-    [True]
-    >>> found.tolist()  # torque, and a groove that is 3 µm too large
-    [[-167.0, -3e-06]]
     """
     finite = np.empty(errors.shape[0], np.bool_)
     for s in range(errors.shape[0]):
@@ -518,16 +471,6 @@ def fill_loads(at, tables, layout, values, force, undisturbed, play_offset):
     follows from the levers there, and not from the compressions at the nodes.
 
     f = F·ε and θca = t·ε at undisplaced discs, theory page (19) and (20), own derivation [N, rad].
-
-    Examples
-    --------
-    Held at its discs the carrier of an RV-20E turns by t per torque [rad/(N·m)]:
-
-    >>> from tolalloc.reducers.equivalent.condensation import condense
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> found = condense(load_reducer("rv20e_liu2020"), (1,), np.zeros(1))
-    >>> f"{found.carrier_by_load[0, -1]:.2e}"
-    '7.32e-08'
     """
     rotation = 0.0
     force[:] = 0.0
@@ -550,16 +493,6 @@ def sample_constants(problem, turn, face_width, layout, values):
 
     c = max(c, 0) [m]; half tilt = b/2·|γ_y·n_x − γ_x·n_y| [m], theory page (31); turned flanks take δ·r_d·|S| from the
     compressions [m], theory page (35), own derivation.
-
-    Examples
-    --------
-    >>> from types import SimpleNamespace
-    >>> none = np.zeros((1, 3, 1))
-    >>> own = SimpleNamespace(clearance=np.empty(1), by_disc=none, half_tilt=np.ones(1))
-    >>> layout = SimpleNamespace(clearance=0, flank=1, tilt=2, pins=1)
-    >>> sample_constants.py_func(own, np.array([1.0, 0.0]), 0.01, layout, np.array([-2e-6, 0.0, 0.0, 0.0]))
-    >>> own.clearance.tolist(), own.half_tilt.tolist()  # a clearance that its deviations make negative is none
-    ([0.0], [0.0])
     """
     for e in range(problem.clearance.size):
         problem.clearance[e] = max(values[layout.clearance + e], 0.0)

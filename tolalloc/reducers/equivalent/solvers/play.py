@@ -369,15 +369,6 @@ def move_with_play(law, discs, tables, v, batch, play, running):
     References
     ----------
     Own derivation.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.equivalent.model import EquivalentModel
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> model = EquivalentModel(load_reducer("cd29"))
-    >>> found = model.equilibria(np.zeros((1, len(model.columns))), -60.0, np.zeros(1))
-    >>> bool(found.residual.max() <= 1e-11)
-    True
     """
     zero, width = spread(0.0), batch.q.shape[1]
     touching, far = press(law, discs, tables, v, batch)

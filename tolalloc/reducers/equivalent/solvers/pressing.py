@@ -95,14 +95,6 @@ def line_contact(stiffness, log_length, depth):
     References
     ----------
     Hertz's line contact, theory page (30); polynomials and Halley's steps are an own derivation.
-
-    Examples
-    --------
-    The law itself, 5 µm at C = 2e8 N/m and λ = 10 mm [N]:
-
-    >>> from tolalloc.reducers.cycloid.solvers.pins import _logarithmic
-    >>> round(float(_logarithmic.py_func(2e8, np.log(0.01), 5e-6)[0]), 1)
-    202.2
     """
     one = spread(1.0)
     goal = subtract(log_length, logarithm(depth))

@@ -171,15 +171,6 @@ def logarithm(typing, a):
     """Return the natural logarithms of positive normal numbers, each within two units in the last place.
 
     a = 2ᵏ·z with z between √½ and √2, ln z = 2·(s + s³/3 + s⁵/5 + …) with s = (z − 1)/(z + 1).
-
-    Examples
-    --------
-    The series for 1.25, s = 1/9, and the logarithm:
-
-    >>> import math
-    >>> series = 2 * sum((1 / 9) ** term / term for term in range(1, 24, 2))
-    >>> bool(abs(series - math.log(1.25)) < 1e-16)
-    True
     """
     integers = ir.VectorType(ir.IntType(64), WIDTH)
 
@@ -333,14 +324,6 @@ def newton_step(typing, discs, stiffness, contact, gradient, step, least):
     long.
 
     LDLᵀ·step = −gradient, own derivation of the replaced pivot; [N/m, N, m].
-
-    Examples
-    --------
-    What it solves, for two of its coordinates:
-
-    >>> import numpy as np
-    >>> np.linalg.solve(np.array([[4.0, 2.0], [2.0, 3.0]]), np.array([8.0, 8.0])).round(9).tolist()
-    [1.0, 2.0]
     """
     size = 3 * len(discs)
 

@@ -66,13 +66,7 @@ class Identify(Inquiry["tuple[Reducer, IdentificationRequest | None, Measurement
     ] = None
 
     def apart_from(self, report: Path | None) -> None:
-        """Refuse a stiffness file inside of the report's folder.
-
-        Raises
-        ------
-        InputError
-            The file would stand in the folder.
-        """
+        """Refuse a stiffness file inside of the report's folder."""
         file, folder = self.write_to, report.absolute() if report else None
         if file and folder and folder in (file.absolute(), *file.absolute().parents):
             raise InputError.of_argument(self.called, "write_to", str(file), "a file outside of the report's folder")
@@ -141,13 +135,7 @@ class Identify(Inquiry["tuple[Reducer, IdentificationRequest | None, Measurement
 
 
 def asked_parameters(reducer: Reducer, asked: Sequence[str], priors: Sequence[str]) -> tuple[Parameter, ...]:
-    """Return the unknowns as they are written: ``NAME`` or ``NAME=LOW:HIGH``, and ``NAME=DEVIATION``.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        What is not allowed.
-    """
+    """Return the unknowns as they are written: ``NAME`` or ``NAME=LOW:HIGH``, and ``NAME=DEVIATION``."""
     from tolalloc.wings.bench.parameters import parameter
 
     place, known = Identify.called, dict[str, float]()

@@ -73,13 +73,7 @@ class Simulate(Inquiry["PreparedSimulation"]):
 
 
 def simulated(prepared: PreparedSimulation, progress: Progress) -> Answer[SimulationResult]:
-    """Return the answer of a simulation, whose header names the unit.
-
-    Raises
-    ------
-    SolveError
-        A time step or an angle without equilibrium.
-    """
+    """Return the answer of a simulation, whose header names the unit."""
     from tolalloc.wings.motion.simulation import simulate
     from tolalloc.wings.motion.telling.simulation import SimulationTeller
 

@@ -79,18 +79,6 @@ def pin_contacts(mesh, disc, q, contact):
     References
     ----------
     Own derivation, as the exact distance of `tolalloc.reducers.cycloid.clearance.exact_clearance`.
-
-    Examples
-    --------
-    A pin at the root of a disc in its place is free by Δr_rp − Δr_p, a compression of −6 µm on xi2015's:
-
-    >>> from tolalloc.reducers.cycloid.clearance import exact_clearance
-    >>> from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> design = load_reducer("rv40e_xi2015")
-    >>> profile = ToothProfile(stage=design.cycloid_stage, modification=design.modification)
-    >>> round(-1e6 * float(exact_clearance([profile], np.zeros(1))[0, 0]), 3)
-    -6.0
     """
     centre = complex(q[0], q[1])
     crank = np.angle(centre)
