@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
+from tolalloc.capability.halving import halved
 from tolalloc.capability.indices import Limits
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.measured_parts import MeasuredParts
@@ -290,11 +291,7 @@ class ProcessDoubt:
         ends = limits.excess(centre + moved)
         reach = wider * np.abs(self.values[[0, -1]] - centre).max()
         low, high = np.min(ends, axis=0) - reach, np.max(ends, axis=0) + reach
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2.0
-            kept = self._beyond(limits, middle, moments) <= share
-            low, high = np.where(kept, low, middle), np.where(kept, middle, high)
-        return np.asarray(high)
+        return np.asarray(halved(lambda by: self._beyond(limits, by, moments) <= share, high, low, _HALVINGS))
 
     def margin(self, limits: Limits, share: float) -> float:
         """Return how much further inside the limits units must lie so that the share beyond is kept [output].

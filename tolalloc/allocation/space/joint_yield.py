@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float
 from tolalloc.allocation.space.output_sample import Control, DesignSample, LimitedSample, OutputSample, Surprises
 from tolalloc.allocation.space.problem import OneSidedConstraint, Stack
 from tolalloc.allocation.space.requirement import AtYield, Check, QuantileBound, Requirement
+from tolalloc.capability.halving import halved
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.linear_function import LinearLaw, NearPlane
 from tolalloc.capability.near_limit import largest_first
@@ -254,10 +255,7 @@ def _overlap(
     counted = beyond(float(np.exp(high)))
     excesses, weights = excesses[:, counted], weights[counted]
     if weights.sum() > room:
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2
-            fits = weights[beyond(float(np.exp(middle)))].sum() <= room
-            low, high = (middle, high) if fits else (low, middle)
+        low = halved(lambda by: weights[beyond(float(np.exp(by)))].sum() <= room, low, high, _HALVINGS)
     else:
         low = high
     return float(np.exp(low)) * (1.0 if wider == 1.0 else max(allowed, 0.5) / (joint.failures * drawn))
@@ -295,10 +293,7 @@ def _controlled_overlap(
 
     low = float(np.log(_LEAST_PART))
     if surprises(float(np.exp(high))).share(confidence) > joint.failures:
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2
-            fits = surprises(float(np.exp(middle))).share(confidence) <= joint.failures
-            low, high = (middle, high) if fits else (low, middle)
+        low = halved(lambda by: surprises(float(np.exp(by))).share(confidence) <= joint.failures, low, high, _HALVINGS)
     else:
         low = high
     overlap = float(np.exp(low))

@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float, Int
 
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.capability.experiment import Experiment
+from tolalloc.capability.halving import halved
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.linear_function import LinearFunction, LinearLaw, NearPlane
 from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo, ProcessDoubt
@@ -203,9 +204,7 @@ class LimitedSample:
         low, high = float(finite.min()), float(finite.max())
         if low < 0 < high:
             low, high = (low, 0.0) if surprises(0.0).share(confidence) <= share else (0.0, high)
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2
-            low, high = (low, middle) if surprises(middle).share(confidence) <= share else (middle, high)
+        high = float(halved(lambda by: surprises(by).share(confidence) <= share, high, low, _HALVINGS))
         step = _STEP * (float(np.ptp(finite)) or 1.0)
         fall = sum(control.share(high - step) - control.share(high + step) for control in self.controls) / (2 * step)
         return high, surprises(high).standard_error / max(fall, np.finfo(float).tiny)

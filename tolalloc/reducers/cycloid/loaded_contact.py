@@ -17,6 +17,7 @@ from math import exp, inf, pi
 import numpy as np
 from jaxtyping import Float, Int
 
+from tolalloc.capability.halving import halved
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import MICROMETRE
 from tolalloc.reducers.cycloid.clearance import FLANK, LARGE, Clearance, Gap, clearance_of, gap_of, is_large
@@ -245,12 +246,7 @@ def _zones(gap: Gap, rotation: Float[np.ndarray, " phase"], contact: float) -> F
     first, last = pressed.argmax(axis=1), table.size - 1 - pressed[:, ::-1].argmax(axis=1)
     edges = []
     for own, outer in ((first, np.maximum(first - 1, 0)), (last, np.minimum(last + 1, table.size - 1))):
-        inside, outside = table[own], table[outer]
-        for _ in range(_HALVINGS):
-            middle = (inside + outside) / 2
-            there = gap(middle, rotation) <= 0
-            inside, outside = np.where(there, middle, inside), np.where(there, outside, middle)
-        edges.append(inside)
+        edges.append(halved(lambda at: gap(at, rotation) <= 0, table[own], table[outer], _HALVINGS))
     return np.stack(edges, axis=1)
 
 
