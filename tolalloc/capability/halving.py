@@ -1,0 +1,28 @@
+"""Where something begins to hold, found by halving: for many intervals at once, and on the side where it holds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+Ends = Float[np.ndarray, "*interval"] | float
+
+
+def halved(
+    holds: Callable[[Any], Bool[np.ndarray, "*interval"] | bool], inside: Ends, outside: Ends, steps: int
+) -> Any:
+    """Return the ends of intervals where something holds, after so many halvings; it need not be continuous.
+
+    Examples
+    --------
+    >>> float(halved(lambda x: x * x <= 2.0, 0.0, 2.0, 30).round(6))
+    1.414214
+    """
+    for _ in range(steps):
+        middle = (inside + outside) / 2.0
+        there = holds(middle)
+        inside, outside = np.where(there, middle, inside), np.where(there, outside, middle)
+    return inside
