@@ -1,4 +1,10 @@
-"""The RV reducer and the single-stage drive: one model of this package, and its own tools."""
+"""The RV reducer and the single-stage drive: one model of this package, and its own tools.
+
+`reducer` is the nominal one with its files, `cycloid` its tooth stage, `equivalent` the spring model that is solved,
+`response` what that answers to random units, `families` what tells one kind of drive from another. `choice.reducer`
+binds one to a drawing as `model.ReducerModel`; `duty`, `contact`, `modification` and `transmission_error` answer
+questions of their own.
+"""
 
 PEAK_TO_PEAK = "peak-to-peak transmission error [arcsec]"
 """Output side, one output turn, at the torque of the study."""
