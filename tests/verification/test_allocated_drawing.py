@@ -27,8 +27,8 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.table_file import stated_settings
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
 from tolalloc.drawings.zones import Feature
-from tolalloc.reports.feature_frame import callout
 from tolalloc.reports.header import Header
+from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.tellers.allocation_drawing import sources_table, tolerances_frame, write_drawing
 from tolalloc.reports.tellers.allocation_workbook import cost_formula
 
@@ -277,7 +277,7 @@ def test_every_line_of_the_drawing_states_the_one_verified_zone_of_its_members(d
         rows[text.value] = text.row
     for line in results.lines:
         (zone,) = {round(verified[own.name] / UM, 6) for own in line[1]}
-        frame = callout(line[1][0])
+        frame = portrait_of(results.model).frame(line[1][0])
         stated = workbook.value("drawing", f"K{rows[results.line_name(line)]}")
         whole = 2e3 * stated if frame.characteristic == "size" else 1e3 * stated
         assert -1e-6 < zone - whole < 2e-2 + 1e-6

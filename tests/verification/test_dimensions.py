@@ -19,7 +19,9 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.drawings.zones import Feature
 from tolalloc.models.model import Evaluation
+from tolalloc.reducers.families.known import SOURCES
 from tolalloc.reports.feature_frame import SYMBOLS, FeatureFrame, callout, callout_assumptions, svg_of, written
+from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.writer import html_table, write_csv
 from tolalloc.sensitivity.effort import QUICK_RANKING, SobolEffort
 from tolalloc.sensitivity.sobol import regrouped, sobol_indices
@@ -110,7 +112,7 @@ def test_a_zone_is_written_in_hundredths_of_a_micrometre_and_never_wider(zone, t
 )
 def test_a_source_has_the_frame_of_its_feature(changes, shown):
     own = source(**changes)
-    assert str(callout(own)) == shown
+    assert str(callout(own, SOURCES.of(own.name))) == shown
     is_certain = own.name not in (
         "carrier.tilt",
         "sun.eccentricity",
@@ -119,12 +121,21 @@ def test_a_source_has_the_frame_of_its_feature(changes, shown):
         "crank1.journal1.phase",
     )
     has_datum = " A" in shown  # no table names one
-    assert len(callout_assumptions((own,))) == has_datum + (not is_certain)
+    assert len(callout_assumptions((own,), lambda one: SOURCES.of(one.name))) == has_datum + (not is_certain)
+
+
+@pytest.mark.parametrize("name", ["carrier.assembly", "sun.eccentricity", "disc1.bore1.position", "crank1.tip", "a"])
+def test_an_own_input_has_the_frame_of_its_feature_whatever_a_reducer_calls_so(name):
+    drawing = ta.Drawing.of_rows(
+        [{"id": name, "feature": "position", "plus": 6, "unit": "µm", "min": 1, "max": 9, "cost": 1}]
+    )
+    bound = ta.model(lambda x: x, inputs=[name], outputs=["y [mm]"]).bound(drawing.errors, "")
+    assert portrait_of(bound).frame(drawing.errors.sources[0]).characteristic == "position"
 
 
 def test_every_source_of_the_shipped_tables_has_a_frame():
     sources = load_tolerance_table("rv20e_all_sources")
-    frames = [callout(own) for own in sources if own.zone]
+    frames = [callout(own, SOURCES.of(own.name)) for own in sources if own.zone]
     assert {frame.characteristic for frame in frames} == set(SYMBOLS) - {"circular run-out"}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from html import escape
 from math import ceil, floor
@@ -10,7 +10,7 @@ from math import ceil, floor
 from tolalloc.drawings.sources import INCHES, LENGTHS, Source
 from tolalloc.drawings.zones import PHASE, ROTATION, TILT, Feature
 from tolalloc.reading.units import INCH, MICROMETRE
-from tolalloc.reducers.families.known import SOURCES
+from tolalloc.reducers.equivalent.sources import ErrorSource
 
 SYMBOLS = {
     "position": "⌖",
@@ -114,9 +114,8 @@ class Frames(tuple[FeatureFrame, ...]):
         return " ".join(frame._repr_html_() for frame in self)
 
 
-def _found(source: Source) -> tuple[str, str]:
+def _found(source: Source, kind: ErrorSource | None) -> tuple[str, str]:
     """Return the characteristic of a source, and what of it is assumed."""
-    kind = SOURCES.of(source.name)
     if kind is not None and kind.each == "tooth":
         return "single tooth", ""
     if kind is not None and kind.shape == "waves" and source.feature in (Feature.PITCH, Feature.RUNOUT):
@@ -146,14 +145,14 @@ def writing_unit(sources: Iterable[Source]) -> str:
     return stated.pop() if len(stated) == 1 else "mm unless stated"
 
 
-def callout(source: Source) -> FeatureFrame:
-    """Return what stands on the drawing for a source.
+def callout(source: Source, kind: ErrorSource | None = None) -> FeatureFrame:
+    """Return what stands on the drawing for a source, of the kind that its model declares, if it does.
 
     References
     ----------
     ISO 1101 (symbols), ISO 1328-1 and -2 (total cumulative pitch deviation, run-out), ISO 129-1 (limit deviations).
     """
-    characteristic, _ = _found(source)
+    characteristic, _ = _found(source, kind)
     exact, unit = source.said(source.zone, ".6g"), source.length_name
     stated = f" {unit}" if unit == INCHES else ""
     if characteristic in _DEVIATIONS:
@@ -184,10 +183,11 @@ def _deviations(source: Source) -> str:
     return " / ".join(ends) + stated
 
 
-def callout_assumptions(sources: tuple[Source, ...]) -> tuple[str, ...]:
+def callout_assumptions(sources: Iterable[Source], kind_of: Callable[[Source], ErrorSource | None]) -> tuple[str, ...]:
     """Return what the frames of some sources take for granted."""
-    said = [assumed for _, assumed in map(_found, sources) if assumed]
-    if any(callout(source).datums for source in sources):
+    known = [(source, kind_of(source)) for source in sources]
+    said = [assumed for own in known if (assumed := _found(*own)[1])]
+    if any(callout(*own).datums for own in known):
         said.append("datum A of a frame is the axis that centres or turns its part; the tolerance table names no datum")
     return tuple(dict.fromkeys(said))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
@@ -13,10 +13,13 @@ from jaxtyping import Float
 from tolalloc.models.function_model import BoundFunction
 from tolalloc.models.model import Model, Units
 from tolalloc.reports.document import Section
+from tolalloc.reports.feature_frame import FeatureFrame, Frames, callout
 from tolalloc.reports.figure import Figure
 
 if TYPE_CHECKING:
     from tolalloc.drawings.error_model import ErrorModel
+    from tolalloc.drawings.sources import Source
+    from tolalloc.reducers.equivalent.sources import ErrorSource
 
 Own = TypeVar("Own", bound=Model)
 Said = TypeVar("Said")
@@ -114,6 +117,18 @@ class Portrait(Generic[Own]):
     def spectra_note(self) -> str:
         """Which sources show at which orders, a clause that begins a sentence; nothing unless a model knows."""
         return ""
+
+    def kind_of(self, source: Source) -> ErrorSource | None:  # noqa: ARG002
+        """Return what the model declares of a source, which a drawing writes by it; nothing unless a model does."""
+        return None
+
+    def frame(self, source: Source) -> FeatureFrame:
+        """Return what stands on the drawing for a source."""
+        return callout(source, self.kind_of(source))
+
+    def frames(self, members: Iterable[Source]) -> Frames:
+        """Return the different frames of the members of a dimension."""
+        return Frames(dict.fromkeys(map(self.frame, members)))
 
     def display_name(self, output: str) -> str:
         """Return what a sentence calls an output, which has no unit."""

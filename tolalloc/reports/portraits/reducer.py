@@ -21,6 +21,7 @@ from tolalloc.reducers.equivalent.hysteresis import HysteresisLoop
 from tolalloc.reducers.equivalent.model import OUTCOMES, Equilibria
 from tolalloc.reducers.equivalent.outputs import turn_orders
 from tolalloc.reducers.equivalent.perfect import twist_shares
+from tolalloc.reducers.families.known import family_of
 from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.reducer.design import CycloidStage, Modification, Reducer
 from tolalloc.reducers.reducer.idle_torque import IdleTorque
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tolalloc.drawings.error_model import ErrorModel
+    from tolalloc.drawings.sources import Source
+    from tolalloc.reducers.equivalent.sources import ErrorSource
 
 _PHASES = 24
 """Angles of a turn of the crankshafts at which its turns are compared [-]."""
@@ -119,6 +122,10 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
             f"Errors that stand still in the housing show at multiples of {stage.disc_teeth}, errors that turn with "
             f"disc or carrier at multiples of {stage.pin_count}"
         )
+
+    def kind_of(self, source: Source) -> ErrorSource | None:
+        """Return the kind of a source, as its spring group declares it."""
+        return family_of(self.model.reducer).sources.of(source.name)
 
     def display_name(self, output: str) -> str:
         """Return what a sentence calls an output; there is one peak-to-peak, and one friction without load."""

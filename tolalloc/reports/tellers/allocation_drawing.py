@@ -19,7 +19,7 @@ from tolalloc.reading.units import COST_UNITS, MICROMETRE, unit_of
 from tolalloc.reports.columns import Column, Table, own_words, span
 from tolalloc.reports.drawing_sheet import write_sheet
 from tolalloc.reports.excel import Book
-from tolalloc.reports.feature_frame import Frames, callout, writing_unit
+from tolalloc.reports.feature_frame import writing_unit
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
@@ -101,13 +101,15 @@ def _span(values: Sequence[float]) -> float | str:
 def dimensions_table(result: AllocationResult) -> Table[_Dimension]:
     """Return the drawing line by line: a dimension, or members of one that share a value where it has several."""
     parts, zone = _parts(result), zone_unit(result.space.errors.sources)
-    before, after = _processes(result)
+    (before, after), portrait = _processes(result), portrait_of(result.model)
     columns: list[Column[_Dimension]] = [
         Column(header="dimension", value=lambda row: row[0], terminal=1),
         *own_words(_after),
         Column(header="places [-]", value=lambda row: len(row[1])),
         Column(
-            header=f"write [{writing_unit(result.drawn_sources)}]", value=lambda row: frames(_after(row)), terminal=2
+            header=f"write [{writing_unit(result.drawn_sources)}]",
+            value=lambda row: portrait.frames(_after(row)),
+            terminal=2,
         ),
         Column(header=f"zone before [{zone}]", value=lambda row: _zones((old for old, _ in row[1]), zone)),
         Column(header=f"zone [{zone}]", value=lambda row: _zones((new for _, new in row[1]), zone)),
@@ -127,11 +129,6 @@ def dimensions_table(result: AllocationResult) -> Table[_Dimension]:
     known = {own.name: own for own in result.space.errors.sources}
     rows = [(result.line_name(own), [(known[member.name], member) for member in own[1]]) for own in result.lines]
     return Table(name="dimensions", columns=columns, rows=rows)
-
-
-def frames(members: Sequence[Source]) -> Frames:
-    """Return the different frames of the members of a dimension."""
-    return Frames(dict.fromkeys(map(callout, members)))
 
 
 def _after(row: _Dimension) -> list[Source]:

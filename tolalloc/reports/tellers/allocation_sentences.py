@@ -531,7 +531,7 @@ def assumptions(result: AllocationResult, header: Header) -> tuple[str, ...]:
         *(("assumed_chosen",) if result.assembled else ()),
     )
     drawn = tuple(source for source in space.errors.sources if source.zone > 0.0)
-    return (*header.assumptions, *map(_say, keys), *callout_assumptions(drawn))
+    return (*header.assumptions, *map(_say, keys), *callout_assumptions(drawn, portrait_of(result.model).kind_of))
 
 
 def quantiles(result: AllocationResult) -> tuple[str, ...]:

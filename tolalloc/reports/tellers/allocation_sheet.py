@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import date
+from typing import Any
 
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.drawings.sources import Source
 from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.drawing_sheet import DrawingSheet, SheetTable
-from tolalloc.reports.feature_frame import INSPECTED, FeatureFrame, callout
+from tolalloc.reports.feature_frame import INSPECTED, FeatureFrame
 from tolalloc.reports.header import Header
-from tolalloc.reports.portrait import portrait_of
+from tolalloc.reports.portrait import Portrait, portrait_of
 from tolalloc.reports.tellers.allocation_assembly import assembly_notes
 from tolalloc.reports.tellers.allocation_sentences import amounts_convention, drawn_amounts, examined, verdict
 from tolalloc.reports.templates import Sentences
@@ -29,8 +30,8 @@ def drawing_sheet(result: AllocationResult, header: Header, today: date) -> Draw
     framed, inspected = _lines(result)
     model = portrait_of(result.model)
     return DrawingSheet(
-        frames=tuple(_framed(result.line_name(own), callout(own[1][0])) for own in framed),
-        tables=(*_inspection(result, inspected), *_amounts(result), *_datums([*framed, *inspected])),
+        frames=tuple(_framed(result.line_name(own), model.frame(own[1][0])) for own in framed),
+        tables=(*_inspection(result, inspected), *_amounts(result), *_datums(model, [*framed, *inspected])),
         sketches=model.sign_sketches if result.amounts else (),
         notes=(
             *drawn_amounts(result),
@@ -47,9 +48,9 @@ def _lines(result: AllocationResult) -> tuple[list[_Line], list[_Line]]:
 
     Tolerances of the amounts stand beside the amounts.
     """
-    beside = set(result.model.drawn_amounts.sources)
+    beside, model = set(result.model.drawn_amounts.sources), portrait_of(result.model)
     lines = [own for own in result.lines if own[1][0].name not in beside]
-    inspected = [own for own in lines if callout(own[1][0]).characteristic in INSPECTED]
+    inspected = [own for own in lines if model.frame(own[1][0]).characteristic in INSPECTED]
     return [own for own in lines if own not in inspected], inspected
 
 
@@ -66,9 +67,9 @@ def _table(key: str, rows: Sequence[tuple[str, ...]], widths: tuple[float, ...])
 
 def _inspection(result: AllocationResult, lines: list[_Line]) -> tuple[SheetTable, ...]:
     """Return pitch and run-out of the gear parts, and what their single teeth may deviate."""
-    rows = []
+    rows, model = [], portrait_of(result.model)
     for own in lines:
-        frame = callout(own[1][0])
+        frame = model.frame(own[1][0])
         about = _AXIS if frame.symbol else ""
         rows.append((result.line_name(own), frame.symbol, frame.characteristic, frame.zone, about))
     return (_table("table_inspection", rows, (68.0, 16.0, 44.0, 32.0, 20.0)),) if rows else ()
@@ -90,12 +91,12 @@ def _amounts(result: AllocationResult) -> tuple[SheetTable, ...]:
     return (_table("table_amounts", rows, (40.0, 18.0, 32.0, 12.0, 78.0)),) if rows else ()
 
 
-def _datums(lines: list[_Line]) -> tuple[SheetTable, ...]:
+def _datums(model: Portrait[Any], lines: list[_Line]) -> tuple[SheetTable, ...]:
     """Return the datum of every kind of part that something refers to; the feature that carries it is left free."""
     parts: dict[str, list[str]] = {}
     for _, members in lines:
         for own in members:
-            frame = callout(own)
+            frame = model.frame(own)
             if frame.datums or frame.characteristic in INSPECTED:
                 alike = parts.setdefault(own.part.rstrip("0123456789"), [])
                 alike += [] if own.part in alike else [own.part]

@@ -19,8 +19,9 @@ from tolalloc.allocation.result import AllocationResult
 from tolalloc.drawings.sources import LENGTHS, STEPS, Source, length_unit, rounded_down
 from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.excel import Book, Formula, Sheet, letter
-from tolalloc.reports.feature_frame import FINEST, FeatureFrame, callout, writing_unit
+from tolalloc.reports.feature_frame import FINEST, FeatureFrame, writing_unit
 from tolalloc.reports.header import Header
+from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.tellers.allocation_answer_sheet import add_answer
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import number as signed
@@ -69,7 +70,7 @@ def add_calculator(book: Book, result: AllocationResult, header: Header, notes: 
 def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     """Return one row per group, with what to write, what it costs and what it adds to every limited side."""
     space, chosen = result.drawn, result.chosen
-    groups, callouts = len(space.groups), [callout(_first_member(result, name)) for name in space.groups]
+    groups, callouts = len(space.groups), [_frame(result, _first_member(result, name)) for name in space.groups]
     unit, length = length_unit(space.errors.sources)
     near = f"{_AS_VERIFIED * MICROMETRE / length:.12f}".rstrip("0")
     scales, zones = chosen.design[:groups], space.first_zones * chosen.design[:groups] / length
@@ -97,9 +98,9 @@ def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
                 )
                 for process, row, scale in zip(made, rows, scales, strict=True)
             ],
-            "characteristic": [_characteristic(_first_member(result, name)) for name in space.groups],
+            "characteristic": [_characteristic(result, _first_member(result, name)) for name in space.groups],
             _write_head(result): [
-                _written(_first_member(result, name), row, zone, length)
+                _written(result, _first_member(result, name), row, zone, length)
                 for row, name, zone in zip(rows, space.groups, zones.tolist(), strict=True)
             ],
             "datum": [" ".join(own.datums) for own in callouts],
@@ -122,9 +123,13 @@ def _write_head(result: AllocationResult) -> str:
     return f"write [{writing_unit(result.drawn_sources)}]"
 
 
-def _characteristic(source: Source) -> str:
+def _frame(result: AllocationResult, source: Source) -> FeatureFrame:
+    return portrait_of(result.model).frame(source)
+
+
+def _characteristic(result: AllocationResult, source: Source) -> str:
     """Return symbol and name of a characteristic, and the length, radius or middle that its zone belongs to."""
-    frame = callout(source)
+    frame = _frame(result, source)
     unit = source.length_name
     _, _, length = frame.zone.removesuffix(f" {unit}").partition("/") if frame.is_framed else ("", "", "")
     where = (
@@ -168,15 +173,15 @@ def _other_lines(result: AllocationResult) -> list[pd.DataFrame]:
     rows, head, (unit, length) = [], _write_head(result), length_unit(result.space.errors.sources)
     for line in _others(result):
         own = line[1][0]
-        half = own.zone / 2 if callout(own).is_deviation else own.zone
+        half = own.zone / 2 if _frame(result, own).is_deviation else own.zone
         rows.append(
             {
                 "group": result.line_name(line),
                 f"zone to change [{unit}]": own.zone / length,
                 "inside": _say("workbook_locked"),
-                "characteristic": _characteristic(own),
+                "characteristic": _characteristic(result, own),
                 head: rounded_down(half, FINEST[own.length_name][0]) / LENGTHS[own.length_name],
-                "datum": " ".join(callout(own).datums),
+                "datum": " ".join(_frame(result, own).datums),
             }
         )
     return [pd.DataFrame(rows)] if rows else []
@@ -191,26 +196,26 @@ def _further_lines(result: AllocationResult) -> list[pd.DataFrame]:
     rows, head, (unit, length) = [], _write_head(result), length_unit(result.space.errors.sources)
     for row, line in enumerate(_further(result), start=_FIRST + len(first)):
         name, members = line
-        own, zone = callout(members[0]), members[0].zone / length
+        own, zone = _frame(result, members[0]), members[0].zone / length
         ratio = number(members[0].zone / _first_member(result, name).zone)
         rows.append(
             {
                 "group": result.line_name(line),
                 f"zone to change [{unit}]": Formula(f"=B{first[name]}*{ratio}", zone),
-                "characteristic": _characteristic(members[0]),
-                head: _written(members[0], row, zone, length),
+                "characteristic": _characteristic(result, members[0]),
+                head: _written(result, members[0], row, zone, length),
                 "datum": " ".join(own.datums),
             }
         )
     return [pd.DataFrame(rows)] if rows else []
 
 
-def _written(source: Source, row: int, zone: float, shown: float) -> Formula:
+def _written(result: AllocationResult, source: Source, row: int, zone: float, shown: float) -> Formula:
     """Return what the drawing states of a zone in a row: rounded down to its step, half of it for a size.
 
     The zone is in the unit of the sheet, of that length [m]; what is stated in that of the drawing, mm or in.
     """
-    halved = callout(source).is_deviation
+    halved = _frame(result, source).is_deviation
     size = f"B{row}/2" if halved else f"B{row}"
     length, (finest, _) = LENGTHS[source.length_name], FINEST[source.length_name]
     step = number((source.step or finest) / shown)
@@ -313,10 +318,10 @@ def _mark(result: AllocationResult, drawing: Sheet) -> None:
     for row, name in enumerate(groups, start=_FIRST):
         drawing.cell(row, 2, **_INPUT)
         drawing.cell(row, 4, num_format="0.000")
-        drawing.cell(row, 11, num_format=_written_as(callout(_first_member(result, name))))
+        drawing.cell(row, 11, num_format=_written_as(_frame(result, _first_member(result, name))))
     below = [*_further(result), *_others(result)]
     for row, (_, members) in enumerate(below, start=_FIRST + len(groups)):
-        drawing.cell(row, 11, num_format=_written_as(callout(members[0])))
+        drawing.cell(row, 11, num_format=_written_as(_frame(result, members[0])))
 
 
 def _written_as(frame: FeatureFrame) -> str:

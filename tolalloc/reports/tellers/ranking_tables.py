@@ -10,8 +10,8 @@ import numpy as np
 from tolalloc.drawings.sources import Source, zone_in, zone_unit
 from tolalloc.reading.units import MICROMETRE, unit_of
 from tolalloc.reports.columns import Column, Table, of_positions, own_words, span
-from tolalloc.reports.feature_frame import Frames, callout
 from tolalloc.reports.header import Header
+from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import quantity
 from tolalloc.sensitivity.derivatives import LineDerivatives
@@ -137,7 +137,7 @@ def dimensions_table(result: RankingResult, found: SobolIndices) -> pd.DataFrame
         {
             "dimension": found.sources,
             "places [-]": lambda at: len(members[at]),
-            "as written [mm]": lambda at: Frames(dict.fromkeys(map(callout, members[at]))),
+            "as written [mm]": lambda at: portrait_of(result.model).frames(members[at]),
             "total-effect index [%]": found.total * 100,
             "low 5 % [%]": low,
             "high 95 % [%]": high,
