@@ -108,7 +108,7 @@ def test_the_page_stands_without_a_network(driver, request, opened):
 
 
 def test_a_slider_moves_cost_curve_and_yield_of_the_reducer_at_once(driver, reducer, record_property):
-    """Alone on two cores cost and curve take 50 ms, the yield of 256 units 200 ms: recorded, as others may run beside."""
+    """Alone on two cores cost and curve take 50 ms, the yield of 256 units 200 ms; recorded, never judged."""
     shown(driver, reducer, 6144)
     drawn, judged = driver.execute_async_script(MOVE, 20, 7)
     record_property("median until cost and curve [ms]", statistics.median(drawn))
