@@ -15,7 +15,6 @@ study = ta.Study(
     ta.reducer(
         "rv20e",
         stiffness="rv20e_catalogue.stiffness.toml",
-        neglected=("disc*.tilt",),  # a line contact does not say what a leaning disc does
         flank_clearance=(1.0, 8.0),
         radial_clearance=(3.0, 30.0),
     ),

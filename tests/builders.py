@@ -34,6 +34,7 @@ from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import TolallocError
 from tolalloc.models.model import Evaluation
 from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.outputs import Orders
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import PRESETS
 from tolalloc.reducers.response.kernel import KernelResponse
@@ -261,6 +262,14 @@ def unit_with(model: EquivalentModel, **errors: float) -> np.ndarray:
     known = model.reducer.modification.deviations | {name.replace("__", "."): own for name, own in errors.items()}
     assert known.keys() <= set(model.columns)
     return np.array([[known.get(name, 0.0) for name in model.columns]])
+
+
+def order_spectrum(transmission_error: np.ndarray) -> Orders:
+    """Return Fourier's sum of curves on equally spaced angles of one turn, orders below half the number of angles."""
+    angles = transmission_error.shape[1]
+    order = np.arange(1.0, (angles + 1) // 2)
+    found = np.fft.rfft(transmission_error, axis=1)[:, 1 : order.size + 1] * (2 / angles)
+    return Orders(order=order, amplitude=np.abs(found), phase=np.angle(found), angles=angles)
 
 
 def kernel_of(model: EquivalentModel, errors: ErrorModel, torque: float) -> KernelResponse:

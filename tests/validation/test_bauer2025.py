@@ -13,11 +13,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.builders import FIRST_STAGE, STANDING, at_constant_contact, drawn_units, only, table_of_three_cranks
+from tests.builders import (
+    FIRST_STAGE,
+    STANDING,
+    at_constant_contact,
+    drawn_units,
+    only,
+    order_spectrum,
+    table_of_three_cranks,
+)
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import order_spectrum
 from tolalloc.reducers.reducer.files import load_reducer
 
 TEETH, PINS = 45, 46

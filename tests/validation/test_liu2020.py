@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.builders import order_spectrum
 from tests.validation_manual import shown
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND
 from tolalloc.reducers.equivalent.hysteresis import LOOP_ANGLES, hysteresis_loop
 from tolalloc.reducers.equivalent.model import EquivalentModel, Status
-from tolalloc.reducers.equivalent.outputs import order_spectrum
 
 PUBLISHED = np.loadtxt(Path(__file__).parent / "rv20e_table4_curves.csv", delimiter=",", skiprows=1)
 TORQUES = (-1.0, -10.0, -167.0)

@@ -9,14 +9,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.builders import numbers_of, says
+from tests.builders import numbers_of, order_spectrum, says
 from tests.studies.command import answer_of, refused, tolalloc
 from tests.validation_manual import shown
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCMINUTE
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import forces, order_spectrum
+from tolalloc.reducers.equivalent.outputs import forces
 from tolalloc.reducers.equivalent.perfect import exact_loop, preload, rated_pin_force
 from tolalloc.reducers.reducer.bearings import SLIDING_FRICTION
 from tolalloc.reducers.reducer.files import PRESETS, load_reducer

@@ -21,6 +21,7 @@ from tests.builders import (
     at_constant_contact,
     drawn_units,
     only,
+    order_spectrum,
     seeded_units,
     table_of_three_cranks,
     with_ovality,
@@ -29,7 +30,6 @@ from tests.validation_manual import shown
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import order_spectrum
 from tolalloc.reducers.reducer.files import load_reducer
 
 MEASURED = np.array([29.68 + 30.39, 31.51 + 33.13])

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.builders import at_constant_contact, reducer_file, refusal, unit_with
+from tests.builders import at_constant_contact, order_spectrum, reducer_file, refusal, unit_with
 from tolalloc.exceptions import TolallocError
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.cycloid.tooth_profile import normals
 from tolalloc.reducers.dynamics.motion import inertia_of
 from tolalloc.reducers.equivalent.hysteresis import friction_torques
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import Solved, forces, order_spectrum
+from tolalloc.reducers.equivalent.outputs import Solved, forces
 from tolalloc.reducers.equivalent.perfect import perfect_reducer
 from tolalloc.reducers.reducer.bearings import loss_factor
 from tolalloc.reducers.reducer.design import CentreGearClearances, Reducer, interface_forces

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
+from tests.builders import order_spectrum
 from tests.verification.dense_twin import dense_model, least_energy
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import ARCSECOND
@@ -15,7 +16,6 @@ from tolalloc.reducers.dynamics.motion import Damping, SpeedProfile, generalised
 from tolalloc.reducers.dynamics.simulation import simulate
 from tolalloc.reducers.dynamics.speeds import Modes, critical_speeds, modes, orders_against_speed
 from tolalloc.reducers.equivalent.model import EquivalentModel, Status
-from tolalloc.reducers.equivalent.outputs import order_spectrum
 from tolalloc.reducers.equivalent.springs import Coordinates
 from tolalloc.reducers.reducer.design import Clearances
 from tolalloc.reducers.reducer.files import load_reducer

@@ -8,7 +8,7 @@ from math import cos
 import numpy as np
 import pytest
 
-from tests.builders import LINEAR_STAGE, reducer_file, unit_with
+from tests.builders import LINEAR_STAGE, order_spectrum, reducer_file, unit_with
 from tests.random_cases import random_case, seeds
 from tests.verification.dense_twin import dense_equilibrium
 from tolalloc.reading.units import ARCSECOND
@@ -21,7 +21,6 @@ from tolalloc.reducers.equivalent.outputs import (
     fitted_waves,
     forces,
     load_share,
-    order_spectrum,
     outputs_of,
     turn_orders,
 )

@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.builders import seeded_units
+from tests.builders import order_spectrum, seeded_units
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop
 from tolalloc.reducers.equivalent.model import Status, count_statuses
-from tolalloc.reducers.equivalent.outputs import order_spectrum
 from tolalloc.reducers.response.outputs import OutputsResponse, Reading, orders_reading, requirements_of
 
 ORDERS = (1, 39, 40)

@@ -224,11 +224,11 @@ def told_first(answer: ta.Answer, rejected: int, *, error: float, law: bool, acc
     [
         (26, 0.05, True, "Met: 99.74 %"),
         (27, 0.05, True, "Met: 99.73 %"),
-        (28, 0.05, True, "99.73 % kept, by the laws of the outputs beside the units: 99.72 %"),
-        (28, 0.05, False, "99.73 % kept, by the laws of the outputs beside the units: 99.72 %"),
+        (28, 0.05, True, "Met by the laws of the outputs, while the units alone leave it open: 99.72 %"),
+        (28, 0.05, False, "Met by the laws of the outputs, while the units alone leave it open: 99.72 %"),
         (26, 0.5, False, "Met, by a quick run: 99.74 %"),
         (28, 0.5, False, "Not decided by a quick run: 99.72 %"),
-        (28, 0.5, True, "99.73 % kept, by the laws of the outputs beside the units: 99.72 %"),
+        (28, 0.5, True, "Met by the laws of the outputs, while the units alone leave it open: 99.72 %"),
     ],
 )
 def test_met_is_not_the_first_word_where_fewer_units_than_required_keep_the_limits(

@@ -109,23 +109,6 @@ class Orders:
         return [(float(self.order[at]), float(own[at]), float(self.phase[sample, at])) for at in strongest]
 
 
-def order_spectrum(transmission_error: Float[np.ndarray, "sample angle"]) -> Orders:
-    """Return the orders 1, 2, … of curves on equally spaced angles of one output turn, the end point left out.
-
-    Amplitude = |2/N·Σ y·e^(−inθ)| [rad], own derivation: Fourier's sum; orders below half the number of angles,
-    onto which waves beyond fold back: `turn_orders` tells those of a unit that none folds onto.
-
-    Examples
-    --------
-    >>> turn = 2 * np.pi * np.arange(8) / 8
-    >>> order_spectrum(3.0 * np.cos(2 * turn)[np.newaxis]).amplitude[0].round(9).tolist()
-    [0.0, 3.0, 0.0]
-    """
-    order = np.arange(1.0, (transmission_error.shape[1] + 1) // 2)
-    found = _waves(transmission_error, order)
-    return Orders(order=order, amplitude=np.abs(found), phase=np.angle(found), angles=transmission_error.shape[1])
-
-
 def _waves(
     curve: Float[np.ndarray, "row angle"], order: Float[np.ndarray, " order"], turns: int = 1
 ) -> Complex[np.ndarray, "row order"]:

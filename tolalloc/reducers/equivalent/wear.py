@@ -62,11 +62,6 @@ class Wear:
     phases: tuple[DutyPhase, ...]
     steps: tuple[_Step, ...]
 
-    @property
-    def largest_depth(self) -> float:
-        """Where the flanks have lost most [m]."""
-        return float(self.depth.max())
-
     def aged(
         self, model: EquivalentModel, errors: Float[np.ndarray, "sample column"]
     ) -> Float[np.ndarray, "sample column"]:
@@ -193,7 +188,7 @@ def wear_of(
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> found = wear_of(load_reducer("rv20e"), (LoadCase("rated", torque=-167, speed=15),), 6000)
-    >>> round(1e6 * found.largest_depth, 2), round(1e6 * found.pin_depth, 2)  # off the flanks, off pins' radius [µm]
+    >>> round(1e6 * float(found.depth.max()), 2), round(1e6 * found.pin_depth, 2)  # off flanks, off pins' radius [µm]
     (2.27, 0.12)
     """
     duty = require_duty(f"wear of {reducer.name}", cases)

@@ -136,7 +136,7 @@ def _verdict_word(result: AllocationResult, guarantee: Guarantee, achieved: Yiel
     if not isinstance(guarantee, AtYield) or achieved.estimate >= guarantee.target:
         return _say("verdict_met_quick" if is_quick else "verdict_met")
     has_laws = len(result.chosen.laws) == len(result.yields)
-    return _say("verdict_open" if is_quick and not has_laws else "verdict_known", target=guarantee.target)
+    return _say("verdict_open" if is_quick and not has_laws else "verdict_known")
 
 
 def zones_changed(result: AllocationResult) -> tuple[str, ...]:
@@ -457,8 +457,9 @@ def _settled(result: AllocationResult) -> tuple[str, ...]:
     gaps = {"change": COST_CHANGE, "most": worst.most, "share": worst.most / cost, "lost": worst.lost}
     said.append(_say("worst_prices", **gaps))
     ranges = zip(found.groups, found.prices, strict=True)
-    group, own = min(ranges, key=lambda one: one[1].nearest)
-    if own.nearest < np.inf:
+    ending = [one for one in ranges if one[1].low > _LEAST_PRICE or one[1].high < np.inf]
+    if ending:
+        group, own = min(ending, key=lambda one: one[1].nearest)
         both = "price_range" if own.low > _LEAST_PRICE else "price_range_below"
         key = "price_range_above" if own.high == np.inf else both
         said.append(_say(key, group=group, low=own.low, high=own.high, same=SAME))

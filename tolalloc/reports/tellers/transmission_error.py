@@ -33,6 +33,8 @@ _MAIN = 8
 """Main orders that are named [-]."""
 _ON_TERMINAL = 5
 """Main orders that fit on a screen [-]."""
+_PRINTED = 0.005
+"""Smallest amplitude that does not print as 0.00 [arcsec]."""
 _DRAWN = 60
 """Strongest orders that are drawn [-]."""
 _UNIT = 0
@@ -137,7 +139,7 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
             "smallest_at_deg": float(extremes.carrier_angle[0, 1] / DEGREE),
             "main_orders": [
                 {"order": order, "amplitude_arcsec": amplitude / ARCSECOND, "phase_deg": phase / DEGREE}
-                for order, amplitude, phase in result.orders.main(_MAIN)
+                for order, amplitude, phase in self._main_orders
             ],
             "outputs": [
                 {"name": name, "unit": unit, "value": float(value(result.solved)[0])}
@@ -165,8 +167,13 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
             "assumptions": list(self.assumptions),
         }
         if result.attribution is not None:
-            found["attribution"] = _attributed(result.attribution, [order for order, *_ in result.orders.main(_MAIN)])
+            found["attribution"] = _attributed(result.attribution, [order for order, *_ in self._main_orders])
         return found
+
+    @property
+    def _main_orders(self) -> list[tuple[float, float, float]]:
+        """The strongest orders that print as more than 0.00″, with amplitude and phase [rad]."""
+        return [own for own in self.result.orders.main(_MAIN) if own[1] >= _PRINTED * ARCSECOND]
 
     @property
     def terminal(self) -> tuple[tuple[pd.DataFrame, str], ...]:
