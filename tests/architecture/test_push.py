@@ -8,7 +8,7 @@ import pytest
 
 from tests import push
 from tests.import_graph import ROOT, graph, module_of, public_uses, steps_to
-from tests.push import TIME, TURNS, Touched, chosen, reason_for_all
+from tests.push import NEAR, TIME, TURNS, Touched, chosen, reason_for_all
 from tests.whole_run import WholeRun, summed_up
 
 SADDLE = "tests/verification/test_saltelli.py"
@@ -68,6 +68,14 @@ def test_tests_of_every_push_are_run_whatever_they_take():
     assert push.always == (TESTS[7],)
     assert not push.near
     assert push.seconds > 2 * TIME
+
+
+def test_the_nearest_have_some_minutes_however_long_the_others_take():
+    tests = [f"{SADDLE}::test_{number}" for number in range(40)]
+    cost = dict.fromkeys(tests, NEAR / 4) | {TESTS[7]: 2 * TIME}
+    near = chosen([*tests, TESTS[7]], {TESTS[7]}, run_of(**cost), Touched.of([SADDLE]), None)
+    assert len(near.near) == 4
+    assert near.seconds == 2 * TIME + NEAR
 
 
 def test_what_the_time_does_not_allow_is_counted_and_the_nearest_comes_first():
