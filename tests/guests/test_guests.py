@@ -205,3 +205,11 @@ def test_what_if_of_the_found_zones_keeps_what_the_run_says(guest, place):
     verified = effort(guest).allocation.verification_units
     error = 4 * np.sqrt(max(low * (1 - low), 1e-3) * (1 / units + 1 / verified))
     assert share == pytest.approx(low, abs=error + 1 / units)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "guest", [own for own in GUESTS if own.name in ("compiled", "buero_csv", "spacers_4x")], ids=lambda own: own.name
+)
+def test_a_quick_run_as_typed_is_met(guest, place):
+    assert summary_of(run_of(guest, place))["allocation"]["met"] is True
