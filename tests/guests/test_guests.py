@@ -78,6 +78,7 @@ def unchanged(guest: Guest) -> dict[str, float]:
     return {source.name: 1e6 * source.zone}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("guest", params())
 def test_what_if_of_no_change_is_the_drawing_as_it_is(guest):
     answer = answer_of("whatif", guest.script, *_zones(unchanged(guest)))
@@ -98,6 +99,7 @@ def _zones(zones: dict[str, float]) -> list[str]:
     return [f"{name}={zone!r}um" for name, zone in zones.items()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("guest", params())
 def test_what_if_in_python_on_the_command_line_and_on_the_live_page_is_one_answer(guest):
     study = load_study(guest.script)
