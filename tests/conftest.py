@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import gc
 import os
 
 import numpy as np
@@ -23,6 +24,12 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     """Compile the kernel before workers start."""
     if "PYTEST_XDIST_WORKER" not in os.environ and getattr(session.config.option, "numprocesses", None):
         compile_in_two_processes()
+
+
+def pytest_collection_finish() -> None:
+    """Leave what was collected out of every later search for rubbish, which would walk through all of it each time."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

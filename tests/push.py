@@ -3,10 +3,11 @@
     python -m tests.push due              # why the whole gate is to be run, if so
     python -m tests.push tests FILE       # the slow tests of a push, an id a line, into a file
     python -m tests.push scripts          # a pattern of the handbook's scripts that are run
+    python -m tests.push shapes MODULES   # in which of some modules the shapes are checked
 
 A push is what has changed since the last whole run. Of the slow tests it gets those that every push runs, an eighth of
 the others, another one at each commit, and the nearest to what has changed, by the number of imports between, until
-its time is used up.
+its time is used up, four minutes of it at least.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import ast
 import io
 import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,8 +32,10 @@ TURNS = 8
 """Commits within which every slow test is run once [-]."""
 TIME = 1150.0
 """What the slow tests of a push may take on one core [s]."""
+NEAR = 240.0
+"""What of it the nearest may take at least, however long those of every push and the turn take [s]."""
 NEW = 10.0
-"""What a test is taken to take that the last whole run did not have [s]."""
+"""What a test, or the fixtures of a file, are taken to take that the last whole run does not tell [s]."""
 PINS = ".ci/constraints.txt"
 SCRIPTS = sorted(path for room in ("tutorials", "gallery") for path in (ROOT / "docs" / room).glob("plot_*.py"))
 
@@ -149,15 +152,19 @@ def chosen(tests: Sequence[str], every: set[str], run: WholeRun, touched: Touche
     """
     cost = {test: NEW if (own := run.taken_by(test)) is None else own for test in tests}
     always = [test for test in tests if test in every]
-    dearest_first = sorted((test for test in tests if test not in every), key=lambda test: (-cost[test], test))
-    turn = [] if commits is None else dearest_first[commits % TURNS :: TURNS]  # each turn takes about as long
+    others = {test: own for test, own in cost.items() if test not in every}
+    turn = [] if commits is None else turn_of(others, run, commits)
     taken = {*always, *turn}
     steps = {test: found for test in tests if test not in taken and (found := touched.steps(test)) is not None}
-    near, left, seconds = list[str](), list[str](), sum(cost[test] for test in taken)
+    files = {file_of(test) for test in taken}
+    seconds = sum(cost[test] for test in taken) + sum(run.setups.get(file, NEW) for file in files)
+    near, left, allowed = list[str](), list[str](), max(TIME, seconds + NEAR)
     for test in sorted(steps, key=lambda test: (steps[test], cost[test], test)):
-        if seconds + cost[test] <= TIME:
+        more = cost[test] + (0.0 if file_of(test) in files else run.setups.get(file_of(test), NEW))
+        if seconds + more <= allowed:
             near.append(test)
-            seconds += cost[test]
+            files.add(file_of(test))
+            seconds += more
         elif steps[test] <= 1:
             left.append(test)
     return Push(tuple(always), tuple(turn), tuple(near), tuple(left), seconds)
@@ -175,6 +182,24 @@ class _Collected:
             self.tests.append(item.nodeid)
             if item.get_closest_marker("push"):
                 self.every.add(item.nodeid)
+
+
+def turn_of(cost: Mapping[str, float], run: WholeRun, commits: int) -> list[str]:
+    """Return the tests whose turn it is: files as a whole, which share their fixtures, and long tests one by one.
+
+    They are dealt out dearest first, so that each turn takes about as long.
+    """
+    parts: dict[str, list[str]] = {}
+    for test, own in cost.items():
+        parts.setdefault(test if own > NEW else file_of(test), []).append(test)
+    whole = {part: sum(cost[test] for test in own) + run.setups.get(file_of(part), NEW) for part, own in parts.items()}
+    dearest_first = sorted(parts, key=lambda part: (-whole[part], part))
+    return [test for part in dearest_first[commits % TURNS :: TURNS] for test in parts[part]]
+
+
+def file_of(test: str) -> str:
+    """Return the file of a test."""
+    return test.partition("::")[0]
 
 
 def slow_tests() -> _Collected:
@@ -196,6 +221,12 @@ def scripts_near(touched: Touched) -> list[Path]:
     ]
 
 
+def shaped(modules: Sequence[str], touched: Touched, commits: int) -> list[str]:
+    """Return in which modules a push checks the shapes: those that it touches, and an eighth of the others by turn."""
+    others = [own for own in modules if own not in touched.modules]
+    return sorted({*modules}.difference(others) | {*others[commits % TURNS :: TURNS]})
+
+
 def main(words: Sequence[str]) -> None:
     """Print or write what is asked for."""
     run = last_whole_run()
@@ -208,8 +239,12 @@ def main(words: Sequence[str]) -> None:
     if words[0] == "scripts":
         sys.stdout.write("|".join(re.escape(path.name) + "$" for path in scripts_near(touched)) or "(?!)")
         return
+    commits = int(git("rev-list", "--count", "HEAD") or 0)
+    if words[0] == "shapes":
+        sys.stdout.write(",".join(shaped(words[1].split(","), touched, commits)))
+        return
     found = slow_tests()
-    push = chosen(found.tests, found.every, run, touched, int(git("rev-list", "--count", "HEAD") or 0))
+    push = chosen(found.tests, found.every, run, touched, commits)
     Path(words[1]).write_text("".join(f"{test}\n" for test in push.tests), encoding="utf-8")
     sys.stdout.write(f"Since {run.commit[:8]}: {push.sentence(len(found.tests))}\n")
 

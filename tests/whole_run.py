@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 from collections import defaultdict
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from datetime import date
 from pathlib import Path
 
@@ -44,6 +44,8 @@ class WholeRun:
         Slow tests that passed [-].
     seconds
         Test, or function of tests that take less than ten seconds → what one takes [s].
+    setups
+        File → what its fixtures take, whichever of its tests is first [s].
     """
 
     commit: str
@@ -52,6 +54,7 @@ class WholeRun:
     processor: str
     tests: int
     seconds: dict[str, float]
+    setups: dict[str, float] = field(default_factory=dict)
 
     def taken_by(self, test: str) -> float | None:
         """Return what a test takes [s], or None where it is new."""
@@ -92,12 +95,17 @@ def processor() -> str:
 
 
 _taken: dict[str, float] = defaultdict(float)
+_setups: dict[str, float] = defaultdict(float)
 _began = time.time()
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
-    """Add what setting up, calling or clearing away took."""
-    _taken[report.nodeid] += report.duration
+    """Add what calling or clearing away took, and keep the longest setting up of a file."""
+    if report.when == "setup":
+        file = report.nodeid.partition("::")[0]
+        _setups[file] = max(_setups[file], round(report.duration, 1))
+    else:
+        _taken[report.nodeid] += report.duration
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
@@ -115,6 +123,7 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
         processor=processor(),
         tests=len(_taken),
         seconds=summed_up(_taken),
+        setups=dict(sorted(_setups.items())),
     )
     FILE.write_text(json.dumps(asdict(run), indent=1) + "\n", encoding="utf-8")
     sys.stderr.write(f"\nThis whole run is written down in {FILE.relative_to(ROOT)}: commit it.\n")

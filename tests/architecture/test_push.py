@@ -8,7 +8,7 @@ import pytest
 
 from tests import push
 from tests.import_graph import ROOT, graph, module_of, public_uses, steps_to
-from tests.push import TIME, TURNS, Touched, chosen, reason_for_all
+from tests.push import NEAR, NEW, TIME, TURNS, Touched, chosen, reason_for_all
 from tests.whole_run import WholeRun, summed_up
 
 SADDLE = "tests/verification/test_saltelli.py"
@@ -56,7 +56,7 @@ def test_a_push_runs_what_it_touches_and_an_eighth_of_the_others_and_in_eight_co
     touched = Touched.of(["tolalloc/sensitivity/saltelli.py"])
     seen = set()
     for commits in range(TURNS):
-        push = chosen(TESTS, set(), run_of(), touched, commits)
+        push = chosen(TESTS, set(), run_of(**dict.fromkeys(TESTS, 2 * NEW)), touched, commits)
         assert TESTS[0] in push.tests
         assert len(push.turn) == pytest.approx(len(TESTS) / TURNS, abs=1)
         seen |= set(push.turn)
@@ -68,6 +68,32 @@ def test_tests_of_every_push_are_run_whatever_they_take():
     assert push.always == (TESTS[7],)
     assert not push.near
     assert push.seconds > 2 * TIME
+
+
+def test_the_nearest_have_some_minutes_however_long_the_others_take():
+    tests = [f"{SADDLE}::test_{number}" for number in range(40)]
+    cost = dict.fromkeys(tests, NEAR / 4) | {TESTS[7]: 2 * TIME}
+    near = chosen([*tests, TESTS[7]], {TESTS[7]}, run_of(**cost), Touched.of([SADDLE]), None)
+    assert len(near.near) == 3
+    assert near.seconds == 2 * TIME + 3 * NEAR / 4 + 2 * NEW  # the fixtures of two files too
+
+
+def test_shapes_are_checked_where_a_push_touches_and_in_eight_commits_everywhere():
+    modules = [f"tolalloc.room.module{number}" for number in range(40)]
+    touched = Touched(modules=frozenset(modules[3:5]), stems=frozenset())
+    found = [push.shaped(modules, touched, commits) for commits in range(TURNS)]
+    assert all({*modules[3:5]} <= {*own} for own in found)
+    assert {own for some in found for own in some} == {*modules}
+    assert max(map(len, found)) <= 2 + 5
+
+
+def test_short_tests_of_a_file_have_one_turn_and_long_ones_their_own():
+    cost = {f"a.py::test_{at}": 1.0 for at in range(20)} | {f"a.py::test_long_{at}": 2 * NEW for at in range(TURNS)}
+    turns = [push.turn_of(cost, run_of(), commits) for commits in range(TURNS)]
+    assert sorted(test for own in turns for test in own) == sorted(cost)
+    (whole,) = (own for own in turns if "a.py::test_0" in own)
+    assert {f"a.py::test_{at}" for at in range(20)} <= {*whole}
+    assert all(any("long" in test for test in own) for own in turns if own is not whole)
 
 
 def test_what_the_time_does_not_allow_is_counted_and_the_nearest_comes_first():

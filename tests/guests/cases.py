@@ -149,7 +149,6 @@ STACKS = (
         # A + B/t of the way that reaches ±t = 0.04 mm: ground 1.5 + 0.02/0.04 for a and b, milled 0.2 + 0.08/0.04 for c
         cost=2 * 2 + 2.2,
         hand={"gap [mm]": Hand(40 - 30 - 9.5, 0.08 / 6 * hypot(1, 1, 0.5))},
-        order=("a",),
         zones={"a": 60},
     ),
     Guest(

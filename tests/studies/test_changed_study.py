@@ -19,6 +19,7 @@ from tolalloc.study.prepared import Prepared
 FLANK, RADIAL = "flank clearance [µm]", "radial clearance [µm]"
 
 
+@pytest.mark.slow
 def test_a_changed_study_is_the_model_at_other_settings_and_zones_to_the_last_bit(tmp_path):
     before = prepared()
     zones = [0.7 * own.zone for own in before.errors.active]

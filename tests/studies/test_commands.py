@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 
 import tolalloc as ta
-from tests.builders import page_of, reducer_file, says, summary_of
+from tests.builders import LINEAR_STAGE, page_of, reducer_file, says, summary_of
 from tests.studies.command import ROOT, answer_of, refused, require_offline, tolalloc
 from tests.studies.scripts import study_script
 from tolalloc.drawings.table_file import DATA
@@ -130,7 +130,7 @@ def test_the_curve_that_te_writes_is_read_by_diagnose_and_lot_as_it_stands(tmp_p
 
 @pytest.mark.slow
 def test_te_calls_exact_parts_one_thing_and_its_orders_what_they_are(tmp_path):
-    answer = ta.te(reducer="cd29", attributed=True)
+    answer = ta.te(reducer=str(LINEAR_STAGE), attributed=True)
     found = answer.summary
     assert {"curve.csv", "curve.json"} <= {path.name for path in answer.save(tmp_path / "te").iterdir()}
     orders = [wave["order"] for wave in found["main_orders"]]

@@ -102,6 +102,7 @@ def test_what_numpy_does_at_a_rounding_stays_as_a_study_found_it(tmp_path):
     assert np.geterr() == before != dict.fromkeys(before, "raise")
 
 
+@pytest.mark.slow
 def test_what_a_script_prints_is_no_part_of_an_answer_to_a_program(tmp_path):
     script = study_script(tmp_path)
     script.write_text(f"print('mine')\n{script.read_text()}")

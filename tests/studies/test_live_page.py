@@ -80,6 +80,7 @@ def test_the_page_says_the_digits_of_whatif_on_a_reducer():
     assert max(curve) - min(curve) == pytest.approx(answer.values[1].max(), rel=5e-3)
 
 
+@pytest.mark.slow
 def test_another_torque_says_the_digits_of_a_study_at_that_torque(tmp_path):
     shutil.copy(ROOT / "studies" / "liu2020_allocation.py", tmp_path)
     script = tmp_path / "liu2020_allocation.py"
@@ -159,6 +160,7 @@ def test_the_command_after_saving_runs_from_any_folder(tmp_path):
     assert load_study(Path(script)).drawing.sources[1].zone == pytest.approx(41.7e-6)
 
 
+@pytest.mark.slow
 def test_the_picture_follows_a_swept_error():
     desk = desk_of(ROOT / "studies" / "liu2020_allocation.py")
     swept = ask(desk, "sweep", unit=3, source="disc1.runout")

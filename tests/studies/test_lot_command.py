@@ -166,6 +166,7 @@ def test_files_that_are_missing_empty_or_there_already_are_refused(tmp_path):
     refused(tolalloc("lot", tmp_path / "empty.csv", drawing), "the table has no rows")
 
 
+@pytest.mark.slow
 def test_curves_of_a_lot_tell_the_orders_that_moved_and_what_makes_them(tmp_path, monkeypatch):
     monkeypatch.setattr(lot_orders, "_UNITS", 128)
     monkeypatch.setattr(lot_orders, "_REDRAWN", 4)

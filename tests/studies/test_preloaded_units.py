@@ -75,6 +75,7 @@ def test_a_study_may_say_otherwise():
         _ = prepared("rv20e", limits={ta.PRELOAD: None}).requirements
 
 
+@pytest.mark.slow
 def test_a_check_counts_the_preloaded_among_random_units(tmp_path):
     script = study_script(tmp_path, reducer={"name": "rv20e"})
     result = tolalloc("check", script)

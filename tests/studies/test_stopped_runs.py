@@ -42,6 +42,7 @@ def stopped_after(monkeypatch, units: int) -> None:
     monkeypatch.setattr(Lines, "advance", advanced)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("worth", "words"), [(0.0, "the same command goes on from there."), (np.inf, "Nothing was kept.")]
 )
@@ -58,6 +59,7 @@ def test_ctrl_c_is_a_sentence_that_says_what_is_kept(tmp_path, monkeypatch, wort
     assert left(runs) == ({KEPT} if worth == 0.0 else set())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("existing", [False, True])
 def test_a_report_that_cannot_be_written_leaves_nothing(tmp_path, monkeypatch, existing):
     def full(*_: object) -> None:
@@ -74,6 +76,7 @@ def test_a_report_that_cannot_be_written_leaves_nothing(tmp_path, monkeypatch, e
     assert not existing or not left(folder)
 
 
+@pytest.mark.slow
 def test_a_report_fills_an_empty_folder_that_stands_there(tmp_path):
     (tmp_path / "mine").mkdir()
     result = tolalloc("te", "--reducer", "rv20e_liu2020", "--out", tmp_path / "mine")

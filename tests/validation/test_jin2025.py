@@ -118,6 +118,7 @@ def test_equidistant_amount_and_pin_radius_are_one_error_with_two_names(model):
     assert abs(curves[0].mean() - curves[1].mean()) == pytest.approx(34, abs=2)
 
 
+@pytest.mark.slow
 def test_the_largest_transmission_error_puts_the_sizes_before_the_run_out_and_not_in_the_printed_order(model):
     """With the mean in it, at the drawing's zones: 0.45, 0.06, 0.17, 0.05, 0.29. The pin radius comes second."""
     errors = of_the_drawing()

@@ -143,6 +143,7 @@ def exact_parts(amounts: Modification, part: float) -> TransmissionErrorResult:
     return transmission_error(own, load_unit("exact"), -own.load.rated_torque)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", [1.0, 0.01])
 def test_the_rotated_profile_leaves_its_angle_as_play_and_nearly_all_pins_in_contact(part):
     """Its gap grows as the lever does, so the flank of every pin closes at once: δ either side, hardly an error left.
@@ -157,6 +158,7 @@ def test_the_rotated_profile_leaves_its_angle_as_play_and_nearly_all_pins_in_con
     assert found.loop.backlash[0] == pytest.approx(play, rel=2e-4)
 
 
+@pytest.mark.slow
 def test_the_optimum_comes_close_to_the_play_of_the_rotated_profile_and_carries_on_fewer_pins(optimum):
     """At a hundredth of the amounts, 2.9 µm on the flank; exact distances close first elsewhere than at φ0."""
     found, aim = exact_parts(optimum.modification, 0.01), exact_parts(ROTATED, 0.01)

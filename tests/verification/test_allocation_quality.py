@@ -46,6 +46,7 @@ def test_designs_are_compared_where_they_just_keep_the_limits(compared, scale):
     assert found[0] == pytest.approx(0.015 / (2.0537 * np.sqrt(2) * 0.04 / 6), rel=0.08)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("algorithm", ["NSGA-II", "CMA-ES"])
 def test_a_rival_finds_the_cheapest_gap(compared, algorithm):
     """Two zones of one cost: alike is the cheapest, whatever the units."""

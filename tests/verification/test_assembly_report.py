@@ -565,9 +565,9 @@ def test_what_is_drawn_over_the_precision_is_computed():
     assert set(transmission.DRAWN.values()) <= outputs
 
 
-def test_differences_from_perfect_parts_are_in_percent():
+def test_differences_from_exact_parts_are_in_percent():
     frame = transmission.difference_table(effect(1))
-    assert frame["largest line load, rated torque, above perfect parts [%]"].tolist() == pytest.approx(
+    assert frame["largest line load, rated torque, above exact parts [%]"].tolist() == pytest.approx(
         [100 * (400 / 0.8 - 1), 100 * (200 / 0.8 - 1)]
     )
 

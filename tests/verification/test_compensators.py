@@ -475,6 +475,7 @@ def test_every_file_that_leaves_says_which_classes_the_zones_hold_with(sorted_ga
     assert [own.zone for own in again.sources] == pytest.approx(drawn, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_questions_beside_the_allocation_take_the_first_number_of_classes():
     study = gap_study(compensators=ta.Sorting("shaft", "hole", classes=(4, 1)))
     assert Prepared(study=study).errors.compensators[0].count == 4
@@ -487,6 +488,7 @@ def test_questions_beside_the_allocation_take_the_first_number_of_classes():
     assert not [header for header in measures_table(ranked).columns if "bound" in header]  # its output jumps
 
 
+@pytest.mark.slow
 def test_a_shim_is_chosen_with_the_zones():
     shim = ta.Shim("hole", step=4.0, sizes=(1, 5), against={"shaft": -1.0}, size_cost=0.1)
     result = gap_study(compensators=shim).allocate().result
@@ -510,6 +512,7 @@ def test_no_law_of_a_linear_output_and_no_shapley_shares_are_claimed_where_parts
     assert LinearLaw.of(function, errors, errors.zones) is None
 
 
+@pytest.mark.slow
 def test_classes_of_equal_width_are_chosen_with_the_zones():
     sorting = ta.Sorting("shaft", "hole", classes=(1, 4), width=2.0, batch=100, class_cost=0.1, leftover_cost=1.0)
     result = gap_study(compensators=sorting).allocate().result

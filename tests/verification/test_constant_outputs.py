@@ -64,6 +64,7 @@ def test_a_limit_that_a_constant_misses_is_missed_by_every_drawing():
     assert found.result.chosen.blocking.tightest.excess == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("outputs", [(GAP, OTHER), (OTHER, GAP)])
 def test_a_constant_beside_another_output_moves_nothing(outputs):
     """What a + b ≤ 2.05 costs, it costs alone."""

@@ -239,6 +239,7 @@ def test_large_problems_are_proven_and_no_exchange_of_two_is_better(seed):
             assert not program.allows(taken)
 
 
+@pytest.mark.slow
 def test_when_the_nodes_are_used_up_the_answer_says_how_far_it_may_be_from_the_best():
     program = large_program(0)
     (_, best, _), (taken, cost, bound), (*_, later) = (best_choice(program, nodes) for nodes in (10_000, 1, 10))

@@ -140,6 +140,7 @@ def made_of(zone, mean, deviation, parts, generator):
     return MeasuredParts(path=Path("p.csv"), values=tuple(values), are_radii=False, zone=zone, middle=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("parts", [20, 200])
 def test_promised_yield_is_held_for_the_process_behind_the_parts(parts):
     """Three sizes, two of them measured: all zones by one factor until just met, 250 sets of parts, closed form."""
@@ -248,6 +249,7 @@ def test_allocation_says_what_few_parts_do_and_what_a_hundred_would(studied):
     assert answer.result.met and achieved.low < achieved.widening.counted.low
 
 
+@pytest.mark.slow
 def test_ranking_says_what_few_parts_do(studied):
     answer = studied.rank(effort="quick")
     assert says(" ".join(answer.sentences), "check.few_parts_one", parts=20)

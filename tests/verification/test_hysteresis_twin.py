@@ -77,6 +77,7 @@ def test_the_loop_is_the_twins_with_the_secants_of_the_theory_page(name, unit, a
         assert loop.twist[0, level, 0] == pytest.approx(twin, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "unit", "angle"), CASES)
 def test_the_loop_under_own_loads_is_that_of_nonlinear_bearings(name, unit, angle):
     """The same against bearings whose force is their own function of displacement; measured 1.8e-7."""

@@ -379,6 +379,7 @@ def test_the_velocity_is_equation_18():
     assert list(best_neighbours(np.array([3.0, 1.0, 2.0, 0.0, 5.0]))) == [1, 1, 3, 3, 3]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
 def test_every_search_ends_where_gauss_newton_does(algorithm):
     """Within 1e-4 of S, and the same bits from the same seed."""

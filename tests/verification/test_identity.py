@@ -211,6 +211,7 @@ def identities(head, texts):
 """
 
 
+@pytest.mark.slow
 def test_it_is_the_same_in_another_process_with_other_hashes():
     here, texts = {}, [text.format("1.0") for text in CASES.values()]
     exec(SAME, here)

@@ -113,6 +113,7 @@ def test_they_are_one_line_of_a_check(tmp_path):
     assert len(lines) == 1 and lines[0].startswith("  Bolzen (pin*), 4 places (pin1, pin2, pin3, pin4): 40 µm, ")
 
 
+@pytest.mark.slow
 def test_they_are_one_line_of_a_drawing_everywhere_and_come_back_as_their_row(tmp_path):
     answer = pins(tmp_path, questions=[ta.Allocation(front=False, what_if=False)]).allocate()
     answer.save(tmp_path / "found")

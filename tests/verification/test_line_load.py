@@ -309,6 +309,7 @@ def test_crowning_raises_the_pressure_of_a_loaded_contact_and_nothing_else():
         assert (own.pressure[carries] > getattr(even, name).pressure[carries]).all()
 
 
+@pytest.mark.slow
 def test_what_crowning_would_change_as_a_spring_in_series():
     """The figures that theory and assumptions state for what the equilibrium does not feel."""
     design = crowned(load_reducer("rv20e"), 5)

@@ -38,6 +38,7 @@ def units(drawing) -> np.ndarray:
     return seeded_units(drawing.errors, 6)
 
 
+@pytest.mark.slow
 def test_output_under_a_load_case_is_that_of_the_study_under_its_conditions(model, drawing, units):
     alone = {
         RATED: bound(drawing, torque=-167.0),
@@ -87,6 +88,7 @@ def test_a_load_case_offers_what_it_changes(model):
     assert ta.worst(ta.LOST_MOTION) not in model.outputs  # of one load case
 
 
+@pytest.mark.slow
 def test_transmission_error_within_a_part_of_the_turn(drawing, units):
     whole = ta.LoadCase("whole", output_angles=(0, 360))
     parts = [ta.LoadCase(f"part {at}", output_angles=(90 * at, 90 * at + 90)) for at in range(4)]

@@ -59,6 +59,7 @@ def lots(few: ta.Drawing) -> Lots:
     return Lots(2 * len(few.sources), LEVEL, 1)
 
 
+@pytest.mark.slow
 def test_unmoved_lots_have_no_more_alarms_than_is_stated(few, lots):
     rng = np.random.default_rng(11)
     alarms = sum(bool(judged(drawn_lot(few.sources, PARTS, rng), few, lots).moved) for _ in range(200))
@@ -66,6 +67,7 @@ def test_unmoved_lots_have_no_more_alarms_than_is_stated(few, lots):
     assert 1 <= alarms <= stats.binom.isf(0.001, 200, LEVEL)
 
 
+@pytest.mark.slow
 def test_a_moved_process_is_named_in_95_of_100_lots(few, lots):
     rng, named = np.random.default_rng(12), 0
     for _ in range(200):
@@ -185,6 +187,7 @@ def test_coordinates_of_a_gauge_that_errs_have_the_capability_of_their_place():
     assert capable.cp_interval[0] < 1.0 < capable.cp_interval[1]
 
 
+@pytest.mark.slow
 def test_what_is_detectable_is_found_as_often_as_it_says():
     drawing = drawing_of(*({"id": f"size{at}", **ROW} for at in range(10)))
     rng, named = np.random.default_rng(3), 0

@@ -265,6 +265,7 @@ class Told:
         self.sentences.append(sentence)
 
 
+@pytest.mark.slow
 def test_an_allocation_says_first_that_a_limit_is_out_of_reach(tmp_path):
     told = Told()
     study = study_of_one(stack, ta.Limit(lower=40.0), "h6")
@@ -273,6 +274,7 @@ def test_an_allocation_says_first_that_a_limit_is_out_of_reach(tmp_path):
     assert says(found.document.warnings, "check.missed")
 
 
+@pytest.mark.slow
 def test_a_single_stage_names_the_lost_motion_that_it_can_reach():
     """The best is the least room on the flank, 1 of 1 to 12 µm, and 5 of 5 to 30 µm at tip and root: 1.88′."""
     study = study_of(str(LINEAR_STAGE), "cd29_drawing", limits={LOST_MOTION: ta.Limit(upper=1.5)})

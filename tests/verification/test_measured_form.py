@@ -75,6 +75,7 @@ def reducer() -> Reducer:
     return load_reducer("rv20e_liu2020")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("torque", [-1.0, -167.0])
 def test_a_profile_sampled_from_amounts_has_their_transmission_error(reducer, torque):
     unit = load_unit("table4").deviations
@@ -426,6 +427,7 @@ def contact_amounts(reducer: Reducer) -> tuple[float, float]:
     return float(found.before[360]), found.radial
 
 
+@pytest.mark.slow
 def test_the_perfect_reducer_beside_a_measured_unit_has_no_form(reducer, tmp_path):
     write(tmp_path / "disc2.csv", disc_points(reducer, reducer.modification))
     found, exact = (
@@ -464,6 +466,7 @@ def test_a_study_is_known_by_its_profile_too(tmp_path):
     assert known[3] == pytest.approx(known[1] + 1.0)
 
 
+@pytest.mark.slow
 def test_smoothed_points_let_the_search_find_the_extremes(reducer):
     generator, teeth = np.random.default_rng(2), reducer.cycloid_stage.disc_teeth
     around = 2 * np.pi * np.arange(POINTS * teeth) / POINTS

@@ -147,6 +147,7 @@ def named(model: EquivalentModel, errors: np.ndarray, angles: int | None = None)
     return {order: size / ARCSECOND for order, size, _ in turn_orders(model, errors, -1.0, angles).main(8)}
 
 
+@pytest.mark.slow
 def test_orders_of_a_single_stage_are_those_of_its_pins_and_output_pins():
     """8 output pins meet 30 pins 240 times, 29 teeth 870 times: all else are sums of both, multiples of 30."""
     model = EquivalentModel(load_reducer(LINEAR_STAGE))
@@ -158,6 +159,7 @@ def test_orders_of_a_single_stage_are_those_of_its_pins_and_output_pins():
     np.testing.assert_allclose(amplitudes(model, list(found), 5003)[:5], list(found.values())[:5], rtol=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", ["rv20e", "rv40e_xi2015", pytest.param("rv80e", marks=pytest.mark.slow)])
 def test_exact_rv_reducers_make_no_order_below_that_of_pins_and_teeth(preset):
     """At 936 angles 1,560 folds back onto 312 = 2·936 − 1,560, 4,680 at 6,552 angles onto 1,872."""
@@ -167,6 +169,7 @@ def test_exact_rv_reducers_make_no_order_below_that_of_pins_and_teeth(preset):
     assert coarse.main(8) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("line", "expected"),
     [

@@ -46,6 +46,7 @@ def test_they_stand_beside_the_source_in_every_answer_and_in_the_next_table(tmp_
     assert book["share of variance [%]"].notna().all()
 
 
+@pytest.mark.slow
 def test_they_stand_for_the_source_where_files_and_commands_name_one(tmp_path):
     drawing = ta.drawing(table(tmp_path))
     for asked in ("4711-12", "4711-*"):

@@ -54,6 +54,7 @@ def priced(problem: AllocationProblem, factors: np.ndarray) -> AllocationProblem
     return replace(problem, features=features)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_at_the_ends_of_its_price_a_zone_has_moved_by_a_tenth(seed):
     """Prices found by solving the whole program at every price that a root finder asks for."""

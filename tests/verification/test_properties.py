@@ -91,6 +91,7 @@ def test_a_name_that_would_make_its_row_a_comment_is_refused():
         Drawing.of_rows([alone("#1")])
 
 
+@pytest.mark.slow
 @every_table
 @given(rows=tables(), order=st.randoms(use_true_random=False))
 def test_the_order_of_rows_changes_no_zone_and_no_cost(rows, order):

@@ -104,6 +104,7 @@ def limited(bounds: PeakBounds | SlopeBounds, limit: float, allowed: int, accura
     return Conditions(limits=(own,), allowed=(((0,), allowed),))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_no_unit_of_a_box_lies_below_its_bound(seed):
     """100 random designs in boxes of 0.1 to 30 % to either side; the narrowest one bounds all units, to 0.05″."""
@@ -189,6 +190,7 @@ def gap_of(seed: int, boxes: int, steps: int) -> float:
     return best / found - 1
 
 
+@pytest.mark.slow
 def test_bounds_of_small_reducers_lie_below_the_cheapest_of_a_grid():
     for seed in range(2):  # thirty in the slow test
         gap_of(seed, boxes=60, steps=5)
@@ -317,6 +319,7 @@ def test_a_reducer_that_has_no_bounds_is_refused(preset, output, says):
     assert f"no bound can be proven, as {says}" in str(caught.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("boxes", "key"), [(500, "proven"), (1, "proven_nothing")])
 def test_the_report_says_what_no_drawing_costs_less_than(boxes, key):
     slopes = {GAP: {"a": (1.0, 1.0), "b": (-1.0, -1.0), "c": (2.0, 2.0)}}

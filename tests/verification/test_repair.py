@@ -131,6 +131,7 @@ def all_measured(toy: Toy) -> float:
     return toy.paid(int(toy.costs(toy.likely()).mean(axis=0).argmin()))
 
 
+@pytest.mark.slow
 def test_to_follow_the_advice_costs_less_than_to_suspect_and_than_to_measure_everything():
     seeds, paid = SeedTree(4).child("policies"), []
     for number in range(200):

@@ -114,6 +114,7 @@ def test_turned_flanks_let_both_discs_turn_by_their_angle_and_take_no_radial_cle
     np.testing.assert_allclose(found[0] - found[1], -turned * (1 - 1 / reducer.ratio) * 39 / 40, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_angles_between_the_tabulated_ones_feel_the_kink_of_turned_flanks_at_root_and_tip():
     """Without radial clearance pins press at the root; a cubic through |S| at the nodes misses 0.4 µm of 5 there.
 

@@ -93,6 +93,7 @@ def test_nothing_stays_where_the_first_question_has_no_answer(tmp_path, monkeypa
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 def test_a_front_that_cannot_be_found_leaves_the_drawing(monkeypatch):
     def fails(*_):
         raise SolveError("Too many designs of the front failed.")

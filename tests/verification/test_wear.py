@@ -103,6 +103,7 @@ def test_a_unit_ages_by_its_own_errors(model, drawing):
     assert taken.mean() == pytest.approx(-2 * own.wear.pin_depth, rel=0.1)
 
 
+@pytest.mark.slow
 def test_two_micrometres_off_all_flanks_make_the_lost_motion_of_practice(drawing):
     """A flank of 3.5 µm, medians of 40 units: an earlier calculation had 0.64 → 1.02′ and +4″."""
     choice = ta.reducer("rv20e", stiffness=STIFFNESS, neglected=("disc*.tilt",))

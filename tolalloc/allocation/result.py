@@ -304,7 +304,7 @@ def limit_price(side: OneSidedConstraint, price: float) -> tuple[float, str]:
 
 
 def unit_quantile(design: VerifiedDesign, check: Check, side: OneSidedConstraint) -> float:
-    """Return the limit that just the target share of a design's units keeps [unit of the output].
+    """Return the limit that the target share keeps as a design's units show at even odds [unit of the output].
 
     Parameters
     ----------
@@ -317,8 +317,7 @@ def unit_quantile(design: VerifiedDesign, check: Check, side: OneSidedConstraint
 
     Notes
     -----
-    What the units show at even odds (Hahn & Meeker 1991, Statistical Intervals); not a number unless a yield is asked
-    for.
+    An order statistic (Hahn & Meeker 1991, Statistical Intervals); not a number unless a yield is asked for.
     """
     asked, tested = check.requirement, design.independent
     if not isinstance(asked.guarantee, AtYield):

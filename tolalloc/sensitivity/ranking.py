@@ -117,9 +117,9 @@ def share_interval(
 def percentile_interval(
     resamples: Float[np.ndarray, "resample source"],
     confidence: float = 0.9,
-    unseen: Float[np.ndarray, " source"] | float = 0.0,
+    unseen: Float[np.ndarray, " source"] | float = -np.inf,
 ) -> Float[np.ndarray, "2 source"]:
-    """Return the two-sided percentile interval of every index, from 0 to what is unseen where that is more [-].
+    """Return the two-sided percentile interval of every index, from 0 to what is unseen if that is given and more [-].
 
     References
     ----------

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from jaxtyping import Float
 
 from tolalloc.drawings.sources import Source, zone_in, zone_unit
 from tolalloc.reading.units import MICROMETRE, unit_of
@@ -39,6 +40,11 @@ def largest_first(values: Sequence[float] | np.ndarray) -> list[int]:
     return [int(at) for at in np.argsort(-np.round(known / size, _ALIKE), kind="stable")]
 
 
+def _told(index: Float[np.ndarray, "*source"]) -> Float[np.ndarray, "*source"]:
+    """Return indices as shares within 0 and 1, as their intervals are; chance may put an estimate beside them [-]."""
+    return np.asarray(np.clip(index, 0.0, 1.0))
+
+
 def sobol_table(sobol: SobolIndices) -> pd.DataFrame:
     """Return the sources, largest total Sobol index first, with intervals and the confidence of every place."""
     share = sobol.total / sobol.total.sum() * 100
@@ -52,10 +58,10 @@ def sobol_table(sobol: SobolIndices) -> pd.DataFrame:
             "source": sobol.sources,
             "contribution [%]": share,
             "cumulative [%]": lambda at: share[sobol.order[: place[at]]].sum(),
-            "total index ST [-]": sobol.total,
+            "total index ST [-]": _told(sobol.total),
             "ST low 5 % [-]": total[0],
             "ST high 95 % [-]": total[1],
-            "first index S1 [-]": sobol.first,
+            "first index S1 [-]": _told(sobol.first),
             "S1 low 5 % [-]": first[0],
             "S1 high 95 % [-]": first[1],
             "S1 reading": [_say("zero" if is_zero else "above_zero") for is_zero in sobol.first_is_zero],
@@ -112,9 +118,9 @@ def ranked(sobol: SobolIndices) -> list[dict[str, Any]]:
         "ranking",
         {
             "source": sobol.sources,
-            "total index [-]": sobol.total,
+            "total index [-]": _told(sobol.total),
             "interval 90 % [-]": lambda at: interval[:, at].tolist(),
-            "first index [-]": sobol.first,
+            "first index [-]": _told(sobol.first),
             "P(among first 3) [-]": among,
         },
         sobol.order,
@@ -138,10 +144,10 @@ def dimensions_table(result: RankingResult, found: SobolIndices) -> pd.DataFrame
             "dimension": found.sources,
             "places [-]": lambda at: len(members[at]),
             "as written [mm]": lambda at: portrait_of(result.model).frames(members[at]),
-            "total-effect index [%]": found.total * 100,
+            "total-effect index [%]": _told(found.total) * 100,
             "low 5 % [%]": low,
             "high 95 % [%]": high,
-            "alone (first-order index) [%]": np.maximum(found.first, 0.0) * 100,
+            "alone (first-order index) [%]": _told(found.first) * 100,
             f"Sens [{unit}/µm]": lambda at: span(*own.slope) if (own := lines[at]) else np.nan,
             f"rms change per µm in every place [{unit}/µm]": per_micrometre,
             "rank per µm [-]": lambda at: place.get(at, np.nan),
@@ -186,7 +192,7 @@ def pairs_table(sobol: SobolIndices) -> Table[int]:
         {
             "source": [sobol.sources[one] for one, _ in sobol.pairs],
             "with": [sobol.sources[other] for _, other in sobol.pairs],
-            "second index S2 [-]": sobol.second,
+            "second index S2 [-]": _told(sobol.second),
             "S2 low 5 % [-]": low,
             "S2 high 95 % [-]": high,
         },
@@ -245,7 +251,7 @@ def orders_table(result: RankingResult, unit: str) -> pd.DataFrame:
         ("share alone [-]", "alone", found.first, first),
         ("share with others [-]", "with others", found.total, total),
     ):
-        columns[name] = [shares[row] for row in rows]
+        columns[name] = [_told(shares)[row] for row in rows]
         columns[f"{short} low 5 % [-]"] = [ends[at, 0, source] for at, source in rows]
         columns[f"{short} high 95 % [-]"] = [ends[at, 1, source] for at, source in rows]
     return of_positions("orders", columns, range(len(rows))).frame()
@@ -357,7 +363,7 @@ def reject_table(found: TargetSensitivity) -> pd.DataFrame:
             "lift [-]": found.lift,
             "lift low 5 % [-]": lift[0],
             "lift high 95 % [-]": lift[1],
-            "target index S1 [-]": found.first,
+            "target index S1 [-]": _told(found.first),
             "target S1 low 5 % [-]": first[0],
             "target S1 high 95 % [-]": first[1],
             "p-value of no effect [-]": found.p_value,
