@@ -42,6 +42,10 @@ _NOMINAL = "*.clearance"
 
 _LARGEST_ZONE = 200.0 * MICROMETRE
 """Largest zone of a reducer's part that is believed; a metre typed for a millimetre is far above it [m]."""
+_LARGEST_MISMATCH = 0.01
+"""Largest share by which a nominal size of a table may differ from that of the reducer without a remark [-]."""
+_FARTHEST = 50.0
+"""Largest clearance that a modification may be asked to leave, either way [µm]."""
 
 
 def bind(
@@ -121,10 +125,6 @@ def _require_each(errors: ErrorModel, own: Mapping[str, Sequence[str]], reducer:
     )
 
 
-_LARGEST_MISMATCH = 0.01
-"""Largest share by which a nominal size of a table may differ from that of the reducer without a remark [-]."""
-
-
 def _other_sizes(errors: ErrorModel, reducer: Reducer) -> tuple[str, ...]:
     """Return which nominal sizes of a table are not those of the reducer, in sentences; a size of 0 is not stated."""
     sentences = []
@@ -140,10 +140,6 @@ def _other_sizes(errors: ErrorModel, reducer: Reducer) -> tuple[str, ...]:
                 "model takes the reducer's, so correct the one that is wrong."
             )
     return tuple(sentences)
-
-
-_FARTHEST = 50.0
-"""Largest clearance that a modification may be asked to leave, either way [µm]."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

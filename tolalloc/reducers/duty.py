@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import MEGAPASCAL, MILLIMETRE
-from tolalloc.reducers.equivalent.hysteresis import FrictionAtTorque
+from tolalloc.reducers.equivalent.friction import FrictionAtTorque
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import Solved, peak_line_load, unit_pressure
 from tolalloc.reducers.equivalent.perfect import exact_unit
@@ -31,6 +31,7 @@ RESISTANCE, _PIN_CIRCLE = 0.05, 52e-3
 """Temperature of the discs above the ring over the lost power at an RV-20E's pin circle, an assumption [K/W, m]."""
 _SETTLED, _STEPS = 1e-3, 200
 """Change below which a temperature has settled [K], and most steps to get there [-]."""
+MAIN = "carrier_bearing"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +50,7 @@ class CaseLoads:
     @property
     def loss(self) -> float:
         """Power that becomes heat [W]."""
-        return self.friction_torque * _angular(self.case)
+        return self.friction_torque * (2.0 * pi * (self.case.speed or 0.0) / 60.0)
 
     @property
     def efficiency(self) -> float:
@@ -101,11 +102,6 @@ class DutyResult:
         if not self.bearings:
             return None
         return float(sum(own.count * own.life**-_WEIBULL for own in self.bearings) ** (-1.0 / _WEIBULL))
-
-
-def _angular(case: LoadCase) -> float:
-    """Return the speed of the output [rad/s]."""
-    return 2.0 * pi * (case.speed or 0.0) / 60.0
 
 
 def require_cycle(cases: Sequence[LoadCase], reducer: Reducer) -> None:
@@ -223,9 +219,6 @@ def _over_turn(bearing: RollingBearing, force: Float[np.ndarray, "angle element"
     """Return the constant load that takes as much life as that of the turn, (mean of F^p)^(1/p) [N]."""
     exponent = bearing.life_exponent
     return np.asarray((force**exponent).mean(axis=0) ** (1.0 / exponent) + bearing.rows * bearing.idle_load)
-
-
-MAIN = "carrier_bearing"
 
 
 def _known(reducer: Reducer) -> dict[str, RollingBearing]:

@@ -47,6 +47,7 @@ _WINDOW = Rule(
         and value[1] - value[0] <= 360
     ),
 )
+_UNITS = {"torque": "N·m", "speed": "rpm", "share": "%", "disc_temperature": "K", "moment": "N·m"}
 
 
 @dataclass(frozen=True)
@@ -202,7 +203,7 @@ def _over_all(place: str, output: Any, said: str) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Combined:
+class OverLoadCases:
     """An output over several load cases: the worst of it, its mean weighted by shares of the time, or a change."""
 
     of: tuple[str, ...]  # Names of the output under every load case
@@ -219,17 +220,19 @@ class Combined:
         return np.asarray(np.eye(values.shape[1])[worst])
 
 
-def combined_outputs(cases: Sequence[LoadCase], outputs: Sequence[str]) -> Mapping[str, Combined]:
+def combined_outputs(cases: Sequence[LoadCase], outputs: Sequence[str]) -> Mapping[str, OverLoadCases]:
     """Return what load cases change of every output, and its worst and mean over two or more, by their names."""
-    found: dict[str, Combined] = {}
+    found: dict[str, OverLoadCases] = {}
     for output in outputs:
         felt = [case for case in cases if case.felt_by(output)]
-        found |= {change(output, case): Combined(of=(at(output, case), output), fixed=(1.0, -1.0)) for case in felt}
+        found |= {
+            change(output, case): OverLoadCases(of=(at(output, case), output), fixed=(1.0, -1.0)) for case in felt
+        }
         if len(felt) > 1:
             names = tuple(at(output, case) for case in felt)
             together = sum(case.share for case in felt)
-            found[worst(output)] = Combined(of=names, fixed=None, least=output in _LEAST_IS_WORST)
-            found[mean(output)] = Combined(of=names, fixed=tuple(case.share / together for case in felt))
+            found[worst(output)] = OverLoadCases(of=names, fixed=None, least=output in _LEAST_IS_WORST)
+            found[mean(output)] = OverLoadCases(of=names, fixed=tuple(case.share / together for case in felt))
     return found
 
 
@@ -257,9 +260,6 @@ class CycleRow(Record):
     share: float
     disc_temperature: float | None = None
     moment: float | None = None
-
-
-_UNITS = {"torque": "N·m", "speed": "rpm", "share": "%", "disc_temperature": "K", "moment": "N·m"}
 
 
 def load_cycle(path: Path) -> tuple[LoadCase, ...]:

@@ -23,7 +23,7 @@ from tolalloc.reducers.equivalent.interfaces import pin_terms
 from tolalloc.reducers.equivalent.perfect import preload, rated_pin_force
 from tolalloc.reducers.equivalent.wear import wear_of
 from tolalloc.reducers.families.known import family_of
-from tolalloc.reducers.load_case import Combined, LoadCase, at, combined_outputs
+from tolalloc.reducers.load_case import LoadCase, OverLoadCases, at, combined_outputs
 from tolalloc.reducers.reducer.design import (
     MODIFICATION_CONVENTION,
     ROTATION_CONVENTION,
@@ -143,7 +143,7 @@ class ReducerModel(Model):
         }
 
     @cached_property
-    def _combined(self) -> Mapping[str, Combined]:
+    def _combined(self) -> Mapping[str, OverLoadCases]:
         """Output over all load cases → what it is made of."""
         return combined_outputs(self.load_cases, self._own_outputs)
 
@@ -286,7 +286,9 @@ class ReducerModel(Model):
             by_setting=found.by_modification[:, : len(self._amounts)] @ self._modification_by_clearance * MICROMETRE,
         )
 
-    def _combined_derivatives(self, combined: Combined, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+    def _combined_derivatives(
+        self, combined: OverLoadCases, x: Float[np.ndarray, "sample column"]
+    ) -> SettingDerivatives:
         """Return the derivatives of what is made of an output under several load cases."""
         parts = [self.derivatives(name, x) for name in combined.of]
         values = np.hstack([part.evaluation.values for part in parts])
@@ -370,12 +372,10 @@ class ReducerModel(Model):
     @property
     def content(self) -> Any:
         """Reducer, identified stiffnesses, torque, and form, crowning and temperatures of parts where there are any."""
-        own: tuple[Any, ...] = (self.reducer, self.identified.content if self.identified else None, self.kernel.torque)
-        own = (*own, self.reducer.form) if self.reducer.form else own
-        crowning = self.reducer.cycloid_stage.crowning
-        own = (*own, crowning) if crowning else own
+        form = [own for own in (self.reducer.form, self.reducer.cycloid_stage.crowning) if own]
         further = (self.kernel.disc_temperature, self.load_cases)
-        return (*own, *further) if any(further) else own
+        identified = self.identified.content if self.identified else None
+        return (self.reducer, identified, self.kernel.torque, *form, *(further if any(further) else ()))
 
     @property
     def uncertain(self) -> tuple[CorrelatedSource, ...]:

@@ -20,6 +20,21 @@ from tolalloc.reducers.reducer.design import CycloidStage, Modification, Reducer
 _ROUNDING = 1e-17  # violation that counts as none [m]
 _MOST_OFF = 2 * MICROMETRE  # by which a wanted clearance may be missed by exact distances [m]
 _UNMET = 1.0  # merit from which on a constraint is violated; no objective comes near it [m]
+_FIRST, _POINTS, _LEVELS = 33, 9, 24  # the last points are 32·4²³ times closer than the bounds, which is rounding
+Values = Callable[[Float[np.ndarray, "n p"]], Float[np.ndarray, "n p"]]
+"""Values of points on n lines."""
+Metric = Literal["same_angle", "normal", "nearest"]
+METRICS: dict[Metric, str] = {
+    "same_angle": "mean distance of the points with the same φ on the two profiles",
+    "normal": "mean distance of the points with the same φ along the modified profile's normal",
+    "nearest": "mean distance of the rotated profile's points from the modified profile",
+}
+METHODS = ("clearances", "song2019", "li2018")
+"""Amounts that leave wanted clearances, and two published methods: closest to a rotated profile, and least gap."""
+BUILDABLE_FLANK, BUILDABLE_RADIAL = 3.5 * MICROMETRE, 8 * MICROMETRE
+"""Clearances that are wanted unless said otherwise, of a drawing of an RV-20E that can be built; assumed [m]."""
+PUBLISHED_RADIAL = 15 * MICROMETRE
+"""Radial clearance of the published methods unless said otherwise [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,12 +93,6 @@ class ModificationProblem:
     def evaluate(self, amounts: Amounts) -> EvaluatedAmounts:
         """Return objective and constraints."""
         return EvaluatedAmounts(objective=self.objective(amounts), constraints=self.constraints(amounts))
-
-
-_FIRST, _POINTS, _LEVELS = 33, 9, 24  # the last points are 32·4²³ times closer than the bounds, which is rounding
-
-Values = Callable[[Float[np.ndarray, "n p"]], Float[np.ndarray, "n p"]]
-"""Values of points on n lines."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -236,15 +245,6 @@ def closed_form(stage: CycloidStage, radial_clearance: float) -> Modification:
     )
 
 
-Metric = Literal["same_angle", "normal", "nearest"]
-
-METRICS: dict[Metric, str] = {
-    "same_angle": "mean distance of the points with the same φ on the two profiles",
-    "normal": "mean distance of the points with the same φ along the modified profile's normal",
-    "nearest": "mean distance of the rotated profile's points from the modified profile",
-}
-
-
 def rotated_profile_fit(
     stage: CycloidStage,
     shift_sign: int = 1,
@@ -359,14 +359,6 @@ def _solved(problem: ModificationProblem) -> Optimum:
         return reference(problem)
     own = np.array([problem.wanted.equidistant, problem.wanted.shift])
     return Optimum(amounts=own, objective=float(problem.objective(own[np.newaxis])[0]), violation=0.0, evaluations=1)
-
-
-METHODS = ("clearances", "song2019", "li2018")
-"""Amounts that leave wanted clearances, and two published methods: closest to a rotated profile, and least gap."""
-BUILDABLE_FLANK, BUILDABLE_RADIAL = 3.5 * MICROMETRE, 8 * MICROMETRE
-"""Clearances that are wanted unless said otherwise, of a drawing of an RV-20E that can be built; assumed [m]."""
-PUBLISHED_RADIAL = 15 * MICROMETRE
-"""Radial clearance of the published methods unless said otherwise [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -31,6 +31,12 @@ from tolalloc.reducers.families.family import Place
 from tolalloc.reducers.families.known import SOURCES, family_of
 from tolalloc.reducers.reducer.design import Reducer
 
+_POINTS = 22
+"""Points of a tooth [-]."""
+PER_CRANK_TURN = 12
+"""Angles of a picture per turn of the cranks; between them it goes straight from one to the next [-]."""
+_NICE = (1.0, 2.0, 5.0)
+
 
 def place_of(source: str) -> str:
     """Return the id of the place that a source sits at.
@@ -62,10 +68,6 @@ def places_of(reducer: Reducer, sources: Iterable[str] = ()) -> tuple[Place, ...
             raise UnknownNameError.among(f"places of {reducer.name}", "source", source, found)
         found[own] = replace(found[own], sources=(*found[own].sources, source))
     return tuple(found.values())
-
-
-_POINTS = 22
-"""Points of a tooth [-]."""
 
 
 def _tooth(reducer: Reducer) -> dict[str, list[Any]]:
@@ -217,11 +219,6 @@ def _displacements(turn: Turn, equilibria: Equilibria, carried: Forces) -> Float
     return found
 
 
-PER_CRANK_TURN = 12
-"""Angles of a picture per turn of the cranks; between them it goes straight from one to the next [-]."""
-_NICE = (1.0, 2.0, 5.0)
-
-
 @dataclass(frozen=True, kw_only=True)
 class Scene:
     """A reducer and one of its units as a picture needs them.
@@ -284,11 +281,12 @@ def scene_of(
         Angles per turn of the cranks [-].
     """
     own = dict(zip(model.columns, (float(value) for value in errors), strict=True))
-    reducer = _as_modified(model.reducer, own)
+    amounts = {name: own[f"modification.{name}"] for name in ("equidistant", "shift")}
+    reducer = replace(model.reducer, modification=replace(model.reducer.modification, **amounts))
     turn = _turn_of(model.at_torque(torque), per_crank_turn * reducer.cycloid_stage.disc_teeth)
     forward, backward = (_solved_states(turn, errors, sign * abs(torque)) for sign in (-1.0, 1.0))
     outline, assumptions = family_of(reducer).outlines(reducer)
-    turns, start = _motion(reducer)
+    (turns, start), first, axes = _motion(reducer), Coordinates.of(reducer), family_of(reducer).axes(reducer)
     return Scene(
         reducer=reducer.name,
         unit=unit,
@@ -296,22 +294,21 @@ def scene_of(
         tooth=_tooth(reducer),
         turns=turns,
         start=start,
-        coordinates=_coordinates(reducer),
+        coordinates={
+            "sun": [first.input],
+            "planet": [first.planet(crank) for crank in range(reducer.crank_count)],
+            "disc": [first.disc(disc) for disc in range(reducer.disc_count)],
+            "carrier": [first.carrier],
+        },
         output_turns=reducer.closing_turns,
         carrier_angle=turn.carrier_angle,
         forward=forward,
         backward=backward,
-        offsets=_offsets(reducer, own),
+        offsets={place: [own[f"{name}.{axis}"] / MILLIMETRE for axis in "xy"] for place, name in axes.items()},
         places=places_of(reducer, sources),
         magnification=_magnification(reducer, forward, backward),
         assumptions=assumptions,
     )
-
-
-def _as_modified(reducer: Reducer, own: Mapping[str, float]) -> Reducer:
-    """Return the reducer with the tooth modification that the unit's columns state."""
-    amounts = {name: own[f"modification.{name}"] for name in ("equidistant", "shift")}
-    return replace(reducer, modification=replace(reducer.modification, **amounts))
 
 
 def _motion(reducer: Reducer) -> tuple[dict[str, float], dict[str, list[float]]]:
@@ -358,23 +355,6 @@ def _first_tooth(teeth: int, others: int, direction: float) -> float:
     """
     ahead = direction * teeth / (2 * pi) % 1.0
     return direction + pi + (ahead - 0.5) * 2 * pi / others
-
-
-def _coordinates(reducer: Reducer) -> dict[str, list[int]]:
-    """Return the first coordinate of every part [-]."""
-    own = Coordinates.of(reducer)
-    return {
-        "sun": [own.input],
-        "planet": [own.planet(crank) for crank in range(reducer.crank_count)],
-        "disc": [own.disc(disc) for disc in range(reducer.disc_count)],
-        "carrier": [own.carrier],
-    }
-
-
-def _offsets(reducer: Reducer, own: Mapping[str, float]) -> dict[str, list[float]]:
-    """Return how far the axes of features are off their places, in the frames of their parts [mm]."""
-    axes = family_of(reducer).axes(reducer)
-    return {place: [own[f"{name}.{axis}"] / MILLIMETRE for axis in "xy"] for place, name in axes.items()}
 
 
 def _magnification(reducer: Reducer, *states: States) -> float:

@@ -13,6 +13,14 @@ RADIAL = "radial clearance [µm]"
 TURNED = "rotation clearance [µm]"
 _STEP = 0.1
 """Step of a difference by a clearance, to either side [µm]."""
+_WIDEST_TEMPERATURE = 20.0
+"""Difference of temperature that the live page offers either way [K]."""
+FARTHEST_TEMPERATURE = 50.0
+"""Largest difference of temperature between discs and ring that is believed, either way [K]."""
+TEMPERATURE = number(
+    f"−{FARTHEST_TEMPERATURE:g} to {FARTHEST_TEMPERATURE:g} K", least=-FARTHEST_TEMPERATURE, most=FARTHEST_TEMPERATURE
+)
+"""Rule of a difference of temperature between discs and ring."""
 
 
 def clearance_settings(present: Sequence[float], bounds: Iterable[tuple[float, float] | None]) -> tuple[Setting, ...]:
@@ -32,19 +40,7 @@ def torque_condition(present: float, rated: float) -> Setting:
     return Setting(name=TORQUE, value=present, lower=-largest, upper=largest, step=rated / 100)
 
 
-_WIDEST_TEMPERATURE = 20.0
-"""Difference of temperature that the live page offers either way [K]."""
-FARTHEST_TEMPERATURE = 50.0
-"""Largest difference of temperature between discs and ring that is believed, either way [K]."""
-
-
 def temperature_condition(present: float) -> Setting:
     """Return the temperature of the discs above the ring as an operating condition, up to 20 K either way [K]."""
     largest = max(_WIDEST_TEMPERATURE, abs(present))
     return Setting(name=DISC_TEMPERATURE, value=present, lower=-largest, upper=largest, step=0.1)
-
-
-TEMPERATURE = number(
-    f"−{FARTHEST_TEMPERATURE:g} to {FARTHEST_TEMPERATURE:g} K", least=-FARTHEST_TEMPERATURE, most=FARTHEST_TEMPERATURE
-)
-"""Rule of a difference of temperature between discs and ring."""

@@ -9,18 +9,17 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.exceptions import SolveError
+from tolalloc.reducers.equivalent.friction import FrictionLoop, friction_loop
 from tolalloc.reducers.equivalent.hysteresis import (
     LOOP_ANGLES,
     LOST_MOTION,
     TURN_ANGLES,
-    FrictionLoop,
     HysteresisLoop,
     both_directions,
-    friction_loop,
     hysteresis_loop,
     own_load_loop,
 )
-from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel, Extremes, Status, count_statuses
+from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel, Status, TurnExtremes, count_statuses
 from tolalloc.reducers.equivalent.outputs import Attribution, Orders, Solved, attribute, turn_orders
 from tolalloc.reducers.equivalent.perfect import Preload, exact_unit, preload, rated_pin_force
 from tolalloc.reducers.equivalent.springs import HARMONICS
@@ -36,7 +35,7 @@ class TransmissionErrorResult:
     unit: BuiltUnit  # Its errors
     torque: float  # Torque on the carrier; negative resists the rotation [N·m]
     equilibria: Equilibria  # At equally spaced angles of one output turn
-    extremes: Extremes  # Largest and smallest transmission error, refined
+    extremes: TurnExtremes  # Largest and smallest transmission error, refined
     preload: Preload  # What presses in this unit without torque
     rated_pin_force: float  # Largest force of a pin of exact parts under their rated torque [N]
     loop: HysteresisLoop  # Hysteresis loop of this unit and of exact parts
@@ -92,6 +91,7 @@ def transmission_error(
         raise SolveError(f"unit {unit.name}: no transmission error can be given, at some angle: {worst.sentence}.")
     forward, backward = both_directions(model, errors, torque)
     drawn = model.with_form(reducer.form.drawn if reducer.form else None)
+    loops = [hysteresis_loop(one, row, LOOP_ANGLES) for one, row in ((model, errors), (drawn, exact_unit(model)))]
     return TransmissionErrorResult(
         reducer=reducer,
         unit=unit,
@@ -100,18 +100,10 @@ def transmission_error(
         extremes=extremes,
         preload=preload(model, errors),
         rated_pin_force=rated_pin_force(drawn.reducer),
-        loop=_loops(model, drawn, errors),
+        loop=HysteresisLoop(torque=loops[0].torque, twist=np.concatenate([loop.twist for loop in loops])),
         own_loads=own_load_loop(model, errors, TURN_ANGLES, (LOST_MOTION, 1.0)) if reducer.parts else None,
         friction=None if reducer.friction_dimensions.unknown else friction_loop(model, errors, TURN_ANGLES),
         reversed_by=(backward - forward)[0],
         attribution=attribute(model, errors, torque, orders) if attributed else None,
         orders=orders,
     )
-
-
-def _loops(model: EquivalentModel, drawn: EquivalentModel, errors: Float[np.ndarray, "1 column"]) -> HysteresisLoop:
-    """Return the loops of a unit and of exact parts."""
-    if drawn is model:
-        return hysteresis_loop(model, np.concatenate([errors, exact_unit(model)]), LOOP_ANGLES)
-    own = [hysteresis_loop(one, row, LOOP_ANGLES) for one, row in ((model, errors), (drawn, exact_unit(model)))]
-    return HysteresisLoop(torque=own[0].torque, twist=np.concatenate([loop.twist for loop in own]))

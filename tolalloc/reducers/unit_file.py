@@ -1,7 +1,4 @@
-"""Unit files: the actual errors of one built reducer.
-
-Unit tables: the measured errors of many built reducers, one row per unit, read from CSV and written back.
-"""
+"""Measured errors of built reducers: of one in a unit file, of many in a table with a row for each."""
 
 from __future__ import annotations
 
@@ -29,7 +26,7 @@ from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
 from tolalloc.reducers.families.known import SOURCES
 from tolalloc.reducers.reducer.design import Modification, Reducer
 from tolalloc.reducers.reducer.files import PRESETS
-from tolalloc.reducers.reducer.form import FlankForm, Form, PinForm
+from tolalloc.reducers.reducer.form import FlankForm, PartForm, PinForm
 
 _HARMONIC = re.compile(r"(.*)\.(?:cos|sin)(\d+)")
 
@@ -38,6 +35,9 @@ Magnitude = Annotated[float, Field(ge=0, le=200)]
 Microradians = Annotated[float, Field(ge=-20000, le=20000)]
 Degrees = Annotated[float, Field(ge=-360, le=360)]
 Order = Annotated[int, Field(ge=1, le=100)]
+LENGTH_UNITS, ANGLE_UNITS = ("µm", "um"), ("µrad", "urad")
+LARGEST_LENGTH, LARGEST_ANGLE = 200.0, 20000.0
+"""Largest deviation that is believed, as in a unit file [µm, µrad]."""
 
 
 class ProfileRecord(Record):
@@ -80,6 +80,11 @@ class BuiltUnit:
     profiles: Mapping[str, MeasuredProfile] = field(default_factory=dict)
     roundness: Mapping[str, PinForm] = field(default_factory=dict)
 
+    def modification(self, reducer: Reducer) -> Modification:
+        """Return the tooth modification of the unit, that of the reducer where it does not state its own."""
+        stated = reducer.modification.deviations
+        return Modification(**{name.rpartition(".")[2]: self.deviations.get(name, stated[name]) for name in stated})
+
     def as_built(self, reducer: Reducer) -> Reducer:
         """Return the reducer with the form of the unit's measured discs and pins, itself where none is stated.
 
@@ -90,10 +95,8 @@ class BuiltUnit:
         """
         if not (self.profiles or self.roundness):
             return reducer
-        stage, form, assumptions = reducer.cycloid_stage, reducer.form or Form(), list(reducer.assumptions)
-        stated = {**reducer.modification.deviations, **self.deviations}
-        amounts = {name.rpartition(".")[2]: stated[name] for name in reducer.modification.deviations}
-        drawn = ToothProfile(stage=stage, modification=Modification(**amounts), form=form.designed)
+        stage, form, assumptions = reducer.cycloid_stage, reducer.form or PartForm(), list(reducer.assumptions)
+        drawn = ToothProfile(stage=stage, modification=self.modification(reducer), form=form.designed)
         numbers = {f"disc{disc + 1}": disc for disc in range(reducer.disc_count)}
         discs: dict[int, FlankForm] = {}
         for name, profile in self.profiles.items():
@@ -201,14 +204,12 @@ def load_unit(name: str | Path) -> BuiltUnit:
     path = shipped_or_path(name, PRESETS, ".unit.toml", "unit")
     record = validated(UnitRecord, read_toml(path), path)
     deviations = {column: value * MICROMETRE for column, value in record.lengths.items()}
-    for source, (magnitude, direction) in record.vectors.items():
-        deviations[f"{source}.x"] = magnitude * MICROMETRE * cos(radians(direction))
-        deviations[f"{source}.y"] = magnitude * MICROMETRE * sin(radians(direction))
     deviations |= {column: value * MICRORADIAN for column, value in record.angles.items()}
     roundness = {}
-    for source, (magnitude, direction) in record.tilts.items():
-        deviations[f"{source}.x"] = magnitude * MICRORADIAN * cos(radians(direction))
-        deviations[f"{source}.y"] = magnitude * MICRORADIAN * sin(radians(direction))
+    for vectors, unit in ((record.vectors, MICROMETRE), (record.tilts, MICRORADIAN)):
+        for source, (magnitude, direction) in vectors.items():
+            deviations[f"{source}.x"] = magnitude * unit * cos(radians(direction))
+            deviations[f"{source}.y"] = magnitude * unit * sin(radians(direction))
     for source, waves in record.harmonics.items():
         sines = [
             (order, amplitude * MICROMETRE * sin(radians(phase)), amplitude * MICROMETRE * cos(radians(phase)))
@@ -239,11 +240,6 @@ def _profile(folder: Path, record: ProfileRecord) -> MeasuredProfile:
         spans=record.spans,
         across=record.across,
     )
-
-
-LENGTH_UNITS, ANGLE_UNITS = ("µm", "um"), ("µrad", "urad")
-LARGEST_LENGTH, LARGEST_ANGLE = 200.0, 20000.0
-"""Largest deviation that is believed, as in a unit file [µm, µrad]."""
 
 
 def unit_names(table: TextTable) -> tuple[str, ...]:

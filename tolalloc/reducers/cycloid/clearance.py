@@ -26,6 +26,8 @@ FLANK = np.linspace(0.0, pi, 721)
 
 _TURNED = FLANK[4:-4]
 """The same without the pins within 1° of root and tip, whose clearance a rotation of the disc does not close [rad]."""
+Gap = Callable[[Angles, Rotation], Float[np.ndarray, "*angles"]]
+"""Clearance of pins at angles φ on a disc rotated by an angle [m]."""
 
 
 def is_large(stage: CycloidStage, modification: Modification) -> bool:
@@ -121,10 +123,6 @@ def exact_clearance(
     return clearance
 
 
-Gap = Callable[[Angles, Rotation], Float[np.ndarray, "*angles"]]
-"""Clearance of pins at angles φ on a disc rotated by an angle [m]."""
-
-
 def gap_of(profile: ToothProfile, exact: bool) -> Gap:
     """Return the clearance as a function of the pins' angles and of the disc's rotation, exact or linear.
 
@@ -147,7 +145,7 @@ def gap_of(profile: ToothProfile, exact: bool) -> Gap:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Clearance:
+class FlankClearance:
     """What a modification leaves between one flank and the pins."""
 
     pin_angle: Float[np.ndarray, " angle"]  # Angle φ of the pins from the crank direction [rad]
@@ -186,7 +184,7 @@ def _narrowest(gap: Gap, rotation: float, angles: Angles = FLANK) -> tuple[float
     return (float(found.x), float(found.fun)) if found.fun < gaps[at] else (float(angles[at]), float(gaps[at]))
 
 
-def clearance_of(profile: ToothProfile, exact: bool | None = None) -> Clearance:
+def clearance_of(profile: ToothProfile, exact: bool | None = None) -> FlankClearance:
     """Return the clearance of a sound profile and where the first pin truly touches.
 
     Distances are exact by default only where the modification is too large for the linear formula.
@@ -210,7 +208,7 @@ def clearance_of(profile: ToothProfile, exact: bool | None = None) -> Clearance:
     if first_contact[1] > _ROUNDING:
         rotation = float(brentq(lambda by: _narrowest(gap, by, _TURNED)[1], 0.0, one_sided, xtol=1e-15, rtol=1e-12))
         first_contact = _narrowest(gap, rotation, _TURNED)
-    return Clearance(
+    return FlankClearance(
         pin_angle=FLANK,
         before=gap(FLANK, 0.0),
         after=gap(FLANK, rotation),

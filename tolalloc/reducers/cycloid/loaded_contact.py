@@ -1,10 +1,7 @@
-"""Pins and teeth under torque: rotation, forces, loaded zone and pressure, at every phase of the pins.
+"""Pins and teeth under torque: how stiff one pin against one tooth is, rotation, forces, loaded zone and pressure.
 
-How stiff one pin against one tooth is: what every contact law takes, along the whole tooth.
-
-Loaded contact by Li Lixing's linear method and by the contact law at every pin.
-
-What a modification does: clearance, pins that carry, forces, pressure and backlash, in one record.
+By Li Lixing's linear method and by the contact law at every pin, at every phase of the pins; with the clearance of a
+modification it is one record.
 """
 
 from __future__ import annotations
@@ -20,7 +17,7 @@ from jaxtyping import Float, Int
 from tolalloc.capability.halving import halved
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import MICROMETRE
-from tolalloc.reducers.cycloid.clearance import FLANK, LARGE, Clearance, Gap, clearance_of, gap_of, is_large
+from tolalloc.reducers.cycloid.clearance import FLANK, LARGE, FlankClearance, Gap, clearance_of, gap_of, is_large
 from tolalloc.reducers.cycloid.line_contact import LineContact
 from tolalloc.reducers.cycloid.solvers import LAWS, LINEAR
 from tolalloc.reducers.cycloid.solvers.pins import pin_forces
@@ -39,6 +36,12 @@ from tolalloc.reducers.reducer.stiffness import Stiffness
 APPROACH = 2.0 / 3.0
 """Constant of the approach F/c·(ln(cL/F) + 2/3) of pin and tooth: Roark's and Li Lixing's, who write it
 2/3 + ln(16·r·ρ/(2a)²) with Hertz's half width a [-]."""
+PAIR_SHARE = 0.55
+"""Share of the torque on the more loaded disc of a pair, Li Lixing's assumption [-]."""
+_HALVINGS = 45  # from a quarter of a degree down to rounding
+_ITERATIONS = 500
+_SHORTEST = 1e-6  # lever below which a pin at tip or root carries no torque [-]
+_ROUNDING = 1e-12  # difference of amounts that counts as none [m]
 
 
 def contact_stiffness(
@@ -158,12 +161,6 @@ def peak_pressure(
     return np.asarray(np.sqrt(force * contact_modulus * sum_of_curvatures / (np.pi * stage.face_width)))
 
 
-PAIR_SHARE = 0.55
-"""Share of the torque on the more loaded disc of a pair, Li Lixing's assumption [-]."""
-
-_HALVINGS = 45  # from a quarter of a degree down to rounding
-
-
 @dataclass(frozen=True, kw_only=True)
 class LoadedContact:
     """Discs pressed against the pins, at phases that divide the pin pitch."""
@@ -218,7 +215,7 @@ class PressedDiscs:
         return ToothProfile.of(self.reducer)
 
     @cached_property
-    def clearance(self) -> Clearance:
+    def clearance(self) -> FlankClearance:
         """What the modification leaves, and where the first pin touches."""
         return clearance_of(self.profile, self.exact)
 
@@ -264,12 +261,8 @@ def _loaded(
 
     Own derivation: the disc has turned by β + δ_max/r_d, β that of the first contact; the torque is r_d·Σ S·F.
     """
-    reducer, stage, closed, angles = (
-        discs.reducer,
-        discs.reducer.cycloid_stage,
-        discs.clearance,
-        discs.pin_angles(phase),
-    )
+    reducer, stage, closed = discs.reducer, discs.reducer.cycloid_stage, discs.clearance
+    angles = discs.pin_angles(phase)
     gap, lever = gap_of(discs.profile, closed.exact), normals(stage.shortening, angles).lever
     rotations = closed.rotation + deflection / stage.disc_pitch_radius
     evenly = force  # What the even load would have to be for the pressure where it is largest
@@ -286,10 +279,6 @@ def _loaded(
         torque=stage.disc_pitch_radius * (lever * force).sum(axis=2),
         zone=_zones(gap, rotations, closed.first_contact),
     )
-
-
-_ITERATIONS = 500
-_SHORTEST = 1e-6  # lever below which a pin at tip or root carries no torque [-]
 
 
 def pressed_linear(
@@ -461,9 +450,6 @@ def pressed(discs: PressedDiscs, phase: Float[np.ndarray, " phase"]) -> LoadedCo
     return _loaded(discs, f"{law} law at every pin", phase, deflection, force.reshape(angles.shape))
 
 
-_ROUNDING = 1e-12  # difference of amounts that counts as none [m]
-
-
 @dataclass(frozen=True, kw_only=True)
 class Assessment:
     """One modification under one torque."""
@@ -472,8 +458,8 @@ class Assessment:
     torque: float  # Torque on the carrier [N·m]
     share: float  # Share of it on the more loaded disc [-]
     profile: ToothProfile  # The ground profile
-    clearance: Clearance  # Clearance in use, linear or exact
-    exact_clearance: Clearance  # Clearance by exact distances, to compare with
+    clearance: FlankClearance  # Clearance in use, linear or exact
+    exact_clearance: FlankClearance  # Clearance by exact distances, to compare with
     linear: LoadedContact  # The more loaded disc by Li Lixing's linear method
     single: LoadedContact  # The more loaded disc by the contact law at every pin
     together: LoadedContact  # All discs turning by the same angle, their bearings rigid
@@ -510,30 +496,11 @@ class Assessment:
         )
 
 
-def _disc_share(discs: int) -> float:
-    """Return the share of the torque on the most loaded disc: Li Lixing's 0.55 of a pair, others in proportion [-].
-
-    References
-    ----------
-    Li Lixing's method as xi2015 uses it; of other numbers than two an assumption.
-
-    2·0.55/n of n discs, 1 of one (own derivation but for a pair).
-
-    Examples
-    --------
-    >>> _disc_share(2), round(_disc_share(3), 4)
-    (0.55, 0.3667)
-    """
-    return 1.0 if discs == 1 else 2 * PAIR_SHARE / discs
-
-
 def pin_moment(reducer: Reducer, torque: float) -> float:
     """Return the moment of all pin forces about the centres of their discs under a torque on the carrier [N·m].
 
     The housing holds what the sun does not, T·(1 − 1/i). All pin forces pass through the pole, e·zp from the housing's
     centre and e·zc from the disc's, so of that moment zc/zp is left about the disc.
-
-
 
     T_pins = T·(1 − 1/i)·zc/zp; exact without friction and tilt.
 
@@ -562,7 +529,9 @@ def assess(
     reducer = replace(reducer, stiffness=replace(reducer.stiffness, pin_contact_law=law))
     profile, torque = ToothProfile.of(reducer), abs(torque)
     require_sound(profile, reducer.name)
-    share, phase = _disc_share(reducer.disc_count), default_phases(reducer, phases)
+    # Li Lixing's method as xi2015 uses it for a pair; in proportion for other numbers, an assumption
+    share = 1.0 if reducer.disc_count == 1 else 2 * PAIR_SHARE / reducer.disc_count
+    phase = default_phases(reducer, phases)
     one = PressedDiscs(reducer=reducer, torque=share * torque, exact=exact)
     every = PressedDiscs(reducer=reducer, torque=pin_moment(reducer, torque), discs=reducer.disc_count, exact=exact)
     return Assessment(

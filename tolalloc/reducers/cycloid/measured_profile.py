@@ -24,6 +24,7 @@ _DENSE = 256  # places of a tooth among which the one nearest to a point is look
 _MOVES = 30  # rigid movements until they no longer change
 _STILL = 1e-13  # movement that changes nothing any more [m]
 _FURTHEST = 2 * MILLIMETRE  # from the theoretical profile that a datum may put a point [m]
+_KINDS = (("direction", "radius"), ("x", "y"), ("space", "phi", "deviation"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,9 +130,6 @@ class MeasuredProfile:
         else:
             found = np.trapezoid(own, height, axis=0) / (height[-1] - height[0])
         return replace(base, deviation=tuple(found.tolist()))
-
-
-_KINDS = (("direction", "radius"), ("x", "y"), ("space", "phi", "deviation"))
 
 
 def _around(

@@ -1,7 +1,4 @@
-"""The tooth profile of a disc as a parametric curve, exact or modified, and as points dense where it bends most.
-
-Where a pin and the exact tooth of a disc touch, by the pin's angle from the crank direction.
-"""
+"""The tooth profile of a disc, exact or modified: a parametric curve, points dense where it bends most, and normals."""
 
 from __future__ import annotations
 
@@ -22,6 +19,10 @@ Angles = Float[np.ndarray, "*angles"]
 
 Amounts = Float[np.ndarray, "n 2"]
 """Pairs of Δr_rp and Δr_p, `tolalloc.reducers.reducer.design.Modification` [m]."""
+_REACH = np.pi / 2  # the nearest point of the modified profile is at most that far in φ [rad]
+_CLOSE = 1e-8  # a step of Newton's method after which the next one is rounding [rad]
+FEWEST, MOST = 8, 20_000
+_DENSE = 20_001  # angles of the dense tabulation that the points are chosen from
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -231,10 +232,6 @@ def require_sound(profile: ToothProfile, place: str) -> None:
             )
 
 
-_REACH = np.pi / 2  # the nearest point of the modified profile is at most that far in φ [rad]
-_CLOSE = 1e-8  # a step of Newton's method after which the next one is rounding [rad]
-
-
 def nearest_angles(
     stage: CycloidStage, points: Complex[np.ndarray, " point"], angles: Float[np.ndarray, " point"], amounts: Amounts
 ) -> Float[np.ndarray, "n point"]:
@@ -271,11 +268,6 @@ def path_of(
     crank = stage.eccentricity * np.exp(-1j * angle * (stage.pin_count / stage.disc_teeth))
     slope = 1j / stage.disc_teeth * (stage.pin_count * crank - pin)
     return pin - crank, slope, (stage.pin_count**2 * crank - pin) / stage.disc_teeth**2
-
-
-FEWEST, MOST = 8, 20_000
-
-_DENSE = 20_001  # angles of the dense tabulation that the points are chosen from
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,13 +1,13 @@
-"""Every interface but the pins: support of the sun gear, sun–planet meshes, and all bearings.
+"""Every interface of an RV reducer as a spring group with the sources that it declares.
 
-Contact of disc teeth and housing pins: unilateral springs and the errors of teeth, pins and housing.
+Support of the sun gear, sun–planet meshes, all bearings, and the one-sided contact of disc teeth and housing pins.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -19,12 +19,12 @@ from tolalloc.reducers.equivalent.sources import ErrorSource, Nominal
 from tolalloc.reducers.equivalent.springs import (
     Positions,
     SpringGroup,
+    SpringRows,
     harmonic_columns,
     harmonic_waves,
     support,
     turned,
     vector_columns,
-    with_play,
 )
 from tolalloc.reducers.reducer.design import Reducer
 
@@ -38,16 +38,30 @@ class Interface:
 
 
 _STANDS_OFF = Characteristic("coaxiality", "how far an assembly stands off is drawn as coaxiality")
-ECCENTRIC = Characteristic("coaxiality", "the eccentricity of a gear is drawn as its coaxiality")
+_PIN_RADIUS = Nominal(said="its pin radius", of=lambda reducer: reducer.cycloid_stage.pin_radius)
+_PIN_DIAMETER = Nominal(said="twice its pin radius", of=lambda reducer: 2 * reducer.cycloid_stage.pin_radius)
+_ECCENTRIC = Characteristic("coaxiality", "the eccentricity of a gear is drawn as its coaxiality")
 
 
-def _clearance(
-    element: str, *, neglected: str = "*.clearance", first_stage: bool = False, fixed: bool = False
-) -> ErrorSource:
+def _fine(name: str, place: str, neglected: str, **other: Any) -> ErrorSource:
+    """Return a source that a first study leaves out, as any table may."""
+    return ErrorSource(name=name, place=place, neglected=neglected, fine=True, **other)
+
+
+def clearance_source(element: str, *, neglected: str = "*.clearance", **other: Any) -> ErrorSource:
     """Return the deviations of the clearances of an interface's elements."""
-    return ErrorSource(
-        name=f"{element}.clearance", place=element, neglected=neglected, fine=True, first_stage=first_stage, fixed=fixed
-    )
+    return _fine(f"{element}.clearance", element, neglected, **other)
+
+
+def eccentricity_source(gear: str, **other: Any) -> ErrorSource:
+    """Return how far the teeth of a gear of the first stage are off its axis."""
+    name = f"{gear}.eccentricity"
+    return ErrorSource(name=name, characteristic=_ECCENTRIC, shape="vector", place=gear, first_stage=True, **other)
+
+
+def _tilt(part: str, **other: Any) -> ErrorSource:
+    """Return the tilt of a part or of one of its features."""
+    return _fine(f"{part}.tilt", part, "*.tilt", shape="vector", mirror="kept", characteristic=TILT, **other)
 
 
 def sun_support(at: Positions) -> SpringGroup:
@@ -67,7 +81,7 @@ def sun_support(at: Positions) -> SpringGroup:
     >>> sun_support(Positions(load_reducer("rv20e_liu2020"), np.zeros(1))).error[0].tolist()
     [[-1.0, -0.0], [-0.0, -1.0]]
     """
-    return support(at, at.coordinates.input, "sun support", "sun_support", "sun.assembly")
+    return support(at, at.coordinates.input, "sun support", "sun_support", "sun")
 
 
 SUN_SUPPORT = Interface(
@@ -78,31 +92,6 @@ SUN_SUPPORT = Interface(
         ),
     ),
 )
-
-
-def _along_line_of_action(
-    at: Positions, crank: int
-) -> tuple[dict[str, Float[np.ndarray, " angle"]], Float[np.ndarray, "angle 2"]]:
-    """Return what every error column of one mesh adds to its compression, and the direction of the line of action.
-
-    Pitch deviations, counter-clockwise about their own gear, lie along the pitch circle, so cos α of them along the
-    line of action. The teeth in mesh stand at P_i seen from the sun's centre and opposite to it seen from the planet's;
-    there a planet's tooth that is ahead moves against the line of action, which compresses as the sun's does.
-    """
-    alpha, position = at.reducer.gears.pressure_angle, at.crank_position(crank)
-    line_of_action = position + np.pi / 2 - alpha
-    normal = np.stack([np.cos(line_of_action), np.sin(line_of_action)], axis=-1)
-    columns: dict[str, Float[np.ndarray, " angle"]] = {}
-    for part, turn, met, sign in (
-        ("sun", at.sun_angle, position, 1.0),
-        (f"planet{crank + 1}", at.crank_angle, position + np.pi, -1.0),
-    ):
-        eccentric = sign * np.einsum("ai,aij->aj", normal, turned(turn))
-        waves = np.cos(alpha) * harmonic_waves(met - turn, at.orders)
-        columns |= dict(zip(vector_columns(f"{part}.eccentricity"), eccentric.T, strict=True))
-        columns |= dict(zip(harmonic_columns(f"{part}.pitch", at.orders), waves.T, strict=True))
-    columns[f"mesh{crank + 1}.deviation"] = np.ones_like(position)
-    return columns, normal
 
 
 def gear_mesh(at: Positions) -> SpringGroup:
@@ -126,45 +115,54 @@ def gear_mesh(at: Positions) -> SpringGroup:
     18.32
     """
     reducer, coordinates, cranks = at.reducer, at.coordinates, at.reducer.crank_count
-    angles = at.carrier_angle.size
-    displacement = np.zeros((angles, cranks, coordinates.count))
-    meshes = []
+    rows, alpha = SpringRows(at, cranks), reducer.gears.pressure_angle
     for crank in range(cranks):
-        columns, normal = _along_line_of_action(at, crank)
-        planet = coordinates.planet(crank)
-        displacement[:, crank, coordinates.input : coordinates.input + 2] = normal
-        displacement[:, crank, planet : planet + 2] = -normal
-        displacement[:, crank, planet + 2] = reducer.planet_base_radius
+        position, planet = at.crank_position(crank), coordinates.planet(crank)
+        line_of_action = position + np.pi / 2 - alpha
+        normal = np.stack([np.cos(line_of_action), np.sin(line_of_action)], axis=-1)
+        rows.displacement[:, crank, coordinates.input : coordinates.input + 2] = normal
+        rows.displacement[:, crank, planet : planet + 2] = -normal
+        rows.displacement[:, crank, planet + 2] = reducer.planet_base_radius
         if reducer.centre_gear:
-            displacement[:, crank, coordinates.input + 2] = reducer.sun_base_radius
-        meshes.append(columns)
-    names = tuple(dict.fromkeys(name for columns in meshes for name in columns))
-    nothing = np.zeros(angles)
-    error = np.stack([np.stack([columns.get(name, nothing) for name in names], -1) for columns in meshes], axis=1)
-    group = SpringGroup(
-        name="gear mesh",
-        stiffness_name="gear_mesh",
-        displacement=displacement,
-        error=error,
-        columns=names,
-        stiffness=np.full((angles, cranks), reducer.stiffness.gear_mesh),
-    )
-    return with_play(group, reducer.clearance_of("gear_mesh"), tuple(f"mesh{crank + 1}" for crank in range(cranks)))
+            rows.displacement[:, crank, coordinates.input + 2] = reducer.sun_base_radius
+        # Pitch deviations, counter-clockwise about their own gear, lie along the pitch circle, so cos α of them along
+        # the line of action. The teeth in mesh stand at P_i seen from the sun's centre and opposite to it seen from the
+        # planet's; there a planet's tooth that is ahead moves against the line of action, which compresses as the sun's
+        # does.
+        for part, turn, met, sign in (
+            ("sun", at.sun_angle, position, 1.0),
+            (f"planet{crank + 1}", at.crank_angle, position + np.pi, -1.0),
+        ):
+            eccentric = sign * np.einsum("ai,aij->aj", normal, turned(turn))
+            waves = np.cos(alpha) * harmonic_waves(met - turn, at.orders)
+            rows.add(crank, vector_columns(f"{part}.eccentricity"), eccentric)
+            rows.add(crank, harmonic_columns(f"{part}.pitch", at.orders), waves)
+        rows.add(crank, (f"mesh{crank + 1}.deviation",), np.ones(1))
+    return rows.group("gear mesh", "gear_mesh", tuple(f"mesh{crank + 1}" for crank in range(cranks)))
 
 
 GEAR_MESH = Interface(
     rows=gear_mesh,
     sources=(
-        ErrorSource(name="sun.eccentricity", characteristic=ECCENTRIC, shape="vector", place="sun", first_stage=True),
+        eccentricity_source("sun"),
         ErrorSource(name="sun.pitch", shape="waves", place="sun.teeth", neglected="sun.pitch", first_stage=True),
+        eccentricity_source("planet{i}", with_part=("crank{i}", "planet.eccentricity")),
         ErrorSource(
-            name="planet{i}.eccentricity", characteristic=ECCENTRIC, shape="vector", place="planet{i}", first_stage=True
+            name="planet{i}.pitch",
+            shape="waves",
+            place="planet{i}.teeth",
+            neglected="planet*.pitch",
+            first_stage=True,
+            with_part=("crank{i}", "planet.pitch"),
         ),
         ErrorSource(
-            name="planet{i}.pitch", shape="waves", place="planet{i}.teeth", neglected="planet*.pitch", first_stage=True
+            name="mesh{i}.deviation",
+            place="mesh{i}",
+            neglected="mesh*",
+            first_stage=True,
+            with_part=("crank{i}", "mesh.deviation"),
         ),
-        ErrorSource(name="mesh{i}.deviation", place="mesh{i}", neglected="mesh*", first_stage=True),
-        _clearance("mesh{i}", neglected="mesh*", first_stage=True),
+        clearance_source("mesh{i}", neglected="mesh*", first_stage=True, with_part=("crank{i}", "mesh.clearance")),
     ),
 )
 
@@ -207,44 +205,28 @@ def crank_disc(at: Positions) -> SpringGroup:
     >>> round(1e3 * float(crank_disc(at).displacement[0, 1, at.coordinates.planet(0) + 2]), 2)  # e·cos β [mm/rad]
     0.9
     """
-    reducer, coordinates = at.reducer, at.coordinates
-    eccentricity, angles = reducer.cycloid_stage.eccentricity, at.carrier_angle.size
+    reducer, coordinates, eccentricity = at.reducer, at.coordinates, at.reducer.cycloid_stage.eccentricity
     pairs = [(crank, disc) for disc in range(reducer.disc_count) for crank in range(reducer.crank_count)]
-    displacement = np.zeros((angles, 2 * len(pairs), coordinates.count))
-    columns: dict[str, Float[np.ndarray, "angle row"]] = {}
-
-    def add(names: tuple[str, ...], rows: slice, moved: Float[np.ndarray, "angle 2 column"]) -> None:
-        for at_column, name in enumerate(names):
-            column = columns.setdefault(name, np.zeros((angles, 2 * len(pairs))))
-            column[:, rows] = moved[:, :, at_column]
-
+    journals = tuple(f"crank{crank + 1}.journal{disc + 1}" for crank, disc in pairs)
+    rows, upright = SpringRows(at, 2 * len(pairs)), np.zeros_like(at.carrier_angle)
     for number, (crank, disc) in enumerate(pairs):
-        rows, plane = slice(2 * number, 2 * number + 2), at.plane(disc)
-        planet, plate = coordinates.planet(crank), coordinates.disc(disc)
-        journal, bore = f"crank{crank + 1}.journal{disc + 1}", f"disc{disc + 1}.bore{crank + 1}"
+        pair, plane, journal = slice(2 * number, 2 * number + 2), at.plane(disc), journals[number]
+        planet, plate, bore = coordinates.planet(crank), coordinates.disc(disc), f"disc{disc + 1}.bore{crank + 1}"
         crank_turn = lever(eccentricity, at.disc_direction(disc))
         disc_turn = lever(reducer.crank_circle_radius, at.crank_position(crank))
-        displacement[:, rows, planet : planet + 2] = np.eye(2)
-        displacement[:, rows, planet + 2] = crank_turn
-        displacement[:, rows, plate : plate + 2] = -np.eye(2)
-        displacement[:, rows, plate + 2] = -disc_turn
-        add(vector_columns(f"{journal}.eccentricity"), rows, turned(at.crank_angle))
-        add(vector_columns(f"{bore}.position"), rows, -turned(at.carrier_angle))
-        add((f"{journal}.phase",), rows, crank_turn[..., np.newaxis])
-        add((f"disc{disc + 1}.bores.rotation",), rows, -disc_turn[..., np.newaxis])
-        add(vector_columns(f"crank{crank + 1}.tilt"), rows, _tilted(plane, at.crank_angle))
-        add(vector_columns(f"{bore}.tilt"), rows, -_tilted(plane, at.carrier_angle))
-        add(vector_columns("carrier.tilt"), rows, _tilted(plane, np.zeros(angles)))
-    group = SpringGroup(
-        name="crank–disc bearing",
-        stiffness_name="crank_disc_bearing",
-        displacement=displacement,
-        error=np.stack(list(columns.values()), axis=-1),
-        columns=tuple(columns),
-        stiffness=np.full((angles, 2 * len(pairs)), reducer.stiffness.crank_disc_bearing),
-    )
-    journals = tuple(f"crank{crank + 1}.journal{disc + 1}" for crank, disc in pairs)
-    return with_play(group, reducer.clearance_of("crank_disc_bearing"), journals)
+        rows.displacement[:, pair, planet : planet + 2] = np.eye(2)
+        rows.displacement[:, pair, planet + 2] = crank_turn
+        rows.displacement[:, pair, plate : plate + 2] = -np.eye(2)
+        rows.displacement[:, pair, plate + 2] = -disc_turn
+        rows.add(pair, vector_columns(f"{journal}.eccentricity"), turned(at.crank_angle))
+        rows.add(pair, vector_columns(f"{bore}.position"), -turned(at.carrier_angle))
+        rows.add(pair, (f"{journal}.phase",), crank_turn[..., np.newaxis])
+        rows.add(pair, (f"disc{disc + 1}.bores.rotation",), -disc_turn[..., np.newaxis])
+        rows.add(pair, vector_columns(f"crank{crank + 1}.tilt"), _tilted(plane, at.crank_angle))
+        rows.add(pair, vector_columns(f"{bore}.tilt"), -_tilted(plane, at.carrier_angle))
+        rows.add(pair, vector_columns("carrier.tilt"), _tilted(plane, upright))
+    places = tuple(f"{journal}.eccentricity" for journal in journals)
+    return rows.group("crank–disc bearing", "crank_disc_bearing", journals, places=places)
 
 
 CRANK_DISC = Interface(
@@ -252,49 +234,12 @@ CRANK_DISC = Interface(
     sources=(
         ErrorSource(name="crank{i}.journal{j}.eccentricity", shape="vector", place="crank{i}.journal{j}"),
         ErrorSource(name="disc{j}.bore{i}.position", shape="vector", place="disc{j}.bore{i}"),
-        ErrorSource(
-            name="crank{i}.journal{j}.phase",
-            place="crank{i}.journal{j}",
-            neglected="*.phase",
-            characteristic=PHASE,
-            fine=True,
-        ),
-        ErrorSource(
-            name="disc{j}.bores.rotation",
-            place="disc{j}.bores",
-            neglected="*.rotation",
-            characteristic=ROTATION,
-            fine=True,
-        ),
-        ErrorSource(
-            name="crank{i}.tilt",
-            shape="vector",
-            mirror="kept",
-            place="crank{i}",
-            neglected="*.tilt",
-            characteristic=TILT,
-            fine=True,
-        ),
-        ErrorSource(
-            name="disc{j}.bore{i}.tilt",
-            shape="vector",
-            mirror="kept",
-            place="disc{j}.bore{i}",
-            neglected="*.tilt",
-            characteristic=TILT,
-            fine=True,
-        ),
-        ErrorSource(
-            name="carrier.tilt",
-            fixed=True,
-            shape="vector",
-            mirror="kept",
-            place="carrier",
-            neglected="*.tilt",
-            characteristic=TILT,
-            fine=True,
-        ),
-        _clearance("crank{i}.journal{j}"),
+        _fine("crank{i}.journal{j}.phase", "crank{i}.journal{j}", "*.phase", characteristic=PHASE),
+        _fine("disc{j}.bores.rotation", "disc{j}.bores", "*.rotation", characteristic=ROTATION),
+        _tilt("crank{i}"),
+        _tilt("disc{j}.bore{i}"),
+        _tilt("carrier", fixed=True),
+        clearance_source("crank{i}.journal{j}"),
     ),
 )
 
@@ -317,36 +262,23 @@ def crank_carrier(at: Positions) -> SpringGroup:
     >>> round(1e3 * float(group.displacement[0, 1, -1]), 2)  # y of crank 1 per rotation of the carrier, −a_sp [mm/rad]
     -27.0
     """
-    reducer, coordinates = at.reducer, at.coordinates
-    angles, cranks = at.carrier_angle.size, reducer.crank_count
-    displacement = np.zeros((angles, 2 * cranks, coordinates.count))
-    error = np.zeros((angles, 2 * cranks, 2 * cranks))
-    columns: list[str] = []
-    for crank in range(cranks):
-        rows = slice(2 * crank, 2 * crank + 2)
-        planet, carrier = coordinates.planet(crank), coordinates.carrier
-        displacement[:, rows, planet : planet + 2] = np.eye(2)
-        displacement[:, rows, carrier : carrier + 2] = -np.eye(2)
-        displacement[:, rows, carrier + 2] = -lever(reducer.crank_circle_radius, at.crank_position(crank))
-        error[:, rows, rows] = -turned(at.carrier_angle)
-        columns += vector_columns(f"carrier.bore{crank + 1}.position")
-    group = SpringGroup(
-        name="crank–carrier bearing",
-        stiffness_name="crank_carrier_bearing",
-        displacement=displacement,
-        error=error,
-        columns=tuple(columns),
-        stiffness=np.full((angles, 2 * cranks), reducer.stiffness.crank_carrier_bearing),
-    )
-    bores = tuple(f"carrier.bore{crank + 1}" for crank in range(cranks))
-    return with_play(group, reducer.clearance_of("crank_carrier_bearing"), bores)
+    planets, carrier, cranks = at.coordinates.planet, at.coordinates.carrier, range(at.reducer.crank_count)
+    bores = tuple(f"carrier.bore{crank + 1}" for crank in cranks)
+    rows, places = SpringRows(at, 2 * len(bores)), tuple(f"{bore}.position" for bore in bores)
+    for crank in cranks:
+        pair, planet = slice(2 * crank, 2 * crank + 2), planets(crank)
+        rows.displacement[:, pair, planet : planet + 2] = np.eye(2)
+        rows.displacement[:, pair, carrier : carrier + 2] = -np.eye(2)
+        rows.displacement[:, pair, carrier + 2] = -lever(at.reducer.crank_circle_radius, at.crank_position(crank))
+        rows.add(pair, vector_columns(places[crank]), -turned(at.carrier_angle))
+    return rows.group("crank–carrier bearing", "crank_carrier_bearing", bores, places=places)
 
 
 CRANK_CARRIER = Interface(
     rows=crank_carrier,
     sources=(
         ErrorSource(name="carrier.bore{i}.position", shape="vector", place="carrier.bore{i}"),
-        _clearance("carrier.bore{i}"),
+        clearance_source("carrier.bore{i}"),
     ),
 )
 
@@ -369,15 +301,14 @@ def carrier_support(at: Positions) -> SpringGroup:
     >>> group.columns, group.error[0].tolist()  # δ = Xca − a_cx, Yca − a_cy
     (('carrier.assembly.x', 'carrier.assembly.y'), [[-1.0, -0.0], [-0.0, -1.0]])
     """
-    group = support(at, at.coordinates.carrier, "carrier bearing", "carrier_bearing", "carrier.assembly")
-    return with_play(group, at.reducer.clearance_of("carrier_bearing"), ("carrier",))
+    return support(at, at.coordinates.carrier, "carrier bearing", "carrier_bearing", "carrier")
 
 
 CARRIER_SUPPORT = Interface(
     rows=carrier_support,
     sources=(
         ErrorSource(name="carrier.assembly", fixed=True, characteristic=_STANDS_OFF, shape="vector", place="carrier"),
-        _clearance("carrier", fixed=True),
+        clearance_source("carrier", fixed=True),
     ),
 )
 
@@ -540,38 +471,23 @@ def tilt_terms(disc: int) -> Terms:
     return {name: [(entry, 1.0)] for entry, name in enumerate(vector_columns(f"disc{disc + 1}.tilt"))}
 
 
-def _pin_radius(reducer: Reducer) -> float:
-    return reducer.cycloid_stage.pin_radius
-
-
-def _pin_diameter(reducer: Reducer) -> float:
-    return 2 * reducer.cycloid_stage.pin_radius
-
-
-def _of_tooth(kind: Literal["pitch", "runout"]) -> tuple[ErrorSource, ...]:
+def _of_tooth(kind: str) -> tuple[ErrorSource, ...]:
     """Return the deviations of a disc's teeth along the arc or outward: its waves, and single teeth."""
-    single = f"disc{{j}}.each_tooth.{kind}"
+    place, single = "disc{j}.teeth", f"disc{{j}}.each_tooth.{kind}"
     return (
-        ErrorSource(name=f"disc{{j}}.{kind}", shape="waves", teeth=True, place="disc{j}.teeth"),
-        ErrorSource(
-            name=single, each="tooth", teeth=True, place="disc{j}.teeth", neglected="*.each_tooth.*", fine=True
-        ),
+        ErrorSource(name=f"disc{{j}}.{kind}", shape="waves", teeth=True, place=place),
+        _fine(single, place, "*.each_tooth.*", each="tooth", teeth=True),
     )
 
 
 def _of_pin(kind: str, place: str, **other: Any) -> ErrorSource:
     """Return a deviation of every pin alone, fixed in the housing as they are."""
-    name, neglected = f"each_pin.{kind}", "each_pin.*"
-    return ErrorSource(name=name, fixed=True, each="pin", place=place, neglected=neglected, fine=True, **other)
+    return _fine(f"each_pin.{kind}", place, "each_pin.*", fixed=True, each="pin", **other)
 
 
 PIN_SOURCES = (
-    ErrorSource(
-        name="pin.diameter", fixed=True, place="pins", nominal=Nominal(said="twice its pin radius", of=_pin_diameter)
-    ),
-    ErrorSource(
-        name="housing.groove.radius", place="housing.grooves", nominal=Nominal(said="its pin radius", of=_pin_radius)
-    ),
+    ErrorSource(name="pin.diameter", fixed=True, place="pins", nominal=_PIN_DIAMETER),
+    ErrorSource(name="housing.groove.radius", place="housing.grooves", nominal=_PIN_RADIUS),
     ErrorSource(
         name="modification.equidistant",
         nominal=Nominal(
@@ -585,20 +501,12 @@ PIN_SOURCES = (
     ErrorSource(name="modification.rotation", silent=True, characteristic=ROTATION, fine=True),
     ErrorSource(name="housing.runout", shape="waves", place="housing.pins"),
     ErrorSource(name="housing.pitch", shape="waves", place="housing.pins"),
-    _of_pin("diameter", "pins", nominal=Nominal(said="twice its pin radius", of=_pin_diameter)),
-    _of_pin("groove", "housing.grooves", nominal=Nominal(said="its pin radius", of=_pin_radius)),
+    _of_pin("diameter", "pins", nominal=_PIN_DIAMETER),
+    _of_pin("groove", "housing.grooves", nominal=_PIN_RADIUS),
     _of_pin("position", "housing.pins", shape="vector", mirror="kept"),
     *_of_tooth("pitch"),
     *_of_tooth("runout"),
-    ErrorSource(
-        name="disc{j}.tilt",
-        shape="vector",
-        mirror="kept",
-        place="disc{j}",
-        neglected="*.tilt",
-        characteristic=TILT,
-        fine=True,
-    ),
+    _tilt("disc{j}"),
 )
 """What the contact of pins and teeth declares."""
 

@@ -1,7 +1,4 @@
-"""The equivalent model of a reducer: errors in, equilibria and transmission error out.
-
-What the kernel answers: how a solution ended, equilibria over a turn, extremes, derivatives.
-"""
+"""The equivalent model of a reducer: errors in; equilibria over a turn, extremes and derivatives out."""
 
 from __future__ import annotations
 
@@ -32,7 +29,10 @@ from tolalloc.reducers.equivalent.solvers.records import (
 )
 from tolalloc.reducers.equivalent.springs import HARMONICS
 from tolalloc.reducers.reducer.design import Reducer, at_torque
-from tolalloc.reducers.reducer.form import Form
+from tolalloc.reducers.reducer.form import PartForm
+
+_FEW_ANGLES = 256
+"""Angles up to which tables are kept: loops have 23, a diagnosis up to 240; 8 MB for an RV-20E [-]."""
 
 
 class Status(IntEnum):
@@ -85,7 +85,7 @@ class Equilibria:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Extremes:
+class TurnExtremes:
     """Largest and smallest transmission error of each sample over one output turn."""
 
     # Extremes of the transmission error, output side [rad]
@@ -119,10 +119,6 @@ class Derivatives:
     status: UInt8[np.ndarray, " item"]  # Worst status of the equilibria behind them [-]
 
 
-_FEW_ANGLES = 256
-"""Angles up to which tables are kept: loops have 23, a diagnosis up to 240; 8 MB for an RV-20E [-]."""
-
-
 @dataclass(frozen=True)
 class EquivalentModel:
     """Equivalent spring model of one reducer, liu2020 equations (1)–(14).
@@ -147,7 +143,7 @@ class EquivalentModel:
         """Return the model with the stiffness that the reducer's parts have under a torque on the carrier [N·m]."""
         return replace(self, reducer=at_torque(self.reducer, torque)) if self.reducer.parts else self
 
-    def with_form(self, form: Form | None) -> EquivalentModel:
+    def with_form(self, form: PartForm | None) -> EquivalentModel:
         """Return the model of parts with another form of flanks and pins, of perfect ones if it is none."""
         return self if form == self.reducer.form else replace(self, reducer=replace(self.reducer, form=form))
 
@@ -241,13 +237,13 @@ class EquivalentModel:
             pins_in_contact=turn.touching,
         )
 
-    def extremes(self, errors: Float[np.ndarray, "sample column"], torque: float) -> Extremes:
+    def extremes(self, errors: Float[np.ndarray, "sample column"], torque: float) -> TurnExtremes:
         """Return the refined extremes of every sample over one output turn."""
         return self._searched(errors, torque, np.empty((errors.shape[0], 0)))
 
     def extremes_within(
         self, errors: Float[np.ndarray, "sample column"], torque: float, window: tuple[float, float]
-    ) -> Extremes:
+    ) -> TurnExtremes:
         """Return the extremes of every sample over part of the output turn, at the tabulated angles within it [rad].
 
         No finer angles are searched: what they may add, `remaining`, is not known.
@@ -259,7 +255,7 @@ class EquivalentModel:
         status, good = found.status.max(axis=1), np.isfinite(found.transmission_error).all(axis=1)
         where = np.stack([np.where(good, own, 0) for own in (curve.argmax(axis=1), curve.argmin(axis=1))], axis=1)
         extreme = np.where(good[:, np.newaxis], curve[sample[:, np.newaxis], where], np.nan)
-        return Extremes(
+        return TurnExtremes(
             largest=extreme[:, 0],
             smallest=extreme[:, 1],
             carrier_angle=angle[where],
@@ -269,7 +265,7 @@ class EquivalentModel:
             residual=found.residual.max(axis=1),
         )
 
-    def exact_extremes(self, errors: Float[np.ndarray, "1 column"], torque: float) -> Extremes:
+    def exact_extremes(self, errors: Float[np.ndarray, "1 column"], torque: float) -> TurnExtremes:
         """Return the extremes of one unit, solved again at their angles with tables of just these angles.
 
         The search interpolates its tables; what that changed of either extreme is added to what finer angles may add.
@@ -289,14 +285,14 @@ class EquivalentModel:
 
     def extremes_and_curve(
         self, errors: Float[np.ndarray, "sample column"], torque: float
-    ) -> tuple[Extremes, Float[np.ndarray, "sample angle"]]:
+    ) -> tuple[TurnExtremes, Float[np.ndarray, "sample angle"]]:
         """Return the extremes, and the transmission error at the coarse angles that they were looked for from [rad]."""
         curve = np.empty((errors.shape[0], self.search.coarse))
         return self._searched(errors, torque, curve), curve
 
     def _searched(
         self, errors: Float[np.ndarray, "sample column"], torque: float, curve: Float[np.ndarray, "sample angle"]
-    ) -> Extremes:
+    ) -> TurnExtremes:
         """Return the extremes, the curve filled as far as there is room."""
         from tolalloc.reducers.equivalent.solvers.extremes import solve_extremes
 
@@ -313,7 +309,7 @@ class EquivalentModel:
         solve_extremes(self._discs, self._tables, self._given(errors, torque), search, found)
         self._mark_out_of_range(np.abs(found.extreme).max(axis=1), found.status)
         found.extreme[found.status != CONVERGED] = np.nan
-        return Extremes(
+        return TurnExtremes(
             largest=found.extreme[:, 0],
             smallest=found.extreme[:, 1],
             carrier_angle=(found.position - search.first) * search.node_step,
@@ -325,7 +321,7 @@ class EquivalentModel:
 
     def peak_to_peak_derivatives(
         self, errors: Float[np.ndarray, "sample column"], torque: float
-    ) -> tuple[Extremes, Derivatives]:
+    ) -> tuple[TurnExtremes, Derivatives]:
         """Return the extremes and the exact derivatives of the peak-to-peak.
 
         Theory page, equation (23). They hold while both extremes stay at the same kinks of the curve: a derivative

@@ -1,8 +1,6 @@
 """Forces in every interface at the equilibria, and what engineers read off them: each output one small function.
 
-Load along the width of teeth whose discs are tilted.
-
-Which source makes which order of a unit's transmission error.
+Load along the width of tilted teeth, and which source makes which order of a unit's transmission error, are such too.
 """
 
 from __future__ import annotations
@@ -21,15 +19,31 @@ from tolalloc.reducers.cycloid.loaded_contact import crowned_contact, peak_press
 from tolalloc.reducers.cycloid.solvers import LAWS, LINEAR
 from tolalloc.reducers.cycloid.tooth_profile import pin_angles
 from tolalloc.reducers.equivalent.columns import source_name
-from tolalloc.reducers.equivalent.interfaces import PinContact, pin_contact
+from tolalloc.reducers.equivalent.interfaces import pin_contact
 from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel
 from tolalloc.reducers.equivalent.solvers.records import design_of
 from tolalloc.reducers.equivalent.springs import Positions, harmonic_waves
 from tolalloc.reducers.reducer.design import Reducer
-from tolalloc.reducers.reducer.form import Form
+from tolalloc.reducers.reducer.form import PartForm
 
 SINGLE = ("gear_mesh", "centre_mesh")
 """Interfaces that carry along one direction; the others carry x and y."""
+_ROUNDING = 1e-4
+"""Amplitude over the largest one below which an order is not named [-]."""
+_MULTIPLE, _OTHERS, _MOST = 936, 241, 20 * 936
+"""Angles of a spectrum are a multiple of the first, a prime more for the curve that confirms it, and at most [-]."""
+_CONFIRMED = 0.1
+"""Difference of a wave on either, over its amplitude, up to which it is believed [-]."""
+_BEARINGS = {
+    "crank–disc bearing": "crank_disc_bearing",
+    "crank–carrier bearing": "crank_carrier_bearing",
+    "eccentric bearing": "eccentric_bearing",
+    "output pin": "output_pin",
+    "carrier bearing": "carrier_bearing",
+}
+"""Bearing, or contact that carries as one, in words → the interface as in `Stiffness`."""
+TORQUE, CLEARANCE, CURVATURE = "torque", "nominal clearance", "curvature of the contact law"
+FORM = "form of flanks and pins"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,10 +95,6 @@ def forces(equilibria: Equilibria) -> Forces:
     return Forces(pins=pins, rows=rows, elements=elements, rows_of_stiffness=columns.rows_of_stiffness)
 
 
-_ROUNDING = 1e-4
-"""Amplitude over the largest one below which an order is not named [-]."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Orders:
     """Waves of the transmission error per output turn."""
@@ -126,12 +136,6 @@ def fitted_waves(
     basis = np.hstack([np.ones((angle.size, 1)), turn.real, turn.imag])
     constant_and = np.linalg.lstsq(basis, curve.T, rcond=None)[0].T
     return np.asarray(constant_and[:, 1 : order.size + 1] - 1j * constant_and[:, order.size + 1 :])
-
-
-_MULTIPLE, _OTHERS, _MOST = 936, 241, 20 * 936
-"""Angles of a spectrum are a multiple of the first, a prime more for the curve that confirms it, and at most [-]."""
-_CONFIRMED = 0.1
-"""Difference of a wave on either, over its amplitude, up to which it is believed [-]."""
 
 
 def turn_orders(
@@ -210,15 +214,6 @@ def _interface_force(interface: str) -> Callable[[Solved], Float[np.ndarray, " s
 
 Quantity = tuple[str, Callable[[Solved], Float[np.ndarray, " sample"]]]
 """Unit of an output of one solve, and what gives it, a number per sample."""
-
-_BEARINGS = {
-    "crank–disc bearing": "crank_disc_bearing",
-    "crank–carrier bearing": "crank_carrier_bearing",
-    "eccentric bearing": "eccentric_bearing",
-    "output pin": "output_pin",
-    "carrier bearing": "carrier_bearing",
-}
-"""Bearing, or contact that carries as one, in words → the interface as in `Stiffness`."""
 
 
 def bearings_of(reducer: Reducer) -> dict[str, str]:
@@ -305,10 +300,12 @@ def _standing_out(model: EquivalentModel, errors: Float[np.ndarray, "sample colu
     mapped, layout, orders = model.error_columns, model.error_columns.layout, model.orders
     values = np.asarray((mapped.matrix @ errors.T).T) + mapped.map.nominal
     pins = values[:, layout.pin : layout.wave].reshape(-1, 3, layout.pins)
-    found, form = [], model.reducer.form or Form()
+    found, form = [], model.reducer.form or PartForm()
     round_pins = form.of_pins(np.zeros(layout.pins))
     for disc in range(model.reducer.disc_count):
-        contact = _at_tips_and_roots(model, disc)
+        # Angles of one output turn at which the first pin is tip or root of the disc's teeth
+        half_turns = np.pi * np.arange(2 * layout.teeth) + 2 * np.pi * disc / model.reducer.disc_count
+        contact = pin_contact(Positions(model.reducer, half_turns / layout.teeth, orders))
         waves = harmonic_waves(contact.tooth_angle[:, disc, 0], orders)
         first, single = layout.wave + disc * layout.waves, layout.tooth + disc * 2 * layout.teeth
         along_ring = values[:, first : first + 2 * waves.shape[1]].reshape(-1, 2, waves.shape[1])
@@ -327,13 +324,6 @@ def _standing_out(model: EquivalentModel, errors: Float[np.ndarray, "sample colu
             )
         )
     return found
-
-
-def _at_tips_and_roots(model: EquivalentModel, disc: int) -> PinContact:
-    """Return the contacts at the angles of one output turn at which the first pin is tip or root of a disc's teeth."""
-    teeth = model.reducer.cycloid_stage.disc_teeth
-    half_turns = np.pi * np.arange(2 * teeth) + 2 * np.pi * disc / model.reducer.disc_count
-    return pin_contact(Positions(model.reducer, half_turns / teeth, model.orders))
 
 
 def line_contact(equilibria: Equilibria, forces: Forces) -> LineContact:
@@ -460,10 +450,6 @@ def contact_pattern(
         line_load=line_load,
         pressure=unit_pressure(solved.equilibria)[at, disc - 1, :, np.newaxis] * np.sqrt(line_load),
     )
-
-
-TORQUE, CLEARANCE, CURVATURE = "torque", "nominal clearance", "curvature of the contact law"
-FORM = "form of flanks and pins"
 
 
 @dataclass(frozen=True, kw_only=True)

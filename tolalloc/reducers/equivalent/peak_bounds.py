@@ -150,7 +150,7 @@ class _Curves:
             left, own, middle, room = left[on], own.at(on), middle[on], np.maximum(room, _WIDER * reached)[on]
         return low, high
 
-    def moved(self, slope: Float[np.ndarray, "item pin"]) -> _Moved:
+    def moved(self, slope: Float[np.ndarray, "item pin"]) -> _MovedContacts:
         """Return what every variable moves with contacts of some stiffness."""
         stiffness = self.tangent(slope)
         values = np.linalg.eigvalsh(stiffness)
@@ -163,7 +163,7 @@ class _Curves:
         solved = np.linalg.solve(stiffness, np.concatenate([levers, loads], axis=2))
         weak, by = solved[..., : levers.shape[2]], solved[..., levers.shape[2] :]
         yielding = np.sqrt(np.maximum((levers * weak).sum(axis=1), 0.0))
-        return _Moved(
+        return _MovedContacts(
             rotation=self.turned[:, 1:] + (self.carrier[..., np.newaxis] * by).sum(axis=1),
             compression=self.touched[:, 1:] + by.swapaxes(1, 2) @ self.lever,
             pin_yielding=yielding[:, :-1],
@@ -173,7 +173,7 @@ class _Curves:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Moved:
+class _MovedContacts:
     """What every variable moves, and the root of what a unit force moves along itself."""
 
     rotation: Float[np.ndarray, "item variable"]  # Of the carrier [rad per variable]

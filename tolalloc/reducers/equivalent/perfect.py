@@ -1,8 +1,6 @@
 """Exact parts, modified as drawn, their bearings yielding: the one answer on forces that every command gives.
 
-Units whose parts press each other before any torque acts: forces of the pins, what turning them takes, derivatives.
-
-How stiff a reducer is: against its catalogue, and which part yields how much of the twist.
+What units press without any torque, what turning them takes, and how stiff a reducer is against its catalogue.
 """
 
 from __future__ import annotations
@@ -15,7 +13,8 @@ from math import inf, pi
 import numpy as np
 from jaxtyping import Float, Integer, UInt8
 
-from tolalloc.reducers.equivalent.hysteresis import BACKLASH, TURN_ANGLES, HysteresisLoop, hysteresis_loop, sliding_ways
+from tolalloc.reducers.equivalent.friction import sliding_ways
+from tolalloc.reducers.equivalent.hysteresis import BACKLASH, TURN_ANGLES, HysteresisLoop, hysteresis_loop
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import Solved
 from tolalloc.reducers.equivalent.springs import Positions
@@ -24,6 +23,7 @@ from tolalloc.reducers.reducer.design import Reducer, at_torque, compliances
 
 PHASES = 72
 """Phases of one pin pitch at which exact parts are solved, for forces over the turn [-]."""
+PRELOAD_ASSUMPTION = "friction torque of the pins without load: discs sliding on pins alone, largest over the turn"
 
 
 def exact_unit(model: EquivalentModel) -> Float[np.ndarray, "1 column"]:
@@ -57,9 +57,6 @@ def perfect_reducer(reducer: Reducer, torque: float) -> Solved:
     model, stage = EquivalentModel(at_torque(reducer, torque)), reducer.cycloid_stage
     span = 2.0 * pi / (stage.pin_count * stage.disc_teeth)
     return Solved.of(model.equilibria(exact_unit(model), torque, span * np.arange(PHASES) / PHASES))
-
-
-PRELOAD_ASSUMPTION = "friction torque of the pins without load: discs sliding on pins alone, largest over the turn"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -55,6 +55,8 @@ class ErrorSource:
     nominal: Nominal | None = None  # Nominal size, if there is one
     characteristic: Characteristic | None = None  # What a drawing writes for it, if its feature alone does not say it
     fixed: bool = False  # Whether it stands fixed in the housing, so that it is mounted and measured with it
+    # Part with which it is mounted and its name there, where these are not the beginning and the rest of its own
+    with_part: tuple[str, str] | None = None
 
     @property
     def angular(self) -> bool:
@@ -70,6 +72,12 @@ class ErrorSource:
     def part(self) -> str:
         """The part that carries it."""
         return self.name.partition(".")[0]
+
+    @property
+    def mounted(self) -> tuple[str, str]:
+        """The part with which it is mounted and turns, and its name on that part alone."""
+        part, _, rest = self.name.partition(".")
+        return self.with_part or (("housing", self.name) if self.fixed else (part, rest))
 
     def count(self, reducer: Reducer) -> int:
         """Return how many like features each have a deviation of their own [-]."""
@@ -89,10 +97,21 @@ class ErrorSource:
         member = r"\.(?P<member>\d+)" if self.each else ""
         return re.compile(f"(?P<source>{_numbered(self.name)}){member}{_COMPONENTS[self.shape]}")
 
+    def numbers(self, column: str) -> dict[str, str]:
+        """Return what a column's name says of it: source, numbers of parts and member, axis or wave and order."""
+        found = self.column_pattern.fullmatch(column)
+        return found.groupdict() if found else {}
+
     def member(self, column: str) -> slice:
         """Return where in a column's name the number of its pin or tooth stands."""
         found = self.column_pattern.fullmatch(column)
         return slice(*found.span("member")) if found and self.each else slice(0, 0)
+
+    def index(self, column: str) -> tuple[int, ...] | None:
+        """Return the numbers of parts and member and the axis in a column's name, from 0; none if it is not its own."""
+        if found := self.column_pattern.fullmatch(column):
+            return tuple("xy".index(part) if part in "xy" else int(part) - 1 for part in found.groups()[1:])
+        return None
 
     def line(self, sources: Sequence[str]) -> str:
         """Return what a drawing calls sources of its kind: the name with those numbers that all of them have."""
@@ -121,14 +140,12 @@ class ErrorSources:
 
     def __init__(self, kinds: Iterable[ErrorSource]) -> None:
         self.kinds = tuple(kinds)
-        self._of = lru_cache(maxsize=None)(self._found)
+        self.of = lru_cache(maxsize=None)(self._of)
+        self.of_column = lru_cache(maxsize=None)(self._of_column)
 
-    def _found(self, name: str) -> ErrorSource | None:
-        return next((kind for kind in self.kinds if kind.pattern.fullmatch(name)), None)
-
-    def of(self, source: str) -> ErrorSource | None:
+    def _of(self, source: str) -> ErrorSource | None:
         """Return the kind of a source, none if nothing declares it."""
-        return self._of(source)
+        return next((kind for kind in self.kinds if kind.pattern.fullmatch(source)), None)
 
     def shared_lines(self, stated: Mapping[str, Hashable]) -> dict[str, str]:
         """Return source → the line of the drawing, part and feature, on which it stands with its copies.
@@ -151,7 +168,7 @@ class ErrorSources:
             for name in members
         }
 
-    def of_column(self, column: str) -> ErrorSource:
+    def _of_column(self, column: str) -> ErrorSource:
         """Return the kind of the source that a column belongs to."""
         for kind in self.kinds:
             if kind.column_pattern.fullmatch(column):

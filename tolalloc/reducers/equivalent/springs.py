@@ -1,6 +1,6 @@
 """The one idea of the model: every interface is a group of spring rows δ = a·q + b·ε.
 
-Where every part stands at a carrier angle, and which coordinate of the model is which.
+With it goes where every part stands at a carrier angle, and which coordinate of the model is which.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -135,6 +135,8 @@ class SpringGroup:
     clearance_terms: Mapping[str, Sequence[tuple[int, float]]] = field(default_factory=dict)
     # Those of ``columns`` that are no errors but nominal distances, which never change → their values [m]
     constants: Mapping[str, float] = field(default_factory=dict)
+    # Sources that displace the bearings whose springs these are, in their order, each its own two rows alone
+    places: tuple[str, ...] = ()
 
 
 def with_play(group: SpringGroup, clearance: float, elements: tuple[str, ...]) -> SpringGroup:
@@ -161,8 +163,44 @@ def vector_columns(name: str) -> tuple[str, str]:
     return f"{name}.x", f"{name}.y"
 
 
-def support(at: Positions, first: int, name: str, stiffness_name: str, error: str) -> SpringGroup:
-    """Return the two springs that hold a part's axis in the housing, which may stand off there.
+class SpringRows:
+    """Rows of one spring group at a batch of carrier angles, filled in one after another.
+
+    Attributes
+    ----------
+    displacement
+        Compression per coordinate [m/m or m/rad].
+    columns
+        Error column → compression per value of it [m/m or m/rad].
+    """
+
+    def __init__(self, at: Positions, rows: int) -> None:
+        self.at, self.shape = at, (at.carrier_angle.size, rows)
+        self.displacement = np.zeros((*self.shape, at.coordinates.count))
+        self.columns: dict[str, Float[np.ndarray, "angle row"]] = {}
+
+    def add(self, rows: int | slice, names: Sequence[str], moved: Float[np.ndarray, "... column"]) -> None:
+        """Let columns, the last axis of what they move, move some rows."""
+        for column, name in enumerate(names):
+            self.columns.setdefault(name, np.zeros(self.shape))[:, rows] = moved[..., column]
+
+    def group(self, name: str, stiffness_name: str, elements: tuple[str, ...] = (), **other: Any) -> SpringGroup:
+        """Return the group with the stiffness and, in its elements, the clearance of an interface as in `Stiffness`."""
+        reducer = self.at.reducer
+        group = SpringGroup(
+            name=name,
+            stiffness_name=stiffness_name,
+            displacement=self.displacement,
+            error=np.stack(list(self.columns.values()), axis=-1),
+            columns=tuple(self.columns),
+            stiffness=np.full(self.shape, getattr(reducer.stiffness, stiffness_name)),
+            **other,
+        )
+        return with_play(group, reducer.clearance_of(stiffness_name), elements)
+
+
+def support(at: Positions, first: int, name: str, stiffness_name: str, part: str) -> SpringGroup:
+    """Return the two springs that hold a part's axis in the housing, where its ``assembly`` may stand off.
 
     δ = X − a_x, Y − a_y [m], own derivation.
 
@@ -172,20 +210,13 @@ def support(at: Positions, first: int, name: str, stiffness_name: str, error: st
         First of the part's coordinates, X and Y behind it [-].
     name, stiffness_name
         What the springs stand for, and the field of `Stiffness`.
-    error
-        Source of (a_x, a_y).
+    part
+        Name of the part.
     """
-    angles = at.carrier_angle.size
-    displacement = np.zeros((angles, 2, at.coordinates.count))
-    displacement[:, [0, 1], [first, first + 1]] = 1.0
-    return SpringGroup(
-        name=name,
-        stiffness_name=stiffness_name,
-        displacement=displacement,
-        error=np.broadcast_to(-np.eye(2), (angles, 2, 2)),
-        columns=vector_columns(error),
-        stiffness=np.full((angles, 2), getattr(at.reducer.stiffness, stiffness_name)),
-    )
+    rows, place = SpringRows(at, 2), f"{part}.assembly"
+    rows.displacement[:, [0, 1], [first, first + 1]] = 1.0
+    rows.add(slice(None), vector_columns(place), -np.eye(2))
+    return rows.group(name, stiffness_name, (part,), places=(place,))
 
 
 def turned(direction: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle 2 2"]:

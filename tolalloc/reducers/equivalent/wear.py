@@ -13,13 +13,14 @@ from jaxtyping import Float
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import MICROMETRE
 from tolalloc.reducers.cycloid.tooth_profile import path_curvature
-from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, sliding_ways
+from tolalloc.reducers.equivalent.friction import sliding_ways
+from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import Solved, angles_of_pins
 from tolalloc.reducers.equivalent.perfect import PHASES, perfect_reducer
 from tolalloc.reducers.load_case import LoadCase, require_duty
 from tolalloc.reducers.reducer.design import CycloidStage, Reducer, thermal_shift
-from tolalloc.reducers.reducer.form import LARGEST_FREE, FlankForm, Form
+from tolalloc.reducers.reducer.form import LARGEST_FREE, FlankForm, PartForm
 
 STEP = 1.0 * MICROMETRE
 """Largest wear in one step of the hours, of a flank or across a pin; what halving it changes is on page validation."""
@@ -42,8 +43,8 @@ class _Step:
     """Some of the hours, and the flanks within them."""
 
     hours: float  # [h]
-    start: Form | None
-    middle: Form | None
+    start: PartForm | None
+    middle: PartForm | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +59,7 @@ class Wear:
     depth: Float[np.ndarray, " point"]  # Off the flanks along their normal there, mean of the discs [m]
     pin_depth: float  # Off the radius of a pin, the same all around it [m]
     volume: float  # Off the flanks of all discs; the pins have lost as much [m³]
-    form: Form | None  # Of the worn parts, as `tolalloc.reducers.reducer.design.Reducer` has it
+    form: PartForm | None  # Of the worn parts, as `tolalloc.reducers.reducer.design.Reducer` has it
     phases: tuple[DutyPhase, ...]
     steps: tuple[_Step, ...]
 
@@ -224,12 +225,12 @@ def _worn(reducer: Reducer, phases: tuple[DutyPhase, ...], hours: float, step: f
     )
 
 
-def _form(reducer: Reducer, angle: Float[np.ndarray, " point"], depth: Float[np.ndarray, " point"]) -> Form | None:
+def _form(reducer: Reducer, angle: Float[np.ndarray, " point"], depth: Float[np.ndarray, " point"]) -> PartForm | None:
     """Return the form of a reducer's parts with worn flanks, as it is where nothing is worn."""
     if not depth.any():
         return reducer.form
     worn = FlankForm(spaces=1, angle=tuple(angle.tolist()), deviation=tuple((-depth).tolist()))
-    return replace(reducer.form or Form(), worn=worn)
+    return replace(reducer.form or PartForm(), worn=worn)
 
 
 def _rates(

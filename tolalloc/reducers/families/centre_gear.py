@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 
 from tolalloc.reading.units import MILLIMETRE
-from tolalloc.reducers.equivalent.interfaces import ECCENTRIC, Interface
-from tolalloc.reducers.equivalent.sources import ErrorSource
-from tolalloc.reducers.equivalent.springs import Positions, SpringGroup, turned, vector_columns, with_play
+from tolalloc.reducers.equivalent.interfaces import Interface, clearance_source, eccentricity_source
+from tolalloc.reducers.equivalent.springs import Positions, SpringGroup, SpringRows, turned, vector_columns
 from tolalloc.reducers.families.family import Place, ReducerFamily
 from tolalloc.reducers.families.rv import RV
 from tolalloc.reducers.reducer.design import Reducer
@@ -34,36 +33,21 @@ def centre_mesh(at: Positions) -> SpringGroup:
     ----------
     Own derivation, as liu2020's of sun and planets.
     """
-    reducer, coordinates, angles = at.reducer, at.coordinates, at.carrier_angle.size
-    gear = reducer.centre_pair
+    gear, sun = at.reducer.centre_pair, at.coordinates.input
     line_of_action = np.pi / 2 + gear.pressure_angle
-    normal = np.array([np.cos(line_of_action), np.sin(line_of_action)])
-    displacement = np.zeros((angles, 1, coordinates.count))
-    displacement[:, 0, coordinates.input : coordinates.input + 3] = [*-normal, -gear.base_radius]
-    error = np.concatenate([normal @ turned(at.pinion_angle), -normal @ turned(at.sun_angle)], axis=-1)
-    group = SpringGroup(
-        name="centre gear mesh",
-        stiffness_name="centre_mesh",
-        displacement=displacement,
-        error=error[:, np.newaxis],
-        columns=(*vector_columns("pinion.eccentricity"), *vector_columns("centre.eccentricity")),
-        stiffness=np.full((angles, 1), reducer.stiffness.centre_mesh),
-    )
-    return with_play(group, reducer.clearance_of("centre_mesh"), ("centre.mesh",))
+    normal, rows = np.array([np.cos(line_of_action), np.sin(line_of_action)]), SpringRows(at, 1)
+    rows.displacement[:, 0, sun : sun + 3] = [*-normal, -gear.base_radius]
+    rows.add(0, vector_columns("pinion.eccentricity"), normal @ turned(at.pinion_angle))
+    rows.add(0, vector_columns("centre.eccentricity"), -normal @ turned(at.sun_angle))
+    return rows.group("centre gear mesh", "centre_mesh", ("centre.mesh",))
 
 
 CENTRE_MESH = Interface(
     rows=centre_mesh,
     sources=(
-        *(
-            ErrorSource(
-                name=f"{gear}.eccentricity", characteristic=ECCENTRIC, shape="vector", place=gear, first_stage=True
-            )
-            for gear in ("pinion", "centre")
-        ),
-        ErrorSource(
-            name="centre.mesh.clearance", place="centre.mesh", neglected="*.clearance", fine=True, first_stage=True
-        ),
+        eccentricity_source("pinion"),
+        eccentricity_source("centre", with_part=("sun", "outer.eccentricity")),
+        clearance_source("centre.mesh", first_stage=True),
     ),
 )
 

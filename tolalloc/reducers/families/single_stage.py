@@ -13,9 +13,9 @@ import numpy as np
 
 from tolalloc.drawings.zones import Characteristic
 from tolalloc.reading.units import MILLIMETRE
-from tolalloc.reducers.equivalent.interfaces import CARRIER_SUPPORT, PIN_SOURCES, Interface, lever
+from tolalloc.reducers.equivalent.interfaces import CARRIER_SUPPORT, PIN_SOURCES, Interface, clearance_source, lever
 from tolalloc.reducers.equivalent.sources import ErrorSource, Nominal
-from tolalloc.reducers.equivalent.springs import Positions, SpringGroup, support, turned, vector_columns, with_play
+from tolalloc.reducers.equivalent.springs import Positions, SpringGroup, SpringRows, support, turned, vector_columns
 from tolalloc.reducers.families.family import HOUSING_PLACES, NewRows, Place, ReducerFamily
 from tolalloc.reducers.reducer.design import Reducer
 
@@ -33,7 +33,7 @@ def shaft_support(at: Positions) -> SpringGroup:
     ----------
     Own derivation, as liu2020's of the sun.
     """
-    return support(at, at.coordinates.input, "shaft bearing", "shaft_support", "shaft.assembly")
+    return support(at, at.coordinates.input, "shaft bearing", "shaft_support", "shaft")
 
 
 SHAFT_SUPPORT = Interface(
@@ -56,29 +56,16 @@ def eccentric_bearing(at: Positions) -> SpringGroup:
     ----------
     Own derivation.
     """
-    reducer, coordinates, angles = at.reducer, at.coordinates, at.carrier_angle.size
-    discs, shaft = reducer.disc_count, coordinates.input
-    displacement = np.zeros((angles, 2 * discs, coordinates.count))
-    error = np.zeros((angles, 2 * discs, 4 * discs))
-    columns: list[str] = []
-    for disc in range(discs):
-        rows, plate = slice(2 * disc, 2 * disc + 2), coordinates.disc(disc)
-        displacement[:, rows, shaft : shaft + 2] = np.eye(2)
-        displacement[:, rows, plate : plate + 2] = -np.eye(2)
-        error[:, rows, 4 * disc : 4 * disc + 2] = turned(at.crank_angle)
-        error[:, rows, 4 * disc + 2 : 4 * disc + 4] = -turned(at.carrier_angle)
-        columns += vector_columns(f"shaft.journal{disc + 1}.eccentricity")
-        columns += vector_columns(f"disc{disc + 1}.bore.position")
-    group = SpringGroup(
-        name="eccentric bearing",
-        stiffness_name="eccentric_bearing",
-        displacement=displacement,
-        error=error,
-        columns=tuple(columns),
-        stiffness=np.full((angles, 2 * discs), reducer.stiffness.eccentric_bearing),
-    )
-    journals = tuple(f"shaft.journal{disc + 1}" for disc in range(discs))
-    return with_play(group, reducer.clearance_of("eccentric_bearing"), journals)
+    discs, shaft = at.reducer.disc_count, at.coordinates.input
+    rows, journals = SpringRows(at, 2 * discs), tuple(f"shaft.journal{disc + 1}" for disc in range(discs))
+    for disc, journal in enumerate(journals):
+        pair, plate = slice(2 * disc, 2 * disc + 2), at.coordinates.disc(disc)
+        rows.displacement[:, pair, shaft : shaft + 2] = np.eye(2)
+        rows.displacement[:, pair, plate : plate + 2] = -np.eye(2)
+        rows.add(pair, vector_columns(f"{journal}.eccentricity"), turned(at.crank_angle))
+        rows.add(pair, vector_columns(f"disc{disc + 1}.bore.position"), -turned(at.carrier_angle))
+    places = tuple(f"{journal}.eccentricity" for journal in journals)
+    return rows.group("eccentric bearing", "eccentric_bearing", journals, places=places)
 
 
 ECCENTRIC_BEARING = Interface(
@@ -86,7 +73,7 @@ ECCENTRIC_BEARING = Interface(
     sources=(
         ErrorSource(name="shaft.journal{j}.eccentricity", shape="vector", place="shaft.journal{j}"),
         ErrorSource(name="disc{j}.bore.position", shape="vector", place="disc{j}.bore"),
-        ErrorSource(name="shaft.journal{j}.clearance", place="shaft.journal{j}", neglected="*.clearance", fine=True),
+        clearance_source("shaft.journal{j}"),
     ),
 )
 
@@ -105,57 +92,33 @@ def output_pins(at: Positions) -> SpringGroup:
     ----------
     Own derivation; the gap of one pin is the hole's radius less the pin's and the eccentricity.
     """
-    reducer, coordinates, angles = at.reducer, at.coordinates, at.carrier_angle.size
-    pins, discs, carrier = reducer.holes, reducer.disc_count, coordinates.carrier
-    offset, count = "output.offset", reducer.holes.count
-    shared = [name for pin in range(count) for name in vector_columns(f"output.pin.position.{pin + 1}")]
-    own = [
-        name
-        for disc in range(discs)
-        for pin in range(count)
-        for name in vector_columns(f"disc{disc + 1}.hole.position.{pin + 1}")
-    ]
-    displacement = np.zeros((angles, 2 * discs * count, coordinates.count))
-    error = np.zeros((angles, 2 * discs * count, 1 + len(shared) + len(own)))
-    with_carrier = turned(at.carrier_angle)
-    for element, (disc, pin) in enumerate((disc, pin) for disc in range(discs) for pin in range(count)):
-        rows, plate = slice(2 * element, 2 * element + 2), coordinates.disc(disc)
-        moved = lever(pins.circle_radius, at.crank_position(pin))
-        displacement[:, rows, carrier : carrier + 2] = np.eye(2)
-        displacement[:, rows, carrier + 2] = moved
-        displacement[:, rows, plate : plate + 2] = -np.eye(2)
-        displacement[:, rows, plate + 2] = -moved
-        direction = at.disc_direction(disc)
-        error[:, rows, 0] = -np.stack([np.cos(direction), np.sin(direction)], axis=-1)
-        error[:, rows, 1 + 2 * pin : 3 + 2 * pin] = with_carrier
-        first = 1 + len(shared) + 2 * element
-        error[:, rows, first : first + 2] = -with_carrier
-    return SpringGroup(
-        name="output pin",
-        stiffness_name="output_pin",
-        displacement=displacement,
-        error=error,
-        columns=(offset, *shared, *own),
-        stiffness=np.full((angles, 2 * discs * count), reducer.stiffness.output_pin),
+    pins, discs, carrier, offset = at.reducer.holes, at.reducer.disc_count, at.coordinates.carrier, "output.offset"
+    elements = list(np.ndindex(discs, pins.count))
+    rows, with_carrier = SpringRows(at, 2 * len(elements)), turned(at.carrier_angle)
+    for element, (disc, pin) in enumerate(elements):
+        pair, plate = slice(2 * element, 2 * element + 2), at.coordinates.disc(disc)
+        moved, direction = lever(pins.circle_radius, at.crank_position(pin)), at.disc_direction(disc)
+        rows.displacement[:, pair, carrier : carrier + 2] = np.eye(2)
+        rows.displacement[:, pair, carrier + 2] = moved
+        rows.displacement[:, pair, plate : plate + 2] = -np.eye(2)
+        rows.displacement[:, pair, plate + 2] = -moved
+        rows.add(pair, (offset,), -np.stack([np.cos(direction), np.sin(direction)], axis=-1)[..., np.newaxis])
+        rows.add(pair, vector_columns(f"output.pin.position.{pin + 1}"), with_carrier)
+    for element, (disc, pin) in enumerate(elements):
+        pair = slice(2 * element, 2 * element + 2)
+        rows.add(pair, vector_columns(f"disc{disc + 1}.hole.position.{pin + 1}"), -with_carrier)
+    return rows.group(
+        "output pin",
+        "output_pin",
         contact="play",
         clearance=pins.hole_radius - pins.pin_radius,
-        clearance_columns=tuple(
-            f"disc{disc + 1}.hole.radius.{pin + 1}" for disc in range(discs) for pin in range(count)
-        ),
+        clearance_columns=tuple(f"disc{disc + 1}.hole.radius.{pin + 1}" for disc, pin in elements),
         clearance_terms={
-            f"output.pin.radius.{pin + 1}": [(disc * count + pin, -1.0) for disc in range(discs)]
-            for pin in range(count)
+            f"output.pin.radius.{pin + 1}": [(disc * pins.count + pin, -1.0) for disc in range(discs)]
+            for pin in range(pins.count)
         },
-        constants={offset: reducer.cycloid_stage.eccentricity},
+        constants={offset: at.reducer.cycloid_stage.eccentricity},
     )
-
-
-def _hole_radius(reducer: Reducer) -> float:
-    return reducer.holes.hole_radius
-
-
-def _output_pin_radius(reducer: Reducer) -> float:
-    return reducer.holes.pin_radius
 
 
 OUTPUT_PINS = Interface(
@@ -167,13 +130,13 @@ OUTPUT_PINS = Interface(
             name="disc{j}.hole.radius",
             each="output pin",
             place="disc{j}.holes",
-            nominal=Nominal(said="its hole radius", of=_hole_radius),
+            nominal=Nominal(said="its hole radius", of=lambda reducer: reducer.holes.hole_radius),
         ),
         ErrorSource(
             name="output.pin.radius",
             each="output pin",
             place="output.pins",
-            nominal=Nominal(said="its output pin radius", of=_output_pin_radius),
+            nominal=Nominal(said="its output pin radius", of=lambda reducer: reducer.holes.pin_radius),
         ),
     ),
 )

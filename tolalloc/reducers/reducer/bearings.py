@@ -1,8 +1,7 @@
 """Rolling bearings: radial force of a displaced ring as a sum over its rolling elements, ISO/TS 16281.
 
-A part that yields in an interface.
-
-What the friction of a reducer follows from: a coefficient per kind of contact, and the dimensions of bearings.
+With them stand the parts that yield in an interface, and what friction follows from: a coefficient per kind of contact,
+and the dimensions of bearings.
 """
 
 from __future__ import annotations
@@ -11,7 +10,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import asin, cos, log, pi, sin, sqrt, tan
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from jaxtyping import Float
@@ -38,6 +37,20 @@ _STEEL = Material(elastic_modulus=206e9, poisson_ratio=0.3)
 
 Elements = Annotated[int, Field(ge=3, le=200)]
 Millimetres = Annotated[float, Field(gt=0, le=500), times(MILLIMETRE)]
+Coefficient = Annotated[float, Field(ge=0, le=0.5)]
+SLIDING_FRICTION = 0.05
+"""Coefficient of a disc that slides on pins in their half grooves, oil between them; an assumption [-]."""
+WEAR = 2e-10
+"""Volume that either of two lubricated hardened steel surfaces loses over force times sliding way; an assumption, as
+mild wear differs by powers of ten [mm³/(N·m)]."""
+LARGEST_CONTACT_RATIO = 2.0
+"""Contact ratio up to which the friction of a gear mesh is known here [-]."""
+CRANK_BEARINGS = ("crank_disc_bearing", "crank_carrier_bearing")
+CONTACTS = {
+    name: name.replace("_", " ").replace("crank ", "crank–")
+    for name in ("pins", *CRANK_BEARINGS, "carrier_bearing", "gear_mesh")
+}
+"""Kind of contact → its name."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +60,9 @@ class RollingBearing(ABC):
     The element at ψ from the displacement δ_r is pressed by (δ_r·cos ψ − s/2)·cos α + δ_a·sin α and carries c times
     that to the exponent, theory page equation (65).
     """
+
+    exponent: ClassVar[float]  # Of the compression of an element [-]
+    life_exponent: ClassVar[float]  # p of load rating over load in the basic life, theory page equation (93) [-]
 
     pitch_diameter: Annotated[Millimetres, Field(alias="pitch_diameter_mm")]  # Of the circle of the elements [m]
     # Internal clearance s, by how much one ring moves across the other, negative for interference, which preloads all
@@ -73,18 +89,8 @@ class RollingBearing(ABC):
 
     @property
     @abstractmethod
-    def exponent(self) -> float:
-        """Exponent of the compression [-]."""
-
-    @property
-    @abstractmethod
     def load_rating(self) -> float:
         """Basic dynamic radial load rating C of all rows by ISO 281, theory page equation (92) [N]."""
-
-    @property
-    @abstractmethod
-    def life_exponent(self) -> float:
-        """Exponent p of load rating over load in the basic rating life, theory page equation (93) [-]."""
 
     @property
     def _slenderness(self) -> float:
@@ -204,6 +210,9 @@ class RollingBearing(ABC):
 class RollerBearing(RollingBearing):
     """Cylindrical, needle or tapered rollers: line contact, c_L = 35,948·L^(8/9) N/mm^(10/9), exponent 10/9."""
 
+    exponent: ClassVar[float] = 10.0 / 9.0
+    life_exponent: ClassVar[float] = 10.0 / 3.0
+
     rollers: Elements
     roller_diameter: Annotated[Millimetres, Field(alias="roller_diameter_mm")]  # [m]
     roller_length: Annotated[Millimetres, Field(alias="roller_length_mm")]  # Effective length L_we [m]
@@ -222,11 +231,6 @@ class RollerBearing(RollingBearing):
         return self.roller_diameter
 
     @property
-    def exponent(self) -> float:
-        """That of line contact [-]."""
-        return 10.0 / 9.0
-
-    @property
     def coefficient(self) -> float:
         """c_L of a roller between both races [N/m^(10/9)]."""
         return float(_LINE * (self.roller_length / MILLIMETRE) ** (8.0 / 9.0) / MILLIMETRE**self.exponent)
@@ -241,15 +245,13 @@ class RollerBearing(RollingBearing):
         carried = (self.rows * self.roller_length / MILLIMETRE * cos(self.contact_angle)) ** (7.0 / 9.0)
         return float(1.1 * factor * carried * self.rollers**0.75 * (self.roller_diameter / MILLIMETRE) ** (29.0 / 27.0))
 
-    @property
-    def life_exponent(self) -> float:
-        """That of line contact [-]."""
-        return 10.0 / 3.0
-
 
 @dataclass(frozen=True, kw_only=True)
 class BallBearing(RollingBearing):
     """Balls in grooves: Hertz's point contact, exponent 3/2, both races together."""
+
+    exponent: ClassVar[float] = 1.5
+    life_exponent: ClassVar[float] = 3.0
 
     balls: Elements
     ball_diameter: Annotated[Millimetres, Field(alias="ball_diameter_mm")]  # [m]
@@ -269,14 +271,9 @@ class BallBearing(RollingBearing):
         return self.ball_diameter
 
     @property
-    def exponent(self) -> float:
-        """That of point contact [-]."""
-        return 1.5
-
-    @property
     def coefficient(self) -> float:
         """c_P of a ball between both races [N/m^1.5]."""
-        small = self.ball_diameter * cos(self.contact_angle) / self.pitch_diameter
+        small = self._slenderness
         races = (self._race(-small / (1.0 + small)), self._race(small / (1.0 - small)))
         return float(sum(race ** (-2.0 / 3.0) for race in races) ** -1.5)
 
@@ -289,11 +286,6 @@ class BallBearing(RollingBearing):
         factor = _BALLS * geometry * (groove / (groove - 1.0)) ** 0.41 * (1.0 + races) ** -0.3
         carried = (self.rows * cos(self.contact_angle)) ** 0.7 * self.balls ** (2.0 / 3.0)
         return float(1.3 * factor * carried * (self.ball_diameter / MILLIMETRE) ** 1.8)
-
-    @property
-    def life_exponent(self) -> float:
-        """That of point contact [-]."""
-        return 3.0
 
     def _race(self, rolling: float) -> float:
         """Return the coefficient at one race [N/m^1.5].
@@ -336,19 +328,6 @@ def _bearing(bearing: RollingBearing, force: float) -> float:
     return bearing.compliance(force)
 
 
-Coefficient = Annotated[float, Field(ge=0, le=0.5)]
-
-SLIDING_FRICTION = 0.05
-"""Coefficient of a disc that slides on pins in their half grooves, oil between them; an assumption [-]."""
-
-WEAR = 2e-10
-"""Volume that either of two lubricated hardened steel surfaces loses over force times sliding way; an assumption, as
-mild wear differs by powers of ten [mm³/(N·m)]."""
-
-LARGEST_CONTACT_RATIO = 2.0
-"""Contact ratio up to which the friction of a gear mesh is known here [-]."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Friction:
     """Coefficients of friction; table ``[friction]`` of a reducer file, all assumed unless a file states them.
@@ -378,14 +357,6 @@ class Friction:
     def coefficients(self) -> dict[str, float]:
         """Coefficient of every kind of contact [-]."""
         return {name: getattr(self, name) for name in CONTACTS}
-
-
-CRANK_BEARINGS = ("crank_disc_bearing", "crank_carrier_bearing")
-CONTACTS = {
-    name: name.replace("_", " ").replace("crank ", "crank–")
-    for name in ("pins", *CRANK_BEARINGS, "carrier_bearing", "gear_mesh")
-}
-"""Kind of contact → its name."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,6 +1,6 @@
-"""The nominal design of an RV reducer: what the drawing would say if nothing had an error.
+"""The nominal design of a reducer: what the drawing would say if nothing had an error.
 
-Interfaces as springs in series: what every part adds to the way of a bearing, at the load that it carries.
+Its interfaces are springs in series: every part adds to the way of a bearing, at the load that it carries.
 """
 
 from __future__ import annotations
@@ -18,10 +18,28 @@ from tolalloc.reading.files import times
 from tolalloc.reading.named_fields import is_number
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.reducer.bearings import Friction, FrictionDimensions, Part
-from tolalloc.reducers.reducer.form import Form
+from tolalloc.reducers.reducer.form import PartForm
 from tolalloc.reducers.reducer.stiffness import Material, Stiffness, contact_modulus, line_contact, pin_bending
 
 Teeth = Annotated[int, Field(ge=5, le=1000)]
+THERMAL_EXPANSION = 11.5e-6
+"""Coefficient α of discs and ring, a usual value of bearing and case-hardened steel; an assumption [1/K]."""
+SHIFT_SIGNS = {"plus": 1.0, "minus": -1.0}
+"""Convention → sign of its shift here: ``plus`` grinds at Rp + Δr_p (liu2020, song2019), ``minus`` at Rp − Δr_p
+(li2018, xi2015). All of them grind with a pin of r_rp + Δr_rp."""
+MODIFICATION_CONVENTION = (
+    "the discs are ground with a pin of radius r_rp + Δr_rp on a pin circle of radius R_p + Δr_p; a positive "
+    "equidistant amount and a negative shift remove material"
+)
+"""What the signs of these two amounts mean on a drawing."""
+ROTATION_CONVENTION = (
+    "a positive rotation turns every flank by δ about the axis of the disc towards the middle of its tooth and removes "
+    "material on the flanks alone; δ·r_d is its arc at the radius r_d = {radius:g} mm"
+)
+"""What the sign of the third one means there, the radius in millimetres."""
+_PHASES = 2.0 * np.pi * np.arange(64) / 64
+_SMALLEST = 1e-3
+"""Share of the rated torque whose forces a secant stiffness is taken at for smaller ones [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,10 +133,6 @@ class CycloidStage:
         return self.pin_circle_radius * sqrt(1 + shortening**2 - 2 * shortening * cosine) ** 3 / bend
 
 
-THERMAL_EXPANSION = 11.5e-6
-"""Coefficient α of discs and ring, a usual value of bearing and case-hardened steel; an assumption [1/K]."""
-
-
 def thermal_shift(stage: CycloidStage, warmer: float) -> float:
     """Return the shift that discs warmer than the ring by ΔT [K] have beside that of their grinding, α·R_p·ΔT [m].
 
@@ -130,25 +144,6 @@ def thermal_shift(stage: CycloidStage, warmer: float) -> float:
     Own derivation; α is an assumption.
     """
     return THERMAL_EXPANSION * stage.pin_circle_radius * warmer
-
-
-SHIFT_SIGNS = {"plus": 1.0, "minus": -1.0}
-"""Convention → sign of its shift here: ``plus`` grinds at Rp + Δr_p (liu2020, song2019), ``minus`` at Rp − Δr_p
-(li2018, xi2015). All of them grind with a pin of r_rp + Δr_rp."""
-
-
-MODIFICATION_CONVENTION = (
-    "the discs are ground with a pin of radius r_rp + Δr_rp on a pin circle of radius R_p + Δr_p; a positive "
-    "equidistant amount and a negative shift remove material"
-)
-"""What the signs of these two amounts mean on a drawing."""
-
-
-ROTATION_CONVENTION = (
-    "a positive rotation turns every flank by δ about the axis of the disc towards the middle of its tooth and removes "
-    "material on the flanks alone; δ·r_d is its arc at the radius r_d = {radius:g} mm"
-)
-"""What the sign of the third one means there, the radius in millimetres."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -279,7 +274,7 @@ class Reducer:
     output_pins: OutputPins | None = None
     assumptions: tuple[str, ...] = field(default=())
     # Free profile of the flanks, form of measured discs and pins; none unless stated
-    form: Form | None = field(default=None, repr=False)
+    form: PartForm | None = field(default=None, repr=False)
 
     @property
     def family(self) -> str:
@@ -426,9 +421,6 @@ class Reducer:
         return order < angles / 2 and order not in folded
 
 
-_PHASES = 2.0 * np.pi * np.arange(64) / 64
-
-
 def interface_forces(reducer: Reducer, torque: float) -> dict[str, float]:
     """Return the mean force in each interface under a torque on the carrier by statics alone [N].
 
@@ -463,10 +455,6 @@ def interface_forces(reducer: Reducer, torque: float) -> dict[str, float]:
         "sun_support": 0.0,
         "carrier_bearing": 0.0,
     }
-
-
-_SMALLEST = 1e-3
-"""Share of the rated torque whose forces a secant stiffness is taken at for smaller ones [-]."""
 
 
 def compliances(reducer: Reducer, torque: float) -> dict[str, dict[str, float]]:

@@ -1,7 +1,4 @@
-"""Reducers and identified stiffnesses as TOML files: presets by name and the user's own.
-
-The stiffness in a reducer file and in a file of identified stiffnesses: what may be written there.
-"""
+"""Reducers and identified stiffnesses as TOML files, presets by name and the user's own: what may be written there."""
 
 from __future__ import annotations
 
@@ -43,7 +40,7 @@ from tolalloc.reducers.reducer.design import (
     SingleStageClearances,
     at_torque,
 )
-from tolalloc.reducers.reducer.form import Form, load_designed
+from tolalloc.reducers.reducer.form import PartForm, load_designed
 from tolalloc.reducers.reducer.idle_torque import IdleTorque
 from tolalloc.reducers.reducer.stiffness import (
     TAPER_ANGLE,
@@ -65,6 +62,18 @@ from tolalloc.reducers.reducer.stiffness import (
 )
 
 NewtonPerMetre = Annotated[float, Field(ge=1e4, le=1e13)]
+_SMALLEST_TWIST, _LARGEST_TWIST = 0.3, 30.0
+"""Twist under rated torque that a catalogue's rigidity may mean; RV reducers have 2.9 to 4 [arcmin]."""
+PRESETS = Path(__file__).parent / "presets"
+Micrometres = Annotated[float, Field(ge=-200, le=200), times(MICROMETRE)]
+CROWNING = (
+    "the crowning of the teeth is felt by line load and pressure alone, by slices as stiff as the contact law at the "
+    "force of the pin; forces, twist and transmission error are those of the section in the middle over the whole width"
+)
+"""What is assumed of crowned teeth."""
+_LARGEST_GAP = 0.5 * MILLIMETRE
+"""Gap between an output pin and its hole that is believed; more is another pin or hole [m]."""
+_MODIFICATION = re.compile(r"^\[modification\].*?(?=^\[|\Z)", re.MULTILINE | re.DOTALL)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -367,12 +376,6 @@ IDENTIFIABLE = tuple(
 """Fields of `tolalloc.reducers.reducer.stiffness.Stiffness` that a file of identified stiffnesses may hold."""
 
 
-_SMALLEST_TWIST, _LARGEST_TWIST = 0.3, 30.0
-"""Twist under rated torque that a catalogue's rigidity may mean; RV reducers have 2.9 to 4 [arcmin]."""
-
-PRESETS = Path(__file__).parent / "presets"
-
-
 def _with_spacing(table: Any) -> Any:
     """Return table ``[cycloid_stage]`` with discs that stand side by side unless it says otherwise."""
     if not isinstance(table, dict) or "face_width_mm" not in table:
@@ -392,9 +395,6 @@ def _is_a_cycloid(stage: CycloidStage) -> CycloidStage:
     return stage
 
 
-Micrometres = Annotated[float, Field(ge=-200, le=200), times(MICROMETRE)]
-
-
 class ModificationRecord(Record):
     """Table ``[modification]``; the convention says whether the shift was written Rp + Δr_p or Rp − Δr_p.
 
@@ -406,13 +406,6 @@ class ModificationRecord(Record):
     rotation_urad: Annotated[float, Field(ge=-5000, le=5000), times(MICRORADIAN)] = 0.0
     convention: Literal["plus", "minus"] = "plus"
     profile: str = ""
-
-
-CROWNING = (
-    "the crowning of the teeth is felt by line load and pressure alone, by slices as stiff as the contact law at the "
-    "force of the pin; forces, twist and transmission error are those of the section in the middle over the whole width"
-)
-"""What is assumed of crowned teeth."""
 
 
 class _AnyReducerRecord(Record):
@@ -432,23 +425,15 @@ class _AnyReducerRecord(Record):
 
     def _stated(self) -> dict[str, Any]:
         """Return the fields of the reducer that all families have."""
-        grinding = self.modification
-        return {
-            "name": self.name,
-            "source": self.source,
-            "disc_count": self.disc_count,
-            "cycloid_stage": self.cycloid_stage,
+        given, same = (
+            self.modification,
+            ("name", "source", "disc_count", "cycloid_stage", "load", "friction", "catalogue"),
+        )
+        amounts = given.equidistant_um, given.shift_um, given.rotation_urad
+        return {name: getattr(self, name) for name in same} | {
             "disc_material": self.material,
             "pin_material": self.pin_material or self.material,
-            "modification": Modification.from_convention(
-                grinding.convention,
-                equidistant=grinding.equidistant_um,
-                shift=grinding.shift_um,
-                rotation=grinding.rotation_urad,
-            ),
-            "load": self.load,
-            "friction": self.friction,
-            "catalogue": self.catalogue,
+            "modification": Modification.from_convention(given.convention, *amounts),
             "assumptions": (*self.assumptions, *([CROWNING] if self.cycloid_stage.crowning else [])),
         }
 
@@ -510,10 +495,6 @@ class SingleStageRecord(_AnyReducerRecord):
             clearances=self.clearances,
             **stated,
         )
-
-
-_LARGEST_GAP = 0.5 * MILLIMETRE
-"""Gap between an output pin and its hole that is believed; more is another pin or hole [m]."""
 
 
 class ReducerRecord(_AnyReducerRecord):
@@ -588,7 +569,7 @@ def load_reducer(name: str | Path) -> Reducer:
         return reducer
     profile = path.parent / record.modification.profile
     said = f"the flanks stand out of the profile of the amounts as {profile.name} states"
-    return replace(reducer, form=Form(designed=load_designed(profile)), assumptions=(*reducer.assumptions, said))
+    return replace(reducer, form=PartForm(designed=load_designed(profile)), assumptions=(*reducer.assumptions, said))
 
 
 def _record_of(content: Mapping[str, Any]) -> type[SingleStageRecord] | type[ReducerRecord]:
@@ -596,9 +577,6 @@ def _record_of(content: Mapping[str, Any]) -> type[SingleStageRecord] | type[Red
     if "output_pins" in content:
         return SingleStageRecord
     return CentreGearRecord if "centre_gear" in content else ReducerRecord
-
-
-_MODIFICATION = re.compile(r"^\[modification\].*?(?=^\[|\Z)", re.MULTILINE | re.DOTALL)
 
 
 def write_modified(name: str | Path, modification: Modification, path: Path) -> None:

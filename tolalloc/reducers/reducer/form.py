@@ -30,6 +30,19 @@ SMOOTHED = 40
 """Spans of the spline of measured points in a tooth space unless stated: 9° of φ, as fine as extremes are found [-]."""
 
 _CLOSE = 1e-9  # points of the two flanks that are nearer in φ are one [rad]
+_ANGLE: Mapping[str, float] = {"deg": DEGREE, "°": DEGREE}
+_LENGTH: Mapping[str, float] = {"mm": MILLIMETRE}
+_UNITS: Mapping[str, Mapping[str, float]] = {
+    "space": {"": 1.0},
+    "phi": _ANGLE,
+    "deviation": {"µm": MICROMETRE, "um": MICROMETRE, "mm": MILLIMETRE},
+    "direction": _ANGLE,
+    "radius": _LENGTH,
+    "x": _LENGTH,
+    "y": _LENGTH,
+    "z": _LENGTH,
+}
+"""Column of a profile file → its units and their factors to SI."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,7 +158,7 @@ class PinForm:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Form:
+class PartForm:
     """Form of the parts of a reducer beyond the amounts of its modification, theory page (83) and (84)."""
 
     designed: FlankForm | None = None  # Of all discs, by their drawing
@@ -160,9 +173,9 @@ class Form:
         return bool(self.discs or self.pins)
 
     @property
-    def drawn(self) -> Form | None:
+    def drawn(self) -> PartForm | None:
         """What of it the drawing states, none if nothing."""
-        return Form(designed=self.designed) if self.designed else None
+        return PartForm(designed=self.designed) if self.designed else None
 
     def of_flank(self, disc: int, angle: Float[np.ndarray, "*angles"]) -> Float[np.ndarray, "*angles"]:
         """Return how far the flanks of a disc stand out at angles φ that go on around it [m]."""
@@ -209,21 +222,6 @@ def read_profile(
             if not np.isfinite(values[at, column]):
                 raise InputError.at(f"{path}, row {row}", name, cells[column], "a number")
     return dict(zip(names, (values * factors).T, strict=True))
-
-
-_ANGLE: Mapping[str, float] = {"deg": DEGREE, "°": DEGREE}
-_LENGTH: Mapping[str, float] = {"mm": MILLIMETRE}
-_UNITS: Mapping[str, Mapping[str, float]] = {
-    "space": {"": 1.0},
-    "phi": _ANGLE,
-    "deviation": {"µm": MICROMETRE, "um": MICROMETRE, "mm": MILLIMETRE},
-    "direction": _ANGLE,
-    "radius": _LENGTH,
-    "x": _LENGTH,
-    "y": _LENGTH,
-    "z": _LENGTH,
-}
-"""Column of a profile file → its units and their factors to SI."""
 
 
 def load_designed(path: Path) -> FlankForm:

@@ -1,15 +1,9 @@
-"""Stiffness of every interface: values, how well they are known, and what pins are made of.
+"""Stiffness of every interface: values, how well they are known, what pins are made of, and elastic bodies.
 
-The rows of liu2020's Table 2 for shaft, gears and bearings are in `tolalloc.reducers.reducer.stiffness`.
-
-Table 2 of liu2020 row by row: the printed form under an honest name, and the sound reading where they differ.
-
-The pins' row, K_djk, has its scale C in `reducers.reducer.stiffness.line_contact` and its sound reading along the tooth
-in `tolalloc.reducers.cycloid.loaded_contact.pin_contact_table2`. The ledger of all rows is
-docs/reference/table-2.md.
+Rows of liu2020's Table 2 stand here for shaft, gears, bearings and the scale C of the pins, the printed form under an
+honest name and the sound reading where they differ; the pins' sound reading along the tooth is
+`tolalloc.reducers.cycloid.loaded_contact.pin_contact_table2`. The ledger of all rows is docs/reference/table-2.md.
 Arguments are in SI units: lengths m, forces N, Young's moduli Pa, angles rad; Poisson's ratios µ are 0 up to 0.5.
-
-Crankshafts, discs and carrier as elastic bodies: what each adds to the way of a bearing, strength of materials.
 """
 
 from __future__ import annotations
@@ -29,6 +23,13 @@ from tolalloc.reading.units import GIGAPASCAL, MILLIMETRE
 
 ROUNDING = 1e-9
 """What a correlation may miss of symmetry, of 1 on its diagonal and of no negative eigenvalue [-]."""
+TAPER_ANGLE = radians(80.0)
+"""Contact angle of the taper roller bearings that liu2020 puts into K_b [rad]."""
+GEAR_STEEL = 206.0 * GIGAPASCAL
+"""Young's modulus that the numbers in ISO 6336-1's formula belong to [Pa]."""
+LARGEST_CONTACT = 0.1
+"""Radius of a ball's contact over the ball's radius up to which Hertz's half space stands for the ball [-]."""
+Millimetres = Annotated[float, Field(gt=0, le=2000), times(MILLIMETRE)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -181,16 +182,6 @@ def pin_bending(diameter: float, span: float, elastic_modulus: float) -> float:
     43.6
     """
     return 64.0 / 31.0 * 48.0 * elastic_modulus * (pi * diameter**4 / 64.0) / span**3
-
-
-TAPER_ANGLE = radians(80.0)
-"""Contact angle of the taper roller bearings that liu2020 puts into K_b [rad]."""
-
-GEAR_STEEL = 206.0 * GIGAPASCAL
-"""Young's modulus that the numbers in ISO 6336-1's formula belong to [Pa]."""
-
-LARGEST_CONTACT = 0.1
-"""Radius of a ball's contact over the ball's radius up to which Hertz's half space stands for the ball [-]."""
 
 
 def shaft_support(diameter: float, length: float, elastic_modulus: float) -> float:
@@ -355,9 +346,6 @@ def shaft_flexibility(
     return np.asarray(
         bending / (material.elastic_modulus * inertia) + shear / (factor * _shear_modulus(material) * area)
     )
-
-
-Millimetres = Annotated[float, Field(gt=0, le=2000), times(MILLIMETRE)]
 
 
 @dataclass(frozen=True, kw_only=True)

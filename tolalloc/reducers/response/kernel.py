@@ -1,6 +1,6 @@
 """The equivalent model as a response: peak-to-peak transmission error of every sample.
 
-Stiffness as columns of the response: its exact derivative by ln K, and how far that first order holds.
+Stiffness may be columns of it: its exact derivative by ln K, and how far that first order holds.
 """
 
 from __future__ import annotations
@@ -19,12 +19,19 @@ from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.model import Evaluation, Observer, Response, unobserved
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers import PEAK_TO_PEAK
-from tolalloc.reducers.equivalent.model import Derivatives, EquivalentModel, Extremes, cached_model
+from tolalloc.reducers.equivalent.model import Derivatives, EquivalentModel, TurnExtremes, cached_model
 from tolalloc.reducers.equivalent.wear import Wear
 from tolalloc.reducers.load_case import LoadCase
 from tolalloc.reducers.reducer.design import Modification, Reducer, at_torque, thermal_shift
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.running.chunks import Mapper, map_chunks
+
+NAME = "stiffness (identified)"
+PREFIX = "stiffness."
+SEEN = 0.05
+"""Accuracy of a peak-to-peak, below which no difference means anything [arcsec]."""
+_LEAST_AXIS = 1e-9
+"""Variance along an axis over the largest one below which it is rounding [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,16 +153,16 @@ class KernelResponse:
         """Let go of the model's tables."""
         self.model.release()
 
-    def extremes(self, errors: Float[np.ndarray, "chunk all_columns"]) -> Extremes:
+    def extremes(self, errors: Float[np.ndarray, "chunk all_columns"]) -> TurnExtremes:
         """Return the extremes of the transmission error at errors in the order of the model's columns."""
         if self.window is None:
             return self.model.extremes(errors, self.torque)
         return self.model.extremes_within(errors, self.torque, self.window)
 
-    def _extremes(self, x: Float[np.ndarray, "chunk column"]) -> Extremes:
+    def _extremes(self, x: Float[np.ndarray, "chunk column"]) -> TurnExtremes:
         return self.extremes(self.errors(x))
 
-    def _derivatives(self, x: Float[np.ndarray, "chunk column"]) -> tuple[Extremes, Derivatives]:
+    def _derivatives(self, x: Float[np.ndarray, "chunk column"]) -> tuple[TurnExtremes, Derivatives]:
         """Return the extremes of a chunk and their derivatives, of the columns those that vary and the amounts alone.
 
         What is asked for is a fraction of all columns, and a chunk's answer is kept in a file or sent by a worker.
@@ -185,13 +192,6 @@ class KernelResponse:
             stage = self.model.reducer.cycloid_stage
             errors[:, where["modification.shift"]] += thermal_shift(stage, self.disc_temperature)
         return errors
-
-
-NAME = "stiffness (identified)"
-PREFIX = "stiffness."
-
-SEEN = 0.05
-"""Accuracy of a peak-to-peak, below which no difference means anything [arcsec]."""
 
 
 def stiffness_source(identified: IdentifiedStiffness, reducer: Reducer) -> CorrelatedSource:
@@ -246,10 +246,6 @@ class StiffnessResponse:
         }
         reducer = replace(model.reducer, stiffness=replace(old, **values))
         return replace(self.kernel, model=replace(model, reducer=reducer))
-
-
-_LEAST_AXIS = 1e-9
-"""Variance along an axis over the largest one below which it is rounding [-]."""
 
 
 def principal_axes(covariance: Float[np.ndarray, "stiffness stiffness"]) -> Float[np.ndarray, "axis stiffness"]:

@@ -1,6 +1,6 @@
 """The equivalent model as a response with several outputs: all that requirements limit, and the waves of its orders.
 
-Exact derivatives of all but the peak-to-peak that have them: off torque against twist, without torque, tip and root.
+Exact derivatives there are of what is read off torque against twist, without torque, and at tip and root.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -27,7 +28,8 @@ from tolalloc.reducers import (
     TORSIONAL_STIFFNESS,
 )
 from tolalloc.reducers.equivalent import hysteresis
-from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, friction_loop, hysteresis_loop
+from tolalloc.reducers.equivalent.friction import friction_loop
+from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, HysteresisLoop, hysteresis_loop
 from tolalloc.reducers.equivalent.model import EquivalentModel, Status
 from tolalloc.reducers.equivalent.outputs import (
     Solved,
@@ -39,12 +41,26 @@ from tolalloc.reducers.equivalent.outputs import (
     unit_pressure,
 )
 from tolalloc.reducers.equivalent.perfect import friction_torque_derivatives, pin_force_derivatives, preload
-from tolalloc.reducers.load_case import Combined
+from tolalloc.reducers.load_case import OverLoadCases
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.running.chunks import map_chunks
 
 Answer = tuple[Float[np.ndarray, "chunk output"], UInt8[np.ndarray, " chunk"]]
+_SHARE = "share of the pin force on the most loaded disc"
+_RV = ("largest pin force", "largest crank–disc bearing force", _SHARE)
+_FORCES = {
+    "RV": _RV,
+    "RV centre gear": _RV,
+    "single stage": ("largest pin force", "largest eccentric bearing force", "largest output pin force", _SHARE),
+}
+"""Family → outputs of one solve that a requirement may limit under the rated torque."""
+WITH_FRICTION = (EFFICIENCY, LOST_MOTION_WITH_FRICTION, HYSTERESIS_LOSS)
+"""Outputs of the loop with friction."""
+Derived = tuple[Float[np.ndarray, " chunk"], Float[np.ndarray, "chunk all_columns"], UInt8[np.ndarray, " chunk"]]
+"""An output of a chunk, its derivatives by all error columns of the model, and the worst status of every sample."""
+Width = tuple[Float[np.ndarray, " chunk"], Float[np.ndarray, "chunk all_columns"]]
+"""Twist between both directions of a torque, mean over the turn, and its derivatives [rad, rad/m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,19 +133,8 @@ def _clearance_of(model: EquivalentModel, errors: Float[np.ndarray, "chunk all_c
     return clearance, status.astype(np.uint8)
 
 
-_SHARE = "share of the pin force on the most loaded disc"
-_RV = ("largest pin force", "largest crank–disc bearing force", _SHARE)
-_FORCES = {
-    "RV": _RV,
-    "RV centre gear": _RV,
-    "single stage": ("largest pin force", "largest eccentric bearing force", "largest output pin force", _SHARE),
-}
-"""Family → outputs of one solve that a requirement may limit under the rated torque."""
-
 _PEAK_TO_PEAK = Reading(outputs=(PEAK_TO_PEAK,), read=_peak_to_peak)
 _LOOP = Reading(outputs=(LOST_MOTION, BACKLASH, TORSIONAL_STIFFNESS), read=_loop)
-WITH_FRICTION = (EFFICIENCY, LOST_MOTION_WITH_FRICTION, HYSTERESIS_LOSS)
-"""Outputs of the loop with friction."""
 _FRICTION_LOOP = Reading(outputs=(*_LOOP.outputs, *WITH_FRICTION), read=_friction_loop)
 
 _REQUIREMENTS = {
@@ -281,7 +286,7 @@ class LoadCasesResponse:
     # Outputs of the responses together, in their order, as they are named under their load cases
     read: tuple[str, ...]
     outputs: tuple[str, ...]  # What is answered, of `read` or `combined`
-    combined: Mapping[str, Combined]
+    combined: Mapping[str, OverLoadCases]
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -301,14 +306,10 @@ class LoadCasesResponse:
 
     @staticmethod
     def _combined(
-        combined: Combined, values: Float[np.ndarray, "sample output"], place: Mapping[str, int]
+        combined: OverLoadCases, values: Float[np.ndarray, "sample output"], place: Mapping[str, int]
     ) -> Float[np.ndarray, " sample"]:
         own = values[:, [place[name] for name in combined.of]]
         return np.asarray((combined.weights(own) * own).sum(axis=1))
-
-
-Derived = tuple[Float[np.ndarray, " chunk"], Float[np.ndarray, "chunk all_columns"], UInt8[np.ndarray, " chunk"]]
-"""An output of a chunk, its derivatives by all error columns of the model, and the worst status of every sample."""
 
 
 def _loop_derivatives(output: str, model: EquivalentModel, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
@@ -322,10 +323,6 @@ def _loop_derivatives(output: str, model: EquivalentModel, errors: Float[np.ndar
     stiffness = 2.0 * (1.0 - hysteresis.LOST_MOTION) * rated / (high - low) * ARCMINUTE
     by_error = -(stiffness / (high - low))[:, np.newaxis] * (by_high - by_low)
     return stiffness, by_error, np.maximum(first, second)
-
-
-Width = tuple[Float[np.ndarray, " chunk"], Float[np.ndarray, "chunk all_columns"]]
-"""Twist between both directions of a torque, mean over the turn, and its derivatives [rad, rad/m]."""
 
 
 def _width(
@@ -345,14 +342,14 @@ def _width(
     return (width, slope), status
 
 
-def _pin_force_derivatives(model: EquivalentModel, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
-    found, slopes = pin_force_derivatives(model, errors)
-    return found.pin_force, slopes, found.status
-
-
-def _friction_derivatives(model: EquivalentModel, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
-    found, slopes = friction_torque_derivatives(model, errors)
-    return found.friction_torque, slopes, found.status
+def _preload_derivatives(
+    output: Literal["pin_force", "friction_torque"],
+    model: EquivalentModel,
+    errors: Float[np.ndarray, "chunk all_columns"],
+) -> Derived:
+    derived = pin_force_derivatives if output == "pin_force" else friction_torque_derivatives
+    found, slopes = derived(model, errors)
+    return getattr(found, output), slopes, found.status
 
 
 def _clearance_derivatives(model: EquivalentModel, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
@@ -362,8 +359,8 @@ def _clearance_derivatives(model: EquivalentModel, errors: Float[np.ndarray, "ch
 
 _DERIVED: dict[str, Callable[[EquivalentModel, Float[np.ndarray, "chunk all_columns"]], Derived]] = {
     **{name: partial(_loop_derivatives, name) for name in (LOST_MOTION, BACKLASH, TORSIONAL_STIFFNESS)},
-    PRELOAD: _pin_force_derivatives,
-    FRICTION_TORQUE: _friction_derivatives,
+    PRELOAD: partial(_preload_derivatives, "pin_force"),
+    FRICTION_TORQUE: partial(_preload_derivatives, "friction_torque"),
     RADIAL_CLEARANCE: _clearance_derivatives,
 }
 

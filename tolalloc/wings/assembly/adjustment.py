@@ -37,27 +37,8 @@ from tolalloc.wings.assembly.tolerances import (
 from tolalloc.wings.assembly.trajectory import Trajectory, foreseen
 
 SWEPT = (
-    0.0,
-    0.1,
-    0.2,
-    0.3,
-    0.5,
-    0.7,
-    1.0,
-    1.5,
-    2.0,
-    3.0,
-    4.0,
-    5.0,
-    6.0,
-    8.0,
-    10.0,
-    13.0,
-    16.0,
-    20.0,
-    30.0,
-    50.0,
-    100.0,
+    *(0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0),
+    *(10.0, 13.0, 16.0, 20.0, 30.0, 50.0, 100.0),
 )
 """Precisions over which the expected errors are drawn [-]."""
 SHOWN = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0)

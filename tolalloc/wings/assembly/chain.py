@@ -13,7 +13,7 @@ from tolalloc.exceptions import InputError, UnknownNameError
 
 
 @dataclass(frozen=True, kw_only=True)
-class Part:
+class ChainPart:
     """One part, known by its key characteristic: the axis that it brings into the assembly."""
 
     name: str  # Name of the key characteristic
@@ -32,7 +32,7 @@ class DatumFlowChain:
     """Parts in the order in which they are mounted, a chain or a tree from one datum."""
 
     datum: str  # Name of the characteristic that all others are measured against
-    parts: tuple[Part, ...]  # The parts in the order of assembly
+    parts: tuple[ChainPart, ...]  # The parts in the order of assembly
 
     def __post_init__(self) -> None:
         names = [self.datum, *self.names]

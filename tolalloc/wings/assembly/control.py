@@ -109,7 +109,9 @@ def kalman_filter(
         innovation = observing @ covariance @ observing.T + noise
         scale = np.sqrt(np.diag(observing @ unmeasured @ observing.T + noise))
         telling = np.flatnonzero(scale > 0)  # what never varies and is read without noise has nothing to tell
-        if not _tells_something_new(innovation[np.ix_(telling, telling)], scale[telling]):
+        told, own = innovation[np.ix_(telling, telling)], scale[telling]
+        # A combination of readings that is known before, judged on each reading's own scale.
+        if telling.size and not eigvalsh(told / np.outer(own, own))[0] > _NOTHING_NEW:
             raise InputError.at(
                 f"{place}, step {step + 1}",
                 "measure",
@@ -117,9 +119,7 @@ def kalman_filter(
                 "readings that each tell something new, or a measurement noise above 0",
             )
         gain = np.zeros((space.states, len(observing)))
-        gain[:, telling] = solve(
-            innovation[np.ix_(telling, telling)], observing[telling] @ covariance, assume_a="pos"
-        ).T
+        gain[:, telling] = solve(told, observing[telling] @ covariance, assume_a="pos").T
         left = identity - gain @ observing
         # Joseph's form stays symmetric and positive semidefinite whatever rounding does to the gain.
         covariance = left @ covariance @ left.T + gain @ noise @ gain.T + missed
@@ -127,10 +127,3 @@ def kalman_filter(
         gains.append(gain)
         covariances.append(covariance)
     return KalmanFilter(gains=tuple(gains), covariance=np.array(covariances))
-
-
-def _tells_something_new(
-    innovation: Float[np.ndarray, "reading reading"], scale: Float[np.ndarray, " reading"]
-) -> bool:
-    """Return whether no combination of readings is known before, judged on each reading's own scale."""
-    return not scale.size or bool(eigvalsh(innovation / np.outer(scale, scale))[0] > _NOTHING_NEW)

@@ -18,7 +18,7 @@ from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.files import Record, read_toml, shipped_or_path, validated
 from tolalloc.reading.units import ARCSECOND, DEGREE, MILLIMETRE
 from tolalloc.reducers.reducer.files import PRESETS
-from tolalloc.wings.assembly.chain import DatumFlowChain, Part
+from tolalloc.wings.assembly.chain import ChainPart, DatumFlowChain
 from tolalloc.wings.assembly.plan import LARGEST_STATE_WEIGHT, AngularRequirements, AssemblyPlan
 from tolalloc.wings.assembly.steps import AssemblyStep, Choice, Efforts, Positive, check_steps, steps_in_order
 
@@ -26,6 +26,13 @@ SMALLEST, LARGEST = 0.1, 3600.0
 """Smallest and largest tolerance and limit that is believed, and largest error; smaller ones are degrees [arcsec]."""
 QUIETEST = 0.01
 """Smallest noise that is believed, unless there is none [arcsec]."""
+
+DATA = Path(__file__).parent / "data"
+
+HEADERS = ("part", "x [arcsec]", "y [arcsec]", "z [arcsec]")
+
+IN_DEGREES = 0.05
+"""Where no error reaches this, they were written in degrees [arcsec]."""
 
 
 def _three(values: object) -> object:
@@ -106,11 +113,11 @@ class PartRecord(Record):
     rotation_limit_arcsec: Angle | None = None
     cost: CostRecord | None = None
 
-    def part(self) -> Part:
+    def part(self) -> ChainPart:
         """Return the part in SI units."""
         x, y, z = (float(value) for value in DEGREE * np.array(self.turned_deg))
         across, up, along = (float(value) for value in MILLIMETRE * np.array(self.position_mm))
-        return Part(
+        return ChainPart(
             name=self.name,
             on=self.on,
             turned=(x, y, z),
@@ -167,12 +174,6 @@ class ChainRecord(Record):
             if self.step and getattr(self, field) is not None:
                 raise ValueError(f"{field} stands beside [[step]]; allowed is one of both, as every step says its own")
         return self
-
-
-DATA = Path(__file__).parent / "data"
-HEADERS = ("part", "x [arcsec]", "y [arcsec]", "z [arcsec]")
-IN_DEGREES = 0.05
-"""Where no error reaches this, they were written in degrees [arcsec]."""
 
 
 def load_plan(name: str | Path) -> AssemblyPlan:

@@ -126,10 +126,9 @@ class StateWeightSweep:
 
     state_weights: Float[np.ndarray, " state_weight"]  # Q [-]
     total: Float[np.ndarray, " state_weight"]  # Root of the sum of the variances of all final angles [rad]
-    tilt: Float[
-        np.ndarray, "state_weight part"
-    ]  # Standard deviation of every part's final tilt, x and y together [rad]
-    rotation: Float[np.ndarray, "state_weight part"]  # The same of its rotation about the datum's axis [rad]
+    # Standard deviation of every part's final tilt, x and y together, and of its rotation about the datum's axis [rad]
+    tilt: Float[np.ndarray, "state_weight part"]
+    rotation: Float[np.ndarray, "state_weight part"]
     effort: Float[np.ndarray, " state_weight"]  # Expected Σ uᵀRu [rad²]
     next_unit: Float[np.ndarray, " state_weight"]  # Share of the total that another unit of Q takes off [-]
     noise_floor: float  # Total that is left however large Q is [rad]

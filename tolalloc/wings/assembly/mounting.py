@@ -39,6 +39,11 @@ Asking = Generator[Mountings, Peaks, _Answer]
 """A search that asks for the peak-to-peaks of units, so that those of all starts are computed at once."""
 MountingStep = Callable[[PartStock, Mountings, Peaks], Asking[Trial]]
 
+_GAIN = 1e-9
+"""Gain in the mean from which a step counts, above the rounding of a sum [arcsec]."""
+
+MOST_STARTS = 64
+
 
 @dataclass(frozen=True, kw_only=True)
 class FoundMounting:
@@ -49,8 +54,6 @@ class FoundMounting:
     # Peak-to-peak of every unit with its parts as they come, infinite where it failed, and as found [arcsec]
     before: Float[np.ndarray, " unit"]
     after: Float[np.ndarray, " unit"]
-    # Mean over the units after each step that improved it, from the start that led to the answer [arcsec]
-    history: tuple[float, ...]
     # Units evaluated, and those of them without an answer [-]
     evaluations: int
     failures: int
@@ -174,13 +177,6 @@ def _with(stock: PartStock, unit: Int[np.ndarray, "place 2"], at: int, part: int
     return trials
 
 
-_GAIN = 1e-9
-"""Gain in the mean from which a step counts, above the rounding of a sum [arcsec]."""
-
-Found = tuple[Mountings, Peaks, tuple[float, ...]]
-"""A mounting, its peak-to-peaks, and the means on the way to it [arcsec]."""
-
-
 @dataclass(kw_only=True)
 class EvaluatedUnits:
     """Units that were evaluated, and how many failed."""
@@ -239,12 +235,11 @@ def best_mounting(
     if stock.units == 1:
         every = units_from(stock, range(len(stock.parts)))
         best = every[[int(np.argmin(memory(every)))]]
-        after = memory(best)
-        found: list[Found] = [(best, after, tuple(dict.fromkeys((float(before[0]), float(after[0])))))]
+        found: list[Trial] = [(best, memory(best))]
     else:
         others = (stock.random_mountings(seeds.generator(number)) for number in range(1, starts))
         found = _together(memory, [_improved(stock, mountings) for mountings in (first, *others)])
-    mountings, after, history = min(found, key=lambda own: (float(own[1].mean()), float(own[1].max())))
+    mountings, after = min(found, key=lambda own: (float(own[1].mean()), float(own[1].max())))
     memory.require_few_failures(largest_failed_share)
     if not np.isfinite(after).all():
         raise SolveError("Mounting: a unit has no equilibrium that can be trusted in any mounting met.")
@@ -253,7 +248,6 @@ def best_mounting(
         mountings=mountings,
         before=before,
         after=after,
-        history=history,
         evaluations=memory.evaluations,
         failures=memory.failures,
     )
@@ -276,9 +270,9 @@ def random_mounting(stock: PartStock, response: Response, count: int, seeds: See
     )
 
 
-def _together(memory: EvaluatedUnits, searches: Sequence[Asking[Found]]) -> list[Found]:
+def _together(memory: EvaluatedUnits, searches: Sequence[Asking[Trial]]) -> list[Trial]:
     """Return what the searches find, each as if it were alone; many units at a time keep all cores busy."""
-    found: dict[int, Found] = {}
+    found: dict[int, Trial] = {}
     asked = {number: next(search) for number, search in enumerate(searches)}
     while asked:
         values = memory(np.concatenate(list(asked.values())))
@@ -292,24 +286,18 @@ def _together(memory: EvaluatedUnits, searches: Sequence[Asking[Found]]) -> list
     return [found[number] for number in range(len(searches))]
 
 
-def _improved(stock: PartStock, mountings: Mountings) -> Asking[Found]:
+def _improved(stock: PartStock, mountings: Mountings) -> Asking[Trial]:
     """Return a mounting that no step improves."""
-    peaks = yield mountings
-    history = [float(peaks.mean())]
-    while True:
+    peaks, gained = (yield mountings), True
+    while gained:
         gained = False
         for step in (*map(assigned, range(len(stock.places))), turned, exchanged):
             if step is exchanged and gained:  # the dearest step waits until nothing else helps
                 break
             trial, values = yield from step(stock, mountings, peaks)
-            if values.mean() < history[-1] - _GAIN:
+            if values.mean() < peaks.mean() - _GAIN:
                 mountings, peaks, gained = trial, values, True
-                history.append(float(values.mean()))
-        if not gained:
-            return mountings, peaks, tuple(history)
-
-
-MOST_STARTS = 64
+    return mountings, peaks
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,18 +6,17 @@ the rings of a bearing in their seats, and exchanging single pins.
 
 from __future__ import annotations
 
-import re
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import product
 from math import cos, gcd, pi, sin
 from typing import NamedTuple
 
-from tolalloc.reducers.families.known import family_of
+from tolalloc.reducers.equivalent.columns import source_name
+from tolalloc.reducers.equivalent.springs import harmonic_columns, vector_columns
+from tolalloc.reducers.families.known import SOURCES, family_of
 from tolalloc.reducers.reducer.design import Reducer
-
-_WAVE = re.compile(r"(.*)\.(cos|sin)(\d+)")
-_MEMBER = re.compile(r"(each_(?:pin|tooth)\.\w+)\.(\d+)(.*)")
-_BORE = re.compile(r"\bbore(\d+)\b")
 
 
 class RingShift(NamedTuple):
@@ -62,12 +61,12 @@ class PartTurn:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Place:
+class MountingPlace:
     """Where one part of a unit goes."""
 
     name: str  # Place, such as ``disc2``
     kind: str  # Parts that fit: all places of one kind take the same ones
-    owned: tuple[tuple[str, str], ...]  # Beginning of a column of the model, and of the own name of the error there
+    owned: Mapping[str, str]  # Source of the model → its name on the part
     turns: tuple[PartTurn, ...]  # Ways to mount a part here that differ in what the unit does
 
 
@@ -107,7 +106,7 @@ def disc_turns(reducer: Reducer, made_for: int, disc: int) -> tuple[PartTurn, ..
     return tuple(turns)
 
 
-def places_of(reducer: Reducer) -> tuple[Place, ...]:
+def places_of(reducer: Reducer) -> tuple[MountingPlace, ...]:
     """Return the places of one unit.
 
     Notes
@@ -121,117 +120,103 @@ def places_of(reducer: Reducer) -> tuple[Place, ...]:
     cranks, first = reducer.crank_count, reducer.gears
     gears = first.sun_teeth + first.planet_teeth
     alike = cranks // gcd(cranks, reducer.cycloid_stage.disc_teeth, gears)
-    fixed = tuple(kind.name for kind in family_of(reducer).sources.kinds if kind.fixed)
-    housing = Place(
-        name="housing",
-        kind="housing",
-        owned=(*((name, name) for name in fixed), ("housing.", "")),
-        turns=(housing_turn(reducer, 0),),
-    )
-    carrier = Place(
-        name="carrier",
-        kind="carrier",
-        owned=(("carrier.bore", "bore"),),
-        turns=tuple(carrier_turn(reducer, bores) for bores in range(alike)),
-    )
-    outer = (("centre.eccentricity", "outer.eccentricity"),) if reducer.centre_gear else ()
-    sun = Place(
-        name="sun",
-        kind="sun",
-        owned=(("sun.eccentricity", "eccentricity"), ("sun.pitch", "pitch"), *outer),
-        turns=tuple(sun_turn(reducer, teeth) for teeth in range(first.sun_teeth)),
-    )
     # The planets' teeth meet the sun's alike at crank positions that lie whole numbers of (Z1 + Z2)/n_crank apart.
     step = cranks // gcd(gears, cranks)
-    crank_places = tuple(_crank_place(crank, step) for crank in range(cranks))
-    return (housing, carrier, *crank_places, *_disc_places(reducer), sun)
-
-
-def _crank_place(crank: int, families: int) -> Place:
-    number = crank + 1
-    return Place(
-        name=f"crank{number}",
-        kind="crank" if families == 1 else f"crank{crank % families + 1}",
-        owned=((f"planet{number}.", "planet."), (f"mesh{number}.", "mesh."), (f"crank{number}.", "")),
-        turns=(PartTurn(),),
-    )
-
-
-def _disc_places(reducer: Reducer) -> tuple[Place, ...]:
     discs = range(reducer.disc_count)
     made_for = [next(first for first in discs if disc_turns(reducer, first, disc)) for disc in discs]
+    # Place → parts that fit there and their turns
+    turns = {
+        "housing": ("housing", (housing_turn(reducer, 0),)),
+        "carrier": ("carrier", tuple(carrier_turn(reducer, bores) for bores in range(alike))),
+    }
+    for crank in range(cranks):
+        turns[f"crank{crank + 1}"] = "crank" if step == 1 else f"crank{crank % step + 1}", (PartTurn(),)
+    for disc, first_disc in enumerate(made_for):
+        kind = f"disc{first_disc + 1}" if any(made_for) else "disc"
+        turns[f"disc{disc + 1}"] = kind, disc_turns(reducer, first_disc, disc)
+    turns["sun"] = "sun", tuple(sun_turn(reducer, teeth) for teeth in range(first.sun_teeth))
+    owned = _owned(reducer)
     return tuple(
-        Place(
-            name=f"disc{disc + 1}",
-            kind=f"disc{first + 1}" if any(made_for) else "disc",
-            owned=((f"disc{disc + 1}.", ""),),
-            turns=disc_turns(reducer, first, disc),
-        )
-        for disc, first in zip(discs, made_for, strict=True)
+        MountingPlace(name=name, kind=kind, owned=owned[name], turns=ways) for name, (kind, ways) in turns.items()
     )
 
 
-def own_name(column: str, place: Place) -> str | None:
+def _owned(reducer: Reducer) -> dict[str, dict[str, str]]:
+    """Return part as mounted → source → its name on the part, as the sources declare it."""
+    owned: dict[str, dict[str, str]] = defaultdict(dict)
+    numbers = product(range(1, reducer.crank_count + 1), range(1, reducer.disc_count + 1))
+    for (i, j), kind in product(numbers, family_of(reducer).sources.kinds):
+        part, name = (text.format(i=i, j=j) for text in kind.mounted)
+        owned[part][kind.name.format(i=i, j=j)] = name
+    return owned
+
+
+def own_name(column: str, place: MountingPlace) -> str | None:
     """Return the own name of the error that a column of the model stands for at a place, none if it is not there."""
-    return next((own + column[len(model) :] for model, own in place.owned if column.startswith(model)), None)
+    source = source_name(column)
+    return place.owned[source] + column[len(source) :] if source in place.owned else None
 
 
-def model_name(error: str, place: Place) -> str:
-    """Return the column of the model that an error in its own name is at a place."""
-    return next(model + error[len(own) :] for model, own in place.owned if error.startswith(own))
-
-
-def owned_columns(columns: Iterable[str], places: Iterable[Place]) -> tuple[str, ...]:
+def owned_columns(columns: Iterable[str], places: Iterable[MountingPlace]) -> tuple[str, ...]:
     """Return the columns that some part at one of the places has."""
     taken = tuple(places)
     return tuple(name for name in columns if any(own_name(name, place) is not None for place in taken))
 
 
-def _terms(error: str, turn: PartTurn) -> tuple[tuple[str, float], ...]:
-    """Return the errors that an error becomes by a turn, and its share in each [-].
+def _terms(column: str, turn: PartTurn) -> tuple[tuple[str, float], ...]:
+    """Return the columns that an error becomes by a turn, and its share in each [-].
 
     Notes
     -----
     A wave f(θ) becomes f(θ − turn), and its two amplitudes turn as a vector does, by its order times the angle. The
     place of a single pin is counted radially and tangentially, so it keeps its components.
     """
-    name = _BORE.sub(lambda bore: f"bore{turn.bores.moved(int(bore[1]))}", error)
-    if member := _MEMBER.fullmatch(name):
-        return ((f"{member[1]}.{turn.ring.moved(int(member[2]))}{member[3]}", 1.0),)
-    if wave := _WAVE.fullmatch(name):
-        angle, order = int(wave[3]) * turn.ring.angle, wave[3]
-        ahead, behind = f"{wave[1]}.cos{order}", f"{wave[1]}.sin{order}"
-    elif name.endswith((".x", ".y")):
-        angle, ahead, behind = turn.direction, f"{name[:-1]}x", f"{name[:-1]}y"
+    kind = SOURCES.of_column(column)
+    if kind.each:
+        number = kind.member(column)
+        member = turn.ring.moved(int(column[number]))
+        return ((f"{column[: number.start]}{member}{column[number.stop :]}", 1.0),)
+    numbers = kind.numbers(column)
+    source = kind.name.format(**numbers | {"i": str(turn.bores.moved(int(numbers.get("i", "1"))))})
+    name = source + column[len(numbers["source"]) :]
+    if kind.shape == "waves":
+        order = int(numbers["order"])
+        angle, (ahead, behind) = order * turn.ring.angle, harmonic_columns(source, (order,))
     else:
-        return ((name, 1.0),)
-    if angle == 0.0:
+        angle, (ahead, behind) = turn.direction, vector_columns(source)
+    if kind.shape == "number" or angle == 0.0:
         return ((name, 1.0),)
     return (
         ((ahead, cos(angle)), (behind, sin(angle))) if name == ahead else ((ahead, -sin(angle)), (behind, cos(angle)))
     )
 
 
-def turned(errors: Mapping[str, float], turn: PartTurn) -> dict[str, float]:
-    """Return the errors of a turned part, still in its own names [m, angles rad]."""
-    found: dict[str, float] = {}
-    for error, value in errors.items():
-        for name, share in _terms(error, turn):
-            found[name] = found.get(name, 0.0) + share * value
-    return found
+def _turned(columns: Mapping[str, float], turn: PartTurn) -> dict[str, float]:
+    """Return the columns of a turned part [m, angles rad]."""
+    sums: dict[str, float] = defaultdict(float)
+    for column, value in columns.items():
+        for name, share in _terms(column, turn):
+            sums[name] += share * value
+    return sums
 
 
-def mounted(errors: Mapping[str, float], place: Place, turn: PartTurn) -> dict[str, float]:
+def mounted(errors: Mapping[str, float], place: MountingPlace, turn: PartTurn) -> dict[str, float]:
     """Return the columns of the model that a part's own errors give [m, angles rad].
 
     Notes
     -----
     Exact: the columns are linear in the errors, and a unit is the sum over its parts.
     """
-    return {model_name(error, place): value for error, value in turned(errors, turn).items()}
+    named = {own: source for source, own in place.owned.items()}
+    columns = {}
+    for error, value in errors.items():
+        own = source_name(error)
+        columns[named.get(own, f"{place.name}.{own}") + error[len(own) :]] = value
+    return _turned(columns, turn)
 
 
-def unmounted(deviations: Mapping[str, float], place: Place, turn: PartTurn) -> dict[str, float]:
+def unmounted(deviations: Mapping[str, float], place: MountingPlace, turn: PartTurn) -> dict[str, float]:
     """Return the own errors of the part that gives these columns; those of other places are passed over."""
-    named = ((own_name(column, place), value) for column, value in deviations.items())
-    return turned({name: value for name, value in named if name is not None}, turn.back)
+    here = {column: value for column, value in deviations.items() if own_name(column, place) is not None}
+    named = ((own_name(column, place), value) for column, value in _turned(here, turn.back).items())
+    return {name: value for name, value in named if name is not None}

@@ -8,7 +8,7 @@ from tolalloc.reading.units import MICROMETRE
 from tolalloc.reducers.families.known import SOURCES
 from tolalloc.study.sample import NewReducer, Sample
 from tolalloc.wings.assembly.files import DATA
-from tolalloc.wings.assembly.places import places_of
+from tolalloc.wings.assembly.places import own_name, places_of
 
 _UNITS = 2
 _MEASURED = """# Invented: errors of the axes of one assembly's parts, each about its own x, y, z.
@@ -38,25 +38,15 @@ def assembly_files(new: NewReducer) -> dict[str, str]:
 def parts_files(new: NewReducer) -> dict[str, str]:
     """Return measured parts of two units, for ``tolalloc mount``."""
     rows = ["# Simulated: the parts of two units, drawn inside the tolerance table.", "part,kind,error,value,unit"]
-    kinds = {place.kind for place in places_of(new.reducer)}
+    places = places_of(new.reducer)
     for unit, x in enumerate(new.units(_UNITS), start=1):
         for name, value in zip(new.errors.columns, x, strict=True):
-            part, error = _part_and_error(name)
-            if part:
-                kind = part if part in kinds else part.rstrip("0123456789")
-                rows.append(f"{part}-{unit},{kind},{error},{value / MICROMETRE:.2f},µm")
+            if SOURCES.of_column(name).first_stage:
+                continue
+            for place in places:
+                if error := own_name(name, place):
+                    rows.append(f"{place.name}-{unit},{place.kind},{error},{value / MICROMETRE:.2f},µm")
     return {"parts.csv": "\n".join(rows) + "\n"}
-
-
-def _part_and_error(column: str) -> tuple[str, str]:
-    """Return which measured part of a unit a column belongs to and what the parts table calls it; none of others."""
-    kind = SOURCES.of_column(column)
-    if kind.first_stage or not kind.place:
-        return "", ""
-    if kind.fixed:
-        return "housing", column
-    part, _, error = column.partition(".")
-    return part, error
 
 
 SAMPLES = {

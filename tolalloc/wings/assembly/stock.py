@@ -22,10 +22,23 @@ from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.unit_file import LARGEST_LENGTH
-from tolalloc.wings.assembly.places import PartTurn, Place, mounted, own_name, owned_columns, places_of, unmounted
+from tolalloc.wings.assembly.places import (
+    MountingPlace,
+    PartTurn,
+    mounted,
+    own_name,
+    owned_columns,
+    places_of,
+    unmounted,
+)
 
 Mountings = Int[np.ndarray, "_unit _place 2"]
 """For every unit and place, the number of the part that stands there and of its turn."""
+
+HEADERS = ("part", "kind", "error", "value", "unit")
+
+LARGEST_ANGLE = 3600.0
+"""Largest deviation of an angle that is believed [arcsec]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,16 +61,18 @@ class PartStock:
         return count_units(self.parts, self.places, "parts")
 
     @cached_property
-    def places(self) -> tuple[Place, ...]:
+    def places(self) -> tuple[MountingPlace, ...]:
         """Places for which there are parts."""
         kinds = {part.kind for part in self.parts}
         return tuple(place for place in places_of(self.reducer) if place.kind in kinds)
 
-    def fitting(self, place: Place) -> tuple[int, ...]:
+    def fitting(self, place: MountingPlace) -> tuple[int, ...]:
         """Return the numbers of the parts that fit a place [-]."""
         return tuple(at for at, part in enumerate(self.parts) if part.kind == place.kind)
 
-    def _rows(self, part: MeasuredPart, place: Place, turns: Sequence[PartTurn]) -> Float[np.ndarray, "turn column"]:
+    def _rows(
+        self, part: MeasuredPart, place: MountingPlace, turns: Sequence[PartTurn]
+    ) -> Float[np.ndarray, "turn column"]:
         """Return what a part adds to the columns in each turn [m, angles rad]."""
         where = {name: at for at, name in enumerate(self.columns)}
         rows = np.zeros((len(turns), len(self.columns)))
@@ -124,11 +139,6 @@ class PartStock:
         return mountings
 
 
-HEADERS = ("part", "kind", "error", "value", "unit")
-LARGEST_ANGLE = 3600.0
-"""Largest deviation of an angle that is believed [arcsec]."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class MeasuredPart:
     """One part and its errors; an error that is not named is 0.
@@ -142,12 +152,12 @@ class MeasuredPart:
     """
 
     name: str  # What is written on the part
-    kind: str  # Kind of place that it fits, `tolalloc.wings.assembly.places.Place.kind`
+    kind: str  # Kind of place that it fits, `tolalloc.wings.assembly.places.MountingPlace.kind`
     # Error in the part's own name, such as ``runout.cos1`` of a disc → deviation in its own frame [m, angles rad]
     errors: Mapping[str, float]
 
 
-def count_units(parts: Sequence[MeasuredPart], places: Sequence[Place], origin: Path | str) -> int:
+def count_units(parts: Sequence[MeasuredPart], places: Sequence[MountingPlace], origin: Path | str) -> int:
     """Return how many units the parts make [-].
 
     Notes
@@ -243,12 +253,12 @@ def drawn_parts(errors: ErrorModel, reducer: Reducer, units: int, seeds: SeedTre
     """
     uniform = np.concatenate(list(seeds.uniform_chunks(units, len(errors.columns))))
     rows = errors.deviations(errors.standard_values(uniform), errors.zones)
+    places = tuple(place for place in places_of(reducer) if owned_columns(errors.columns, (place,)))
     parts = []
     for unit, row in enumerate(rows, start=1):
         deviations = {**errors.fixed, **dict(zip(errors.columns, map(float, row), strict=True))}
         nonzero = {column: value for column, value in deviations.items() if value != 0.0}
-        for place in places_of(reducer):
-            if owned_columns(errors.columns, (place,)):
-                own = unmounted(nonzero, place, place.turns[0])
-                parts.append(MeasuredPart(name=f"{place.name} of unit {unit}", kind=place.kind, errors=own))
+        for place in places:
+            own = unmounted(nonzero, place, place.turns[0])
+            parts.append(MeasuredPart(name=f"{place.name} of unit {unit}", kind=place.kind, errors=own))
     return tuple(parts)

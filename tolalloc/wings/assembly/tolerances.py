@@ -21,6 +21,12 @@ from tolalloc.wings.assembly.gains import FinalErrors, Gains, assembled, tuned_g
 from tolalloc.wings.assembly.plan import AngularRequirements, AssemblyPlan
 from tolalloc.wings.assembly.trajectory import random_numbers
 
+_TOLERANCES_SETTLED = 1e-8
+"""Relative change of all tolerances below which they count as settled [-]."""
+
+_STATE_WEIGHT_SETTLED = 1e-6
+"""Step of the precision's logarithm with which the search for the best one ends [-]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class AngularLimits:
@@ -242,12 +248,6 @@ def _final(
     # A whole chunk is drawn, so that the first assemblies are the same however many follow.
     standard = generator.standard_normal((CHUNK, random_numbers(plan.space)))[:assemblies]
     return np.asarray(assembled(plan, allocation.gains, allocation.tolerances, standard).adjusted[:, -1])
-
-
-_TOLERANCES_SETTLED = 1e-8
-"""Relative change of all tolerances below which they count as settled [-]."""
-_STATE_WEIGHT_SETTLED = 1e-6
-"""Step of the precision's logarithm with which the search for the best one ends [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,6 +22,14 @@ BLENDS = {"linear": Polynomial([0, 1]), "step": Polynomial([0, 0, 3, -2])}
 _OverTime = Float[np.ndarray, " time"]
 _Piece = tuple[Int[np.ndarray, " time"], _OverTime, _OverTime, _OverTime, _OverTime]
 """The piece of a profile that each time lies in: number, first value, rise to the last, length, share gone."""
+ASSUMPTIONS = (
+    "sun gear and planet gears: solid cylinders of their pitch radius, as wide as a disc; a crankshaft adds nothing to "
+    "its planet gear",
+    "disc: solid cylinder of the radius Rp − r_rp and its own width; bores are not taken out",
+    "carrier: two solid flanges of the radius Rp − r_rp, each as wide as a disc",
+    "all parts of steel of one density; the load's inertia turns with the carrier",
+)
+"""What `inertia_of` supposes, because no source prints a mass."""
 
 
 @dataclass(frozen=True)
@@ -174,16 +182,6 @@ def nominal_acceleration(at: Positions, motion: Motion) -> Float[np.ndarray, "ti
         nominal[:, own + 2] = acceleration
     nominal[:, coordinates.carrier + 2] = acceleration
     return nominal
-
-
-ASSUMPTIONS = (
-    "sun gear and planet gears: solid cylinders of their pitch radius, as wide as a disc; a crankshaft adds nothing to "
-    "its planet gear",
-    "disc: solid cylinder of the radius Rp − r_rp and its own width; bores are not taken out",
-    "carrier: two solid flanges of the radius Rp − r_rp, each as wide as a disc",
-    "all parts of steel of one density; the load's inertia turns with the carrier",
-)
-"""What `inertia_of` supposes, because no source prints a mass."""
 
 
 @dataclass(frozen=True, kw_only=True)

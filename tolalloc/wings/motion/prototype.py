@@ -5,7 +5,6 @@ It is the only door to the multibody engine, an optional extra.
 
 from __future__ import annotations
 
-import re
 from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -22,12 +21,20 @@ from tolalloc.reducers.cycloid.loaded_contact import contact_stiffness
 from tolalloc.reducers.cycloid.solvers import LAWS
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
 from tolalloc.reducers.equivalent.springs import Positions
+from tolalloc.reducers.families.known import family_of
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.wings.motion.motion import Damping, Inertia
 from tolalloc.wings.motion.solvers.pin_forces import Mesh, fill_forces, fill_pin_forces
 from tolalloc.wings.motion.stepping import Progress, untold
 
 _KNOTS = 513  # of a smooth step: its straight pieces miss the cubic by less than a millionth of the step
+_TABULATED = 1801  # angles of the contact's stiffness along a tooth
+_FORM_ANGLES = 720  # of the form in one tooth space, and around a pin
+RIGID = 1e13
+"""Stiffness of a bearing that yields 0.01 arcsec at the output of an RV-40E under its rated torque, and whose force is
+still far above its own rounding [N/m]."""
+_RESIDUAL = 1e-2
+"""Unbalanced force or moment at which a time step is solved, above the rounding in the stiffest bearings [N, N·m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,20 +105,20 @@ def part_errors(reducer: Reducer, errors: Mapping[str, float]) -> PartErrors:
         pin_radius=np.zeros(pins),
     )
     places = {
-        r"crank(\d+)\.journal(\d+)\.eccentricity\.([xy])": (found.journal, 1.0),
-        r"disc(\d+)\.bore(\d+)\.position\.([xy])": (found.disc_bore, 1.0),
-        r"carrier\.bore(\d+)\.position\.([xy])": (found.carrier_bore, 1.0),
-        r"carrier\.assembly\.([xy])": (found.carrier, 1.0),
-        r"each_pin\.position\.(\d+)\.([xy])": (found.pin, 1.0),
-        r"each_pin\.diameter\.(\d+)": (found.pin_radius, 1.0),
-        r"pin\.diameter": (found.pin_radius, 1.0),
-        r"housing\.groove\.radius": (found.pin_radius, -1.0),  # a larger groove lets the pins sink
+        "crank{i}.journal{j}.eccentricity": (found.journal, 1.0),
+        "disc{j}.bore{i}.position": (found.disc_bore, 1.0),
+        "carrier.bore{i}.position": (found.carrier_bore, 1.0),
+        "carrier.assembly": (found.carrier, 1.0),
+        "each_pin.position": (found.pin, 1.0),
+        "each_pin.diameter": (found.pin_radius, 1.0),
+        "pin.diameter": (found.pin_radius, 1.0),
+        "housing.groove.radius": (found.pin_radius, -1.0),  # a larger groove lets the pins sink
     }
+    moving = [(kind, *places[kind.name]) for kind in family_of(reducer).sources.kinds if kind.name in places]
     for name, value in errors.items():
-        for pattern, (place, sign) in places.items():
-            match = re.fullmatch(pattern, name)
-            at = tuple("xy".index(part) if part in "xy" else int(part) - 1 for part in match.groups()) if match else ()
-            if match and all(0 <= index < size for index, size in zip(at, place.shape, strict=False)):
+        for kind, place, sign in moving:
+            at = kind.index(name)
+            if at is not None and all(0 <= index < size for index, size in zip(at, place.shape, strict=False)):
                 place[at] += sign * value
                 break
         else:
@@ -119,10 +126,6 @@ def part_errors(reducer: Reducer, errors: Mapping[str, float]) -> PartErrors:
                 f"virtual prototype of {reducer.name}", "error column", name, "one of a journal, bore, carrier or pin"
             )
     return found
-
-
-_TABULATED = 1801  # angles of the contact's stiffness along a tooth
-_FORM_ANGLES = 720  # of the form in one tooth space, and around a pin
 
 
 def _forms(reducer: Reducer) -> tuple[Float[np.ndarray, "disc angle"], Float[np.ndarray, "pin direction"]]:
@@ -268,28 +271,11 @@ class System:
             )
         )
 
-    def sensor(self, node: Any, variable: str) -> Any:
-        """Return a sensor of a node's displacements, speeds or accelerations."""
-        kind = getattr(self.engine.OutputVariableType, variable)
-        return self.content.AddSensor(
-            self.engine.itemInterface.SensorNode(
-                nodeNumber=node, outputVariableType=kind, writeToFile=False, storeInternal=True
-            )
-        )
-
-    def moment_sensor(self, gears: Any) -> Any:
-        """Return a sensor of the moment that the first stage puts on a crank."""
-        kind = self.engine.OutputVariableType.Force
-        return self.content.AddSensor(
-            self.engine.itemInterface.SensorObject(
-                objectNumber=gears, outputVariableType=kind, writeToFile=False, storeInternal=True
-            )
-        )
-
-
-RIGID = 1e13
-"""Stiffness of a bearing that yields 0.01 arcsec at the output of an RV-40E under its rated torque, and whose force is
-still far above its own rounding [N/m]."""
+    def sensor(self, kind: str, variable: str, **of: Any) -> Any:
+        """Return a sensor of a kind, of displacements, speeds or accelerations of a node or of what an object bears."""
+        answered = getattr(self.engine.OutputVariableType, variable)
+        new = getattr(self.engine.itemInterface, kind)
+        return self.content.AddSensor(new(outputVariableType=answered, writeToFile=False, storeInternal=True, **of))
 
 
 def with_rigid_bearings(reducer: Reducer) -> Reducer:
@@ -344,15 +330,20 @@ def _assemble(
             pair = [(crank[1], journal), (disc[1], axis + errors.disc_bore[j, i])]
             new.bearing(pair, stiffness.crank_disc_bearing, bearings)
         gear = new.first_stage(reducer, new.rotation(crank[0]), carrier_rotation, speed)
-        gears.append(new.moment_sensor(gear))
+        gears.append(new.sensor("SensorObject", "Force", objectNumber=gear))
     reference = np.column_stack([places[first_disc:], np.zeros(len(discs))]).ravel()
     new.pin_contacts([node for node, _ in discs], reference, mesh)
     new.output(reducer, carrier_rotation, speed, torque, damping.mass_proportional * inertia.carrier_moment)
     nodes = [node for node, _ in (carrier, *cranks, *discs)]
-    parts = tuple((new.sensor(node, "Coordinates"), new.sensor(node, "Coordinates_t")) for node in nodes)
-    acceleration = new.sensor(carrier[0], "Coordinates_tt")
+    standing, moving = (
+        [new.sensor("SensorNode", variable, nodeNumber=node) for node in nodes]
+        for variable in ("Coordinates", "Coordinates_t")
+    )
+    acceleration = new.sensor("SensorNode", "Coordinates_tt", nodeNumber=carrier[0])
     new.content.Assemble()
-    return replace(new, parts=parts, carrier_acceleration=acceleration, gears=tuple(gears))
+    return replace(
+        new, parts=tuple(zip(standing, moving, strict=True)), carrier_acceleration=acceleration, gears=tuple(gears)
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -372,10 +363,6 @@ class PrototypeAnswer:
     output_torque: Float[np.ndarray, " time"]  # On the carrier, as prescribed [N·m]
     pin_forces: Float[np.ndarray, "time disc pin"]  # Normal force of every pin [N]
     kinetic_energy: Float[np.ndarray, " time"]  # Of all bodies but the sun [J]
-
-
-_RESIDUAL = 1e-2
-"""Unbalanced force or moment at which a time step is solved, above the rounding in the stiffest bearings [N, N·m]."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -53,6 +53,23 @@ LARGEST_TORQUE = 10.0
 """Largest torque over the rated one [-]."""
 LOAD_TIME = 0.5
 """Time in which the load rises after the speed has, over the time of the speed: 1.0 to 1.5 s in xi2015 [-]."""
+ALTERNATING = 0.05
+"""Amplitude from step to step over the static peak-to-peak, above which it is not the reducer's [-]."""
+UNCLOSED = 1e-3
+"""Power that leaves over power that enters, less one, above which the run has not settled or the engine errs [-]."""
+UNSETTLED = 0.1
+"""Change of the deviation from the static model between both halves, over the larger, above which it decays [-]."""
+ANSWERED = ("output_speed", "output_acceleration", "transmission_error", "input_torque", "pin_forces")
+"""What an engine answers over time beside what drives it, fields of `TimeSeries`."""
+Answered = dict[str, Float[np.ndarray, "time ..."]]
+READ = 0.02 * ARCSECOND
+"""Deviation that is too small to matter [rad]."""
+TURNING_BACK = -0.45
+"""Correlation of successive changes below which a quantity turns back at every step; −0.5 has noise [-]."""
+MOST_ANGLES = 5000
+"""Angles at which the static model is asked beside the simulation [-]."""
+MODE_ANGLES = 200
+"""Angles at which natural frequencies are looked for [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,20 +95,12 @@ class SimulationRequest:
     def __post_init__(self) -> None:
         if self.engine not in ENGINES:
             raise UnknownNameError.among("simulation", "engine", self.engine, ENGINES)
-        for name, value in (
-            ("speed_rpm", self.speed_rpm),
-            ("duration", self.duration),
-            ("ramp", self.ramp),
-            ("step", self.step),
-            ("pin_stiffness", 1.0 if self.pin_stiffness is None else self.pin_stiffness),
-        ):
-            if not 0.0 < value < inf:
+        for name in ("speed_rpm", "duration", "ramp", "step", "pin_stiffness"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < inf:
                 raise InputError.of_argument("simulation", name, value, "a number above 0")
-        for name, value in (
-            ("output_inertia", self.output_inertia),
-            ("damping", self.damping),
-            ("mass_damping", self.mass_damping or 0.0),
-        ):
+        for name in ("output_inertia", "damping", "mass_damping"):
+            value = getattr(self, name) or 0.0
             if not 0.0 <= value < inf:
                 raise InputError.of_argument("simulation", name, value, "0 or a positive number")
         if not self.duration / MOST_STEPS <= self.step <= self.duration:
@@ -172,7 +181,8 @@ def prepare_simulation(asked: SimulationRequest) -> PreparedSimulation:
     reducer = unit.as_built(designed)
     if asked.engine == "exudyn":
         multibody_engine()
-        reducer = _with_modification_of(unit, with_ideal_gears(reducer))
+        # The prototype takes the unit's own modification from the teeth.
+        reducer = replace(with_ideal_gears(reducer), modification=unit.modification(reducer))
     if asked.pin_stiffness is not None:
         constant = replace(
             reducer.stiffness, pin_contact=asked.pin_stiffness, pin_contact_law="constant", pin_bending=inf
@@ -198,13 +208,6 @@ def prepare_simulation(asked: SimulationRequest) -> PreparedSimulation:
     return prepared
 
 
-def _with_modification_of(unit: BuiltUnit, reducer: Reducer) -> Reducer:
-    """Return the reducer with the unit's own modification, which the prototype takes from the teeth."""
-    stated = {**reducer.modification.deviations, **unit.deviations}
-    amounts = {name.rpartition(".")[2]: stated[name] for name in reducer.modification.deviations}
-    return replace(reducer, modification=replace(reducer.modification, **amounts))
-
-
 def with_ideal_gears(reducer: Reducer) -> Reducer:
     """Return the reducer with a first stage that does not yield, as the prototype has it.
 
@@ -214,18 +217,6 @@ def with_ideal_gears(reducer: Reducer) -> Reducer:
     10000000000000.0
     """
     return replace(reducer, stiffness=replace(reducer.stiffness, gear_mesh=RIGID, sun_support=RIGID))
-
-
-ALTERNATING = 0.05
-"""Amplitude from step to step over the static peak-to-peak, above which it is not the reducer's [-]."""
-UNCLOSED = 1e-3
-"""Power that leaves over power that enters, less one, above which the run has not settled or the engine errs [-]."""
-UNSETTLED = 0.1
-"""Change of the deviation from the static model between both halves, over the larger, above which it decays [-]."""
-READ = 0.02 * ARCSECOND
-"""Deviation that is too small to matter [rad]."""
-TURNING_BACK = -0.45
-"""Correlation of successive changes below which a quantity turns back at every step; −0.5 has noise [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -387,12 +378,6 @@ def rms(values: Float[np.ndarray, "..."]) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-MOST_ANGLES = 5000
-"""Angles at which the static model is asked beside the simulation [-]."""
-MODE_ANGLES = 200
-"""Angles at which natural frequencies are looked for [-]."""
-
-
 def simulate(prepared: PreparedSimulation, progress: Progress) -> SimulationResult:
     """Return what a reducer does over time, and the static model at the same angles.
 
@@ -402,7 +387,15 @@ def simulate(prepared: PreparedSimulation, progress: Progress) -> SimulationResu
     progress.begin(f"in motion, {asked.engine}", int(1e3 * asked.duration + 1e-6), "ms")
     start = time.perf_counter()
     simulated = _prototype if asked.engine == "exudyn" else _equivalent
-    series = simulated(prepared, motion, _milliseconds(asked.duration, progress))
+    ratio = prepared.reducer.ratio
+    series = TimeSeries(
+        time=motion.time,
+        carrier_angle=motion.carrier_angle,
+        input_speed=motion.carrier_speed * ratio,
+        input_acceleration=motion.carrier_acceleration * ratio,
+        output_torque=motion.torque,
+        **simulated(prepared, motion, _milliseconds(asked.duration, progress)),
+    )
     seconds = time.perf_counter() - start
     count = round(prepared.crank_turns * prepared.crank_turn / motion.step)
     steady = slice(motion.time.size - count, motion.time.size)
@@ -441,7 +434,7 @@ def _damping(prepared: PreparedSimulation) -> Damping:
     return Damping(mass_proportional=prepared.mass_damping, stiffness_proportional=prepared.asked.damping)
 
 
-def _equivalent(prepared: PreparedSimulation, motion: Motion, tell: Callable[[float], None]) -> TimeSeries:
+def _equivalent(prepared: PreparedSimulation, motion: Motion, tell: Callable[[float], None]) -> Answered:
     """Simulate the equivalent model."""
     asked, every = prepared.asked, np.arange(motion.time.size)
     given = (prepared.inertia, _damping(prepared), INTEGRATORS[asked.engine])
@@ -450,18 +443,10 @@ def _equivalent(prepared: PreparedSimulation, motion: Motion, tell: Callable[[fl
     if failed.size:
         outcome = Status(int(found.status[0, failed[0]])).sentence
         raise SolveError(f"unit {prepared.unit.name}: no motion from {motion.time[failed[0]]:.4g} s on: {outcome}.")
-    return _series(
-        prepared,
-        motion,
-        output_speed=found.output_speed[0],
-        output_acceleration=found.output_acceleration[0],
-        transmission_error=found.transmission_error[0],
-        input_torque=found.input_torque[0],
-        pin_forces=found.pin_forces[0],
-    )
+    return {name: getattr(found, name)[0] for name in ANSWERED}
 
 
-def _prototype(prepared: PreparedSimulation, motion: Motion, tell: Callable[[float], None]) -> TimeSeries:
+def _prototype(prepared: PreparedSimulation, motion: Motion, tell: Callable[[float], None]) -> Answered:
     """Simulate the virtual prototype."""
     asked = prepared.asked
     found = simulate_prototype(
@@ -476,28 +461,7 @@ def _prototype(prepared: PreparedSimulation, motion: Motion, tell: Callable[[flo
     )
     if found.time.size != motion.time.size:
         raise SolveError(f"virtual prototype: {found.time.size} answers in {motion.time.size} time steps.")
-    return _series(
-        prepared,
-        motion,
-        output_speed=found.output_speed,
-        output_acceleration=found.output_acceleration,
-        transmission_error=found.transmission_error,
-        input_torque=found.input_torque,
-        pin_forces=found.pin_forces,
-    )
-
-
-def _series(prepared: PreparedSimulation, motion: Motion, **found: np.ndarray) -> TimeSeries:
-    """Return what an engine found beside what drove it."""
-    ratio = prepared.reducer.ratio
-    return TimeSeries(
-        time=motion.time,
-        carrier_angle=motion.carrier_angle,
-        input_speed=motion.carrier_speed * ratio,
-        input_acceleration=motion.carrier_acceleration * ratio,
-        output_torque=motion.torque,
-        **found,
-    )
+    return {name: getattr(found, name) for name in ANSWERED}
 
 
 def _at_rest(prepared: PreparedSimulation, motion: Motion, steady: slice) -> AtRest:

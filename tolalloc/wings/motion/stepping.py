@@ -24,6 +24,8 @@ from tolalloc.wings.motion.motion import Damping, Inertia, Integrator, Motion, n
 from tolalloc.wings.motion.solvers.stepping import Parts, State, StepRecord, advance
 
 _STEPS_AT_ONCE = 512
+Progress = Callable[[float], None]
+"""Told which share of the time is simulated [-]."""
 
 
 class StepTables(NamedTuple):
@@ -166,10 +168,6 @@ class Steps:
             acceleration=nominal_acceleration(at, part) / self.scale,
             torque=part.torque,
         )
-
-
-Progress = Callable[[float], None]
-"""Told which share of the time is simulated [-]."""
 
 
 def untold(share: float) -> None:

@@ -1,6 +1,6 @@
-"""Force of one pin on one disc tooth from their compression: every law is convex in energy and C¹ under load.
+"""Pins and teeth, compiled: force of one pin by its compression, exact distances of pins from many tooth profiles.
 
-Exact distance of pins from tooth profiles, many designs at once.
+Every law of force is convex in energy and C¹ under load.
 """
 
 from __future__ import annotations
@@ -13,6 +13,12 @@ from tolalloc.reducers.cycloid.solvers import LINEAR
 from tolalloc.running.compiled import in_threads, jit, jit_in_place
 
 _STIFFEST = 2.0  # ln(cλ/F) at which the logarithmic law goes on straight: a force that no part carries
+# Fields of a design, `tolalloc.reducers.cycloid.clearance` fills them.
+CIRCLE, PIN, ECCENTRICITY, TEETH, GROUND_CIRCLE, GROUND_PIN, ROTATION, ROOT, TIP, BEND, FIELDS = range(11)
+_GRID = 384  # points of the scan over a tooth and a part of its neighbours
+_NEAR = 0.3  # distance from the path over its radius, and slip along it [rad], up to which the nearest point is plain
+_AT_ONCE = 16  # designs that a thread takes together
+_BEYOND = 1.0  # how far the scan goes beyond the tips on either side [rad]
 
 
 @jit_in_place
@@ -79,15 +85,6 @@ def pin_slopes(law, stiffness, log_length, compression, force, slope):
     """Fill force and derivative of many pins that stand straight, [pin]."""
     for k in range(compression.size):
         force[k], slope[k] = pin_force(law, stiffness[k], log_length[k], 0.0, compression[k])
-
-
-# Fields of a design, `tolalloc.reducers.cycloid.clearance` fills them.
-CIRCLE, PIN, ECCENTRICITY, TEETH, GROUND_CIRCLE, GROUND_PIN, ROTATION, ROOT, TIP, BEND, FIELDS = range(11)
-
-_GRID = 384  # points of the scan over a tooth and a part of its neighbours
-_NEAR = 0.3  # distance from the path over its radius, and slip along it [rad], up to which the nearest point is plain
-_AT_ONCE = 16  # designs that a thread takes together
-_BEYOND = 1.0  # how far the scan goes beyond the tips on either side [rad]
 
 
 @jit

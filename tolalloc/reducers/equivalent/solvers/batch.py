@@ -1,19 +1,15 @@
-"""A batch of samples: what the lanes work on, and everything that is the same for all Newton steps at an angle.
-
-Where the discs of a batch will stand at the next angle, from where they stood at those before it.
-
-After a turn of its crank a disc meets the pins again, each a tooth further, and only the errors of single pins and
-teeth make the difference. So an equilibrium is that of a crank's turn before, and has changed by nearly what it had
-changed by in the turn before that. A straight line through the last two angles is five times as far off: there are 24
-angles to a crank's turn, and at each of them a pin begins or ceases to touch.
-
-Equilibria of a batch of samples at one angle, side by side in registers, for pins and discs without play.
+"""Equilibria of a batch of samples at one angle, side by side in registers, for pins and discs without play.
 
 Newton's steps start where the angles before let the discs be guessed, and nearly all samples need whole ones only.
 Where the tangent is singular, a small pivot replaces the vanishing one and the step ends where the next pin touches.
 A register waits for the slowest of its samples. So those that are not settled after the first steps, one in twenty,
 leave their registers and go on together. Samples not settled in more steps, or that meet no pin, need a line search and
 are left to the solver for one sample.
+
+After a turn of its crank a disc meets the pins again, each a tooth further, and only the errors of single pins and
+teeth make the difference. So an equilibrium is that of a crank's turn before, and has changed by nearly what it had
+changed by in the turn before that. A straight line through the last two angles is five times as far off: there are 24
+angles to a crank's turn, and at each of them a pin begins or ceases to touch.
 """
 
 from __future__ import annotations
@@ -72,9 +68,17 @@ LATE = BATCH
 
 ROW = BATCH + WIDTH
 """Samples of a batch with that register; not a power of two, because a cache keeps few rows that lie so far apart."""
+_LAST, _AHEAD, _HERE, _BEHIND = 0.3, 0.5, 0.35, -0.15
+"""Weights, 1 together, of what changed within a turn of the crank, near the best for random units of four reducers.
+
+At the last angle; a turn before the angle after the next one, the next one, and the last.
+"""
+_FIRST_STEPS, _STEPS = 2, 10
+# Under a curved law, whose stiffness changes with every step
+_FIRST_CURVED_STEPS, _CURVED_STEPS = 4, 16
 
 
-class Batch(NamedTuple):
+class SampleBatch(NamedTuple):
     """Loads, state and work space of a batch; samples are the last axis, so that a register holds several of them."""
 
     # What the tables take, `tolalloc.reducers.equivalent.columns.Layout` [m, rad, N·m]
@@ -97,7 +101,7 @@ class Batch(NamedTuple):
 @jit
 def make_batch(layout, size, contacts, samples):
     """Return an empty batch of so many samples: `ROW`, or one register."""
-    return Batch(
+    return SampleBatch(
         aligned(layout.end, samples),
         aligned(samples // WIDTH * contacts, WIDTH).reshape(samples // WIDTH, contacts, WIDTH),
         aligned(size, samples),
@@ -229,13 +233,6 @@ def _displace_nothing(at, tables, layout, rows, waves, teeth_deviate, flanks_tur
         displace_play(at, tables, layout, rows, used, batch.values, play)
 
 
-_LAST, _AHEAD, _HERE, _BEHIND = 0.3, 0.5, 0.35, -0.15
-"""Weights, 1 together, of what changed within a turn of the crank, near the best for random units of four reducers.
-
-At the last angle; a turn before the angle after the next one, the next one, and the last.
-"""
-
-
 @jit
 def make_history(turn, size):
     """Return room for the equilibria at two turns of a crank, so many angles each, or at two angles if it is 0."""
@@ -275,11 +272,6 @@ def _add(own, weight, kept, used, q, history):
             place = i * ROW + v
             own_part = multiply(spread(own), load(q, place))
             store(q, place, fma(spread(weight), load(history, kept * q.shape[0] * ROW + place), own_part))
-
-
-_FIRST_STEPS, _STEPS = 2, 10
-# Under a curved law, whose stiffness changes with every step
-_FIRST_CURVED_STEPS, _CURVED_STEPS = 4, 16
 
 
 @jit_within

@@ -1,4 +1,4 @@
-"""Equilibrium of one sample at one angle, for every contact law, tilt and play.
+"""Equilibrium of one sample at one angle, for every contact law, tilt and play; its problem from the condensed tables.
 
 The energy ½qᵀSq − fᵀq + Σφ(h + D·q) is convex. Newton's method with an exact line search converges from anywhere in a
 few steps; a plain active-set iteration cycles. S has one zero eigenvalue (the whole mechanism turning), so with too few
@@ -7,10 +7,6 @@ direction, and the line search stops where contacts take over.
 
 Each sample is solved alone and in a fixed order of operations, so its bits do not depend on the number of threads, on
 its place in a batch or on its neighbours.
-
-Energy of one sample at one angle: its problem, and the forces and stiffness of all contacts at given coordinates.
-
-The problem of one sample at one tabulated angle, from the condensed tables.
 """
 
 from __future__ import annotations
@@ -25,8 +21,19 @@ from tolalloc.reducers.cycloid.solvers.pins import pin_force
 from tolalloc.reducers.equivalent.solvers.records import CONVERGED, NOT_CONVERGED, NOT_RESISTED
 from tolalloc.running.compiled import jit, jit_in_place, jit_within
 
+TOLERANCE = 1e-11  # of the largest force
+_PROMISED = 1e-9  # the same where a bearing that just touches keeps the steps from settling
+ROUNDING = 2e-15  # of the terms that cancel in the balance of forces; below it a residual is noise
+PIVOT = 1e-12  # of the largest diagonal entry
+_ITERATIONS = 100
+_SOFTEST = 6  # decades by which play is softened where a part slides around inside its bearing
+_SEARCH_STEPS = 200
+_ENOUGH = 0.1  # of the first slope along a step, under a curved law
+_FARTHEST = 1e9  # steps; a contact that resists only beyond is none
+_REACH = 1.0  # metres; the same
 
-class Problem(NamedTuple):
+
+class ContactProblem(NamedTuple):
     """One sample at one angle, in the retained coordinates; the discs' come first."""
 
     law: int  # One of `tolalloc.reducers.cycloid.solvers.LAWS` [-]
@@ -186,18 +193,6 @@ def assemble(problem, compression, play, q, gradient, tangent):
     return largest, cancelling, touching
 
 
-TOLERANCE = 1e-11  # of the largest force
-_PROMISED = 1e-9  # the same where a bearing that just touches keeps the steps from settling
-ROUNDING = 2e-15  # of the terms that cancel in the balance of forces; below it a residual is noise
-PIVOT = 1e-12  # of the largest diagonal entry
-_ITERATIONS = 100
-_SOFTEST = 6  # decades by which play is softened where a part slides around inside its bearing
-_SEARCH_STEPS = 200
-_ENOUGH = 0.1  # of the first slope along a step, under a curved law
-_FARTHEST = 1e9  # steps; a contact that resists only beyond is none
-_REACH = 1.0  # metres; the same
-
-
 @jit_within
 def solve_tangent(tangent, gradient, step):
     """Solve tangent·step = −gradient by Cholesky in place; return whether a pivot was replaced.
@@ -350,7 +345,7 @@ def _newton(problem, q, work):
 @jit
 def _softened(problem, factor):
     """Return the problem with softer elements with play."""
-    return Problem(
+    return ContactProblem(
         problem.law,
         problem.stiffness,
         problem.force,
@@ -415,7 +410,7 @@ def make_problem(law, tables):
     """Return a problem with memory of its own, to be filled by `fill_loads` and from tables."""
     retained, discs, pins = tables.stiffness.shape[1], tables.contact_by_disc.shape[1], tables.contact_by_disc.shape[3]
     elements = tables.play_stiffness.shape[1]
-    return Problem(
+    return ContactProblem(
         law,
         np.empty((retained, retained)),
         np.empty(retained),
@@ -514,7 +509,7 @@ def sample_constants(problem, turn, face_width, layout, values):
 @jit
 def with_tables(at, tables, layout, face_width, values, own):
     """Return the problem whose loads ``own`` has, with the tables of a node."""
-    problem = Problem(
+    problem = ContactProblem(
         own.law,
         tables.stiffness[at],
         own.force,

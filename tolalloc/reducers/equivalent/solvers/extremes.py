@@ -1,16 +1,9 @@
-"""The two extremes of each sample's transmission error, refined between the coarse angles.
+"""The two extremes of each sample's transmission error, refined between the coarse angles, a search to a lane.
 
 First the highest peak of either side is followed to its end; then every other one that may still reach what was found.
-Every peak's search depends on its own sample alone, whatever stands in the lanes beside it.
-
-Searches around peaks of the curve, one in each lane.
-
 An extreme is a kink, where one pin takes over from another, so a peak is searched by halving the step around it and
-not by a parabola. What a search finds depends on its own sample alone.
-
-Where the searches look, solved side by side, a search to a lane.
-
-Searches go through the turn side by side, so that what the lanes read of the tables is still in the cache.
+not by a parabola. Every peak's search depends on its own sample alone, whatever stands in the lanes beside it; searches
+go through the turn side by side, so that what the lanes read of the tables is still in the cache.
 """
 
 from __future__ import annotations

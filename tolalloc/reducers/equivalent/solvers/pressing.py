@@ -1,8 +1,7 @@
 """Contacts of one register of samples at given coordinates: what presses them, and what that adds up to.
 
-Force and stiffness of line contacts, eight side by side.
-
-No table and no iteration that ends by itself, so that a lane has the same bits alone and among others.
+Force and stiffness of line contacts have no table and no iteration that ends by itself, so that a lane has the same
+bits alone and among others.
 """
 
 from __future__ import annotations
@@ -64,6 +63,8 @@ _BELOW = (
     -0.5558535883401736,
     -0.62195314420652,
 )
+BEYOND = 1.000001
+"""Of the way to the next contact, where a step ends that nothing else resists [-]."""
 
 
 @jit_within
@@ -302,10 +303,6 @@ def press(law, discs, tables, v, batch):
     if law == LINEAR:
         return _press(discs, tables, v, batch), 0
     return _press_line_contacts(discs, tables, v, batch)
-
-
-BEYOND = 1.000001
-"""Of the way to the next contact, where a step ends that nothing else resists [-]."""
 
 
 @jit_in_place

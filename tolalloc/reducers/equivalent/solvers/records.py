@@ -13,6 +13,10 @@ from tolalloc.reducers.reducer.design import Reducer
 
 CONVERGED, NOT_CONVERGED, NOT_RESISTED, NOT_FINITE, OUT_OF_RANGE = range(5)
 """How an equilibrium ended; `tolalloc.reducers.equivalent.model.Status` has the words."""
+Given = tuple[Any, Any, Any, Any, Any]
+"""What every solver takes next to the tables: layout, map and design, errors and torque of the samples."""
+MARGIN = 2
+"""Nodes beyond the coarse angles before and behind the turn that the cubic interpolation needs [-]."""
 
 
 class SolverDesign(NamedTuple):
@@ -25,13 +29,6 @@ class SolverDesign(NamedTuple):
 def design_of(reducer: Reducer) -> SolverDesign:
     """Return a reducer as the solvers take it."""
     return SolverDesign(LAWS[reducer.stiffness.pin_contact_law], reducer.cycloid_stage.face_width)
-
-
-Given = tuple[Any, Any, Any, Any, Any]
-"""What every solver takes next to the tables: layout, map and design, errors and torque of the samples."""
-
-MARGIN = 2
-"""Nodes beyond the coarse angles before and behind the turn that the cubic interpolation needs [-]."""
 
 
 class AngleSearch(NamedTuple):

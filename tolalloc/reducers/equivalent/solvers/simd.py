@@ -33,6 +33,9 @@ _LOGARITHM_LEFT = float.fromhex("0x1.a39ef35793c76p-33")
 
 _DOUBLES = ir.VectorType(ir.DoubleType(), WIDTH)
 _BITS = ir.VectorType(ir.IntType(1), WIDTH)
+_ROOT_HALF = 0x3FE6A09E667F3BCD  # bits of √½
+_TERMS = 11  # of the series in s²; the first left out is below 2e-18 of the logarithm
+_SHIFT = 6755399441055744.0  # 1.5·2⁵²: in this range the last bits of a double are an integer
 
 
 class Common(NamedTuple):
@@ -159,11 +162,6 @@ def fma(typing, a, b, c):
         return _call(builder, "fma", arguments)
 
     return vector(vector, vector, vector), emit
-
-
-_ROOT_HALF = 0x3FE6A09E667F3BCD  # bits of √½
-_TERMS = 11  # of the series in s²; the first left out is below 2e-18 of the logarithm
-_SHIFT = 6755399441055744.0  # 1.5·2⁵²: in this range the last bits of a double are an integer
 
 
 @intrinsic

@@ -34,6 +34,8 @@ from tolalloc.reducers.equivalent.solvers.records import CONVERGED, NOT_FINITE, 
 from tolalloc.reducers.equivalent.solvers.workspace import make_memory
 from tolalloc.running.compiled import in_threads, jit, jit_in_place, thread_count
 
+_AT_ONCE = 8  # samples whose forces a thread takes together
+
 
 def make_turn(samples: Any, angles: Any, retained: Any) -> SolvedTurn:
     """Return an empty turn."""
@@ -44,9 +46,6 @@ def make_turn(samples: Any, angles: Any, retained: Any) -> SolvedTurn:
         np.empty((samples, angles)),
         np.empty((samples, angles), np.uint16),
     )
-
-
-_AT_ONCE = 8  # samples whose forces a thread takes together
 
 
 @jit

@@ -1,6 +1,4 @@
-"""Equilibria of one sample between the tabulated angles, all tables interpolated by cubics.
-
-What each lane solves where its search looks: tables between the nodes by cubics, loads of its own sample.
+"""Equilibria between the tabulated angles, tables interpolated by cubics: of one sample, or of what each lane searches.
 
 Of all pins a lane takes those that are pressed at its start, or clear by less than a margin. A solution that lies
 farther from the start than the margin may have met another one; it is not believed.
@@ -14,7 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.reducers.cycloid.solvers import LINEAR
-from tolalloc.reducers.equivalent.solvers.batch import Batch, make_batch
+from tolalloc.reducers.equivalent.solvers.batch import SampleBatch, make_batch
 from tolalloc.reducers.equivalent.solvers.contact_solver import (
     equilibrium,
     fill_loads,
@@ -28,13 +26,20 @@ from tolalloc.reducers.equivalent.solvers.pressing import VectorTables
 from tolalloc.reducers.equivalent.solvers.simd import WIDTH, Apart, aligned
 from tolalloc.running.compiled import jit, jit_in_place, jit_within
 
+_SLOTS = 8  # nodes whose loads a lane keeps: a search stays within five
+_MARGIN = 4.0
+"""Times the distance between the two equilibria that the start lies between."""
+_LEAST_MARGIN = 1e-9  # metres
+_NOWHERE = -1.0
+"""Depth of a contact that no pin stands for [m]."""
+
 
 class Nodes(NamedTuple):
     """Loads of one sample at the four nodes around two neighbouring intervals, kept while the search stays there."""
 
     first: Int[np.ndarray, "2"]  # First of the four nodes, per slot; −1 for an empty one [-]
     rotation: Float[np.ndarray, "2 4"]  # Carrier rotation at fixed discs [rad]
-    # As in `Problem` [N, m, m]
+    # As in `ContactProblem` [N, m, m]
     force: Float[np.ndarray, "2 4 retained"]
     undisturbed: Float[np.ndarray, "2 4 contact"]
     play_offset: Float[np.ndarray, "2 4 element 2"]
@@ -173,19 +178,11 @@ def make_memory(law, tables):
     )
 
 
-_SLOTS = 8  # nodes whose loads a lane keeps: a search stays within five
-_MARGIN = 4.0
-"""Times the distance between the two equilibria that the start lies between."""
-_LEAST_MARGIN = 1e-9  # metres
-_NOWHERE = -1.0
-"""Depth of a contact that no pin stands for [m]."""
-
-
 class Workspace(NamedTuple):
     """What the lanes solve, and the loads of their samples at the nodes that each has met last."""
 
     tables: VectorTables
-    batch: Batch  # Of which the first register is used
+    batch: SampleBatch  # Of which the first register is used
     play: Play
     node: Int[np.ndarray, "lane slot"]  # Which node a slot holds; −1 for none [-]
     # Carrier rotation [rad], forces [N], compressions of pins and of elements with play [m] at undisplaced discs

@@ -19,7 +19,7 @@ from tolalloc.wings.assembly.orientations import TransmissionEffect
 from tolalloc.wings.assembly.plan import AngularRequirements, AssemblyPlan
 from tolalloc.wings.assembly.steps import AssemblyStep, adjustable, efforts
 from tolalloc.wings.assembly.telling import tables
-from tolalloc.wings.assembly.telling.tables import Characteristic, at_state_weight, has_limits, norm_of
+from tolalloc.wings.assembly.telling.tables import AdjustedAngle, at_state_weight, has_limits, norm_of
 from tolalloc.wings.assembly.telling.tolerances import (
     certificate_table,
     cost_sentences,
@@ -173,7 +173,7 @@ class AssemblyTeller(Teller[AssemblyResult]):
             *((_say("warn_doubted", doubted=doubted),) if doubted else ()),
         )
 
-    def _limited(self, row: Characteristic) -> str:
+    def _limited(self, row: AdjustedAngle) -> str:
         key = "limited_measured" if self.result.measured else "limited"
         return _say(key, angle=row.angle, part=row.part, after=abs(row.after), missed=row.noise, limit=row.limit)
 
@@ -314,11 +314,8 @@ class AssemblyTeller(Teller[AssemblyResult]):
             x_label="step [-]",
             y_label=y_label,
             series=tuple(
-                Series(
-                    label=part,
-                    kind="line",
-                    x=list(where[mounted.index(part) :].ravel()),
-                    y=list(angles[mounted.index(part) :, :, at].ravel() / ARCSECOND),
+                Series.line(
+                    part, where[mounted.index(part) :].ravel(), angles[mounted.index(part) :, :, at].ravel() / ARCSECOND
                 )
                 for at, part in enumerate(self.result.plan.chain.names)
             ),
@@ -331,14 +328,14 @@ class AssemblyTeller(Teller[AssemblyResult]):
         total, floor = sweep.total / ARCSECOND, (sweep.noise_floor / ARCSECOND, "")
         turned = sweep.state_weights > 0
         x = list(sweep.state_weights[turned])
-        series = [Series(label="to be expected of all angles, rms", kind="line", x=x, y=list(total[turned]))]
+        series = [Series.line("to be expected of all angles, rms", x, total[turned])]
         if own.measured:
             name, norms = f"{norm_of(own)} of {own.measured.name}", own.measured.norms[turned] / ARCSECOND
-            series.append(Series(label=name, kind="line", x=x, y=list(norms)))
+            series.append(Series.line(name, x, norms))
         asked = own.plan.state_weight
         if asked > 0:  # 0 has no place on a logarithmic axis
             at = total[at_state_weight(own)]
-            series.append(Series(label=f"at Q = {asked:g}", kind="points", x=[asked], y=[at]))
+            series.append(Series.points(f"at Q = {asked:g}", [asked], [at]))
         effort = list(sweep.effort / ARCSECOND**2)
         return (
             Figure(
@@ -355,7 +352,7 @@ class AssemblyTeller(Teller[AssemblyResult]):
                 title=_say("effort_figure"),
                 x_label="expected effort, Σ uᵀRu [arcsec²]",
                 y_label="all final angles together, rms [arcsec]",
-                series=(Series(label="to be expected", kind="line", x=effort, y=list(total)),),
+                series=(Series.line("to be expected", effort, total),),
                 horizontal=(floor,),
             ),
         )

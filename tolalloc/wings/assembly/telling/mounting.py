@@ -5,33 +5,19 @@ from __future__ import annotations
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from tolalloc.reports.columns import Column, Table
+import numpy as np
+
+from tolalloc.reports.columns import Table, of_positions
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.templates import Sentences
-from tolalloc.wings.assembly.mounting import FoundMounting, MountingResult
+from tolalloc.wings.assembly.mounting import MountingResult
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _say = Sentences("mounting", "tolalloc.wings.assembly")
-
-_FITTINGS: tuple[Column[tuple[FoundMounting, int, int]], ...] = (
-    Column(header="unit [-]", value=lambda row: row[1] + 1),
-    Column(header="place", value=lambda row: row[0].stock.places[row[2]].name),
-    Column(header="part", value=lambda row: row[0].stock.parts[row[0].mountings[row[1], row[2], 0]].name),
-    # Bores of a carrier or disc, teeth of the sun, against the part's own frame.
-    Column(
-        header="turned by, counter-clockwise [steps]",
-        value=lambda row: row[0].stock.places[row[2]].turns[row[0].mountings[row[1], row[2], 1]].number,
-    ),
-)
-_UNITS: tuple[Column[tuple[FoundMounting, int]], ...] = (
-    Column(header="unit [-]", value=lambda row: row[1] + 1),
-    Column(header="peak-to-peak as the parts come [arcsec]", value=lambda row: float(row[0].before[row[1]])),
-    Column(header="peak-to-peak as mounted [arcsec]", value=lambda row: float(row[0].after[row[1]])),
-)
 
 
 class MountingTeller(Teller[MountingResult]):
@@ -49,17 +35,32 @@ class MountingTeller(Teller[MountingResult]):
         return _say("subtitle", reducer=self.header.model, torque=self.result.torque, count=count)
 
     @cached_property
-    def _fittings(self) -> Table[tuple[FoundMounting, int, int]]:
+    def _fittings(self) -> Table[int]:
         """The fitter's list."""
         found, stock = self.result.found, self.result.found.stock
-        rows = [(found, unit, at) for unit in range(stock.units) for at in range(len(stock.places))]
-        return Table(name="fittings", columns=_FITTINGS, rows=rows)
+        part, turn = found.mountings.reshape(-1, 2).T
+        places = stock.places * stock.units
+        columns = {
+            "unit [-]": np.repeat(np.arange(1, stock.units + 1), len(stock.places)),
+            "place": [place.name for place in places],
+            "part": [stock.parts[at].name for at in part],
+            # Bores of a carrier or disc, teeth of the sun, against the part's own frame.
+            "turned by, counter-clockwise [steps]": [
+                place.turns[at].number for place, at in zip(places, turn, strict=True)
+            ],
+        }
+        return of_positions("fittings", columns)
 
     @cached_property
-    def _units(self) -> Table[tuple[FoundMounting, int]]:
+    def _units(self) -> Table[int]:
         """What every unit does with its parts as they come, and as chosen."""
         found = self.result.found
-        return Table(name="units", columns=_UNITS, rows=[(found, unit) for unit in range(found.stock.units)])
+        columns = {
+            "unit [-]": np.arange(1, found.stock.units + 1),
+            "peak-to-peak as the parts come [arcsec]": found.before,
+            "peak-to-peak as mounted [arcsec]": found.after,
+        }
+        return of_positions("units", columns)
 
     @property
     def sentences(self) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reports.columns import Column, Table, of_positions
 from tolalloc.wings.assembly.adjustment import AdjustedParts, AssemblyResult
-from tolalloc.wings.assembly.steps import AssemblyStep, adjustable
+from tolalloc.wings.assembly.steps import adjustable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -76,19 +76,10 @@ def turns(result: AssemblyResult) -> Float[np.ndarray, "step part 3"]:
     return np.asarray(3 * np.sqrt(variances).reshape(len(plan.steps), -1, 3))
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Turn:
-    """One part that is turned at a step, or none."""
-
-    number: int
-    step: AssemblyStep
-    part: str
-    turned: tuple[float, float, float]  # About its own axes [arcsec]
-    left: tuple[float, float]  # Tilt and rotation after that [arcsec]
-
-
 def step_table(result: AssemblyResult) -> pd.DataFrame:
     """Return one row per step and turned part; a part that is turned by less than can be read has none."""
+    import pandas as pd
+
     chain, kind = result.plan.chain, "" if result.measured else ", 3σ"
     rows = []
     turned = np.round(turns(result) / ARCSECOND, READ) + 0.0  # no −0
@@ -97,30 +88,21 @@ def step_table(result: AssemblyResult) -> pd.DataFrame:
         moved = np.flatnonzero(adjustable(chain, step) & turned[number].any(axis=1))
         for at in moved if moved.size else [None]:
             left = chain.names.index(step.mount) if at is None else at
-            x, y, z = (0.0, 0.0, 0.0) if at is None else map(float, turned[number, at])
+            axes = np.zeros(3) if at is None else turned[number, at]
+            # Turns of measured parts follow from the file; what is measured meanwhile changes nothing.
+            measure = {} if result.measured else {"measure": ", ".join(step.measure) or "nothing"}
             rows.append(
-                _Turn(
-                    number=number + 1,
-                    step=step,
-                    part="nothing" if at is None else chain.names[at],
-                    turned=(x, y, z),
-                    left=(float(tilt[number, left]), float(rotation[number, left])),
-                )
+                {
+                    "step [-]": number + 1,
+                    "mount": step.mount,
+                    **measure,
+                    "turn": "nothing" if at is None else chain.names[at],
+                    **{f"{axis}{kind} [arcsec]": own for axis, own in zip("xyz", axes, strict=True)},
+                    f"tilt left{kind} [arcsec]": tilt[number, left],
+                    f"rotation left{kind} [arcsec]": rotation[number, left],
+                }
             )
-    # Turns of measured parts follow from the file; what is measured meanwhile changes nothing.
-    measure: Column[_Turn] = Column(header="measure", value=lambda row: ", ".join(row.step.measure) or "nothing")
-    columns: tuple[Column[_Turn], ...] = (
-        Column(header="step [-]", value=lambda row: row.number),
-        Column(header="mount", value=lambda row: row.step.mount),
-        *(() if result.measured else (measure,)),
-        Column(header="turn", value=lambda row: row.part),
-        Column(header=f"x{kind} [arcsec]", value=lambda row: row.turned[0]),
-        Column(header=f"y{kind} [arcsec]", value=lambda row: row.turned[1]),
-        Column(header=f"z{kind} [arcsec]", value=lambda row: row.turned[2]),
-        Column(header=f"tilt left{kind} [arcsec]", value=lambda row: row.left[0]),
-        Column(header=f"rotation left{kind} [arcsec]", value=lambda row: row.left[1]),
-    )
-    return Table(name="steps", columns=columns, rows=rows).frame()
+    return pd.DataFrame(rows)
 
 
 def angle_table(result: AssemblyResult, measured: AdjustedParts) -> pd.DataFrame:
@@ -136,7 +118,7 @@ def angle_table(result: AssemblyResult, measured: AdjustedParts) -> pd.DataFrame
         "adjusted [arcsec]": measured.adjusted.ravel() / ARCSECOND,
         "turns miss, 3σ [arcsec]": (3 * measured.missed).ravel() / ARCSECOND,
     }
-    return rounded(of_positions("angles", columns, range(len(part))))
+    return rounded(of_positions("angles", columns))
 
 
 def gain_table(result: AssemblyResult) -> pd.DataFrame:
@@ -148,16 +130,12 @@ def gain_table(result: AssemblyResult) -> pd.DataFrame:
         for at, step in enumerate(plan.steps)
         for row in np.flatnonzero(np.repeat(adjustable(plan.chain, step), 3))
     ]
-
-    def gain(state: int) -> Column[tuple[int, int]]:
-        return Column(header=f"{angles[state]} [-]", value=lambda row: float(gains[row[0]][row[1], state]))
-
-    columns: tuple[Column[tuple[int, int]], ...] = (
-        Column(header="step [-]", value=lambda row: row[0] + 1),
-        Column(header="turned", value=lambda row: angles[row[1]]),
-        *map(gain, range(len(angles))),
-    )
-    return rounded(Table(name="gains", columns=columns, rows=rows))
+    columns = {
+        "step [-]": [at + 1 for at, _ in rows],
+        "turned": [angles[row] for _, row in rows],
+        **{f"{angle} [-]": [float(gains[at][row, state]) for at, row in rows] for state, angle in enumerate(angles)},
+    }
+    return rounded(of_positions("gains", columns))
 
 
 def sweep_table(result: AssemblyResult) -> pd.DataFrame:
@@ -173,11 +151,11 @@ def sweep_table(result: AssemblyResult) -> pd.DataFrame:
         **{f"tilt of {name}, 3σ [arcsec]": 3 * sweep.tilt[:, at] / ARCSECOND for at, name in enumerate(names)},
         **{f"rotation of {name}, 3σ [arcsec]": 3 * sweep.rotation[:, at] / ARCSECOND for at, name in enumerate(names)},
     }
-    return rounded(of_positions("sweep", columns, range(sweep.state_weights.size)))
+    return rounded(of_positions("sweep", columns))
 
 
 @dataclass(frozen=True, kw_only=True)
-class Characteristic:
+class AdjustedAngle:
     """Tilt or rotation of one part before and after adjusting, as a report states it [arcsec]."""
 
     part: str
@@ -201,7 +179,7 @@ class Characteristic:
         return bool(np.round(abs(self.after), READ) > np.round(abs(self.before), READ))
 
 
-def characteristics(result: AssemblyResult) -> tuple[Characteristic, ...]:
+def characteristics(result: AssemblyResult) -> tuple[AdjustedAngle, ...]:
     """Return tilts before rotations of all parts."""
     names, required = result.plan.chain.names, result.plan.requirements
     finals = np.round(_finals(result), _KEPT) + 0.0
@@ -210,7 +188,7 @@ def characteristics(result: AssemblyResult) -> tuple[Characteristic, ...]:
         stated = np.concatenate([required.tilt_limit, required.rotation_limit]) / ARCSECOND
         limits = np.round(np.where(np.isfinite(stated), stated, np.nan), _KEPT)
     return tuple(
-        Characteristic(
+        AdjustedAngle(
             part=part,
             angle=angle,
             before=float(finals[0, at]),
@@ -230,16 +208,16 @@ def characteristic_table(result: AssemblyResult) -> pd.DataFrame:
         if measured
         else ("before, 3σ [arcsec]", "after, 3σ [arcsec]", "noise, 3σ [arcsec]")
     )
-    limited: tuple[Column[Characteristic], ...] = (
-        Column(header="limit [arcsec]", value=lambda row: row.limit),
-        Column(header="OK", value=lambda row: row.kept(measured=measured)),
+    limited: tuple[Column[AdjustedAngle], ...] = (
+        Column("limit [arcsec]", lambda row: row.limit),
+        Column("OK", lambda row: row.kept(measured=measured)),
     )
-    columns: tuple[Column[Characteristic], ...] = (
-        Column(header="characteristic", value=lambda row: row.part),
-        Column(header="angle", value=lambda row: row.angle),
-        Column(header=before, value=lambda row: row.before),
-        Column(header=after, value=lambda row: row.after),
-        Column(header=noise, value=lambda row: row.noise),
+    columns: tuple[Column[AdjustedAngle], ...] = (
+        Column("characteristic", lambda row: row.part),
+        Column("angle", lambda row: row.angle),
+        Column(before, lambda row: row.before),
+        Column(after, lambda row: row.after),
+        Column(noise, lambda row: row.noise),
         *(limited if has_limits(result) else ()),
     )
     return Table(name="characteristics", columns=columns, rows=characteristics(result)).frame()

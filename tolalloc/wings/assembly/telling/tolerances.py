@@ -78,7 +78,7 @@ def tolerance_table(plan: AssemblyPlan, tolerances: AngularTolerances) -> pd.Dat
         **{f"{name}, ± [arcsec]": each.tolerances.ravel() / ARCSECOND for name, each in made.items()},
         **{f"cost {name} [{{cost}}]": cost(each) for name, each in made.items()},
     }
-    return rounded(of_positions("angular tolerances", columns, range(len(part))))
+    return rounded(of_positions("angular tolerances", columns))
 
 
 def limit_table(plan: AssemblyPlan, tolerances: AngularTolerances) -> pd.DataFrame:
@@ -98,17 +98,17 @@ def limit_table(plan: AssemblyPlan, tolerances: AngularTolerances) -> pd.DataFra
         "low 2.5 % [%]": [100 * share.low for share in verified.shares],
         "high 97.5 % [%]": [100 * share.high for share in verified.shares],
     }
-    return rounded(of_positions("limits", columns, range(len(limits.names))))
+    return rounded(of_positions("limits", columns))
 
 
 _CERTIFICATES: tuple[Column[tuple[str, AngularAllocation]], ...] = (
-    Column(header="allocation", value=lambda row: row[0]),
-    Column(header=PRECISION, value=lambda row: row[1].gains.state_weight),
-    Column(header="tolerances [{cost}]", value=lambda row: row[1].cost),
-    Column(header="effort [{cost}]", value=lambda row: row[1].effort_cost),
-    Column(header="total [{cost}]", value=lambda row: row[1].total),
-    Column(header="lower bound, own gains [{cost}]", value=lambda row: row[1].bound),
-    Column(header="above the bound [%]", value=lambda row: 100 * row[1].gap),
+    Column("allocation", lambda row: row[0]),
+    Column(PRECISION, lambda row: row[1].gains.state_weight),
+    Column("tolerances [{cost}]", lambda row: row[1].cost),
+    Column("effort [{cost}]", lambda row: row[1].effort_cost),
+    Column("total [{cost}]", lambda row: row[1].total),
+    Column("lower bound, own gains [{cost}]", lambda row: row[1].bound),
+    Column("above the bound [%]", lambda row: 100 * row[1].gap),
 )
 
 
@@ -126,7 +126,7 @@ def state_weight_table(tolerances: AngularTolerances) -> pd.DataFrame:
         "effort [{cost}]": found.effort_cost,
         "total [{cost}]": found.total,
     }
-    return rounded(of_positions("cost by precision", columns, range(found.state_weights.size)))
+    return rounded(of_positions("cost by precision", columns))
 
 
 def cost_sentences(plan: AssemblyPlan, tolerances: AngularTolerances) -> tuple[str, ...]:
@@ -205,7 +205,7 @@ def _cost_figure(plan: AssemblyPlan, tolerances: AngularTolerances) -> Figure:
     known = np.isfinite(found.total)
     costs = {"tolerances": found.cost, "effort": found.effort_cost, "both": found.total}
     priced, best = is_priced(plan), found.best
-    least = Series(label="least of both", kind="points", x=[best.gains.state_weight], y=[best.total])
+    least = Series.points("least of both", [best.gains.state_weight], [best.total])
     return Figure(
         name="cost",
         title=_say("cost_figure"),
@@ -213,7 +213,7 @@ def _cost_figure(plan: AssemblyPlan, tolerances: AngularTolerances) -> Figure:
         y_label="cost [cost units]",
         series=(
             *(
-                Series(label=label, kind="line", x=list(found.state_weights[known]), y=list(values[known]))
+                Series.line(label, found.state_weights[known], values[known])
                 for label, values in costs.items()
                 if priced or label == "tolerances"
             ),

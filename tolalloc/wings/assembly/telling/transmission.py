@@ -78,7 +78,7 @@ def value_table(effect: TransmissionEffect) -> pd.DataFrame:
             for output in effect.outputs
         },
     }
-    return rounded(of_positions("transmission", columns, range(len(names))))
+    return rounded(of_positions("transmission", columns))
 
 
 def difference_table(effect: TransmissionEffect) -> pd.DataFrame:
@@ -91,7 +91,7 @@ def difference_table(effect: TransmissionEffect) -> pd.DataFrame:
         PRECISION: effect.state_weights,
         **{f"{output.split(' [')[0]}, above exact parts [%]": above(output) for output in _counted(effect)},
     }
-    return rounded(of_positions("above exact parts", columns, range(effect.state_weights.size)))
+    return rounded(of_positions("above exact parts", columns))
 
 
 def fallen_table(effect: TransmissionEffect) -> pd.DataFrame | None:
@@ -107,7 +107,7 @@ def fallen_table(effect: TransmissionEffect) -> pd.DataFrame | None:
         PRECISION: effect.state_weights[1:],
         **{f"{output.split(' [')[0]}, smaller than unadjusted [%]": smaller(output) for output in _counted(effect)},
     }
-    return rounded(of_positions("smaller than unadjusted", columns, range(effect.state_weights.size - 1)))
+    return rounded(of_positions("smaller than unadjusted", columns))
 
 
 def _counted(effect: TransmissionEffect) -> tuple[str, ...]:
@@ -167,7 +167,7 @@ def transmission_section(effect: TransmissionEffect, precision: float, *, measur
         ),
         figures=(
             *curve_figures(effect),
-            *state_weight_figures(effect),
+            *(_over_state_weight(effect, name, output) for name, output in DRAWN.items()),
             pressure_map(effect, precision),
             deformation_figure(effect),
         ),
@@ -190,10 +190,7 @@ def curve_figures(effect: TransmissionEffect) -> tuple[Figure, Figure]:
 
     def drawn(curves: Iterable[Float[np.ndarray, " angle"]]) -> tuple[Series, ...]:
         x = list(angle[shown] / DEGREE)
-        return tuple(
-            Series(label=label, kind="line", x=x, y=list(curve[shown]))
-            for label, curve in zip(labels, curves, strict=True)
-        )
+        return tuple(Series.line(label, x, curve[shown]) for label, curve in zip(labels, curves, strict=True))
 
     return (
         Figure(
@@ -213,12 +210,8 @@ def curve_figures(effect: TransmissionEffect) -> tuple[Figure, Figure]:
     )
 
 
-def state_weight_figures(effect: TransmissionEffect) -> tuple[Figure, ...]:
-    """Return largest values over the precision."""
-    return tuple(_over_state_weight(effect, name, output) for name, output in DRAWN.items())
-
-
 def _over_state_weight(effect: TransmissionEffect, name: str, output: str) -> Figure:
+    """Return the largest values of an output over the precision."""
     values, many = answers(effect, output), effect.good.size > 1
     low, high = (list(edge) for edge in np.percentile(values, BAND, axis=1)) if many else ((), ())
     label = _say("band" if many else "single", low=BAND[0], high=BAND[1])
@@ -228,16 +221,7 @@ def _over_state_weight(effect: TransmissionEffect, name: str, output: str) -> Fi
         title=_say("over_precision_figure", output=output.split(" [")[0].capitalize(), of=short),
         x_label=PRECISION,
         y_label=output,
-        series=(
-            Series(
-                label=label,
-                kind="line",
-                x=list(effect.state_weights),
-                y=list(np.median(values, axis=1)),
-                low=low,
-                high=high,
-            ),
-        ),
+        series=(Series.line(label, effect.state_weights, np.median(values, axis=1), low, high),),
         horizontal=((perfect(effect, output), ""),),
     )
 
@@ -268,11 +252,10 @@ def deformation_figure(effect: TransmissionEffect) -> Figure:
         x_label="pin [-]",
         y_label="compression [µm]",
         series=tuple(
-            Series(
-                label=f"Q = {precision:g}",
-                kind="points",
-                x=(np.flatnonzero(pattern.force) + 1).tolist(),
-                y=list(pattern.deformation[pattern.force > 0] / MICROMETRE),
+            Series.points(
+                f"Q = {precision:g}",
+                np.flatnonzero(pattern.force) + 1,
+                pattern.deformation[pattern.force > 0] / MICROMETRE,
             )
             for precision, pattern in zip(effect.state_weights, effect.patterns, strict=True)
         ),
