@@ -56,7 +56,7 @@ from tolalloc.models.model import Model, is_fast
 from tolalloc.running.chunks import one_blas_thread
 from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.effort import SobolEffort
-from tolalloc.sensitivity.sobol import SobolIndices, regrouped, sobol_indices
+from tolalloc.sensitivity.sobol import SourceIndices, regrouped, sobol_indices
 from tolalloc.sensitivity.surrogate.control_variate import learnt
 
 _EXAMINED = 1000
@@ -286,8 +286,7 @@ class DrawingQuestion:
             boxes=self.boxes,
         )
         own, alike = free.chosen, cheapest_met(free.proportional_tried)
-        scales = own.space.first_zones * own.scales / self.space.first_zones
-        designs = (np.concatenate([scales, own.settings]), alike.design)
+        designs = (own.design_in(self.space), alike.design)
         with record.stage("proven bound"):
             return search.prove(designs, own.cost if own.met else np.inf)
 
@@ -302,7 +301,11 @@ class DrawingQuestion:
         traded = zip(self.space.settings[still:], self.effort.setting_steps, strict=False)
         values = (
             *free.chosen.settings[:still, np.newaxis],
-            *(_denser_below(setting.lower, setting.upper, steps) for setting, steps in traded),
+            # Denser towards the lower ends, where zones are cheap.
+            *(
+                np.unique(np.round(own.lower + (own.upper - own.lower) * np.linspace(0.0, 1.0, steps) ** 2, 2))
+                for own, steps in traded
+            ),
         )
         quantile = replace(self.quantile(free.chosen.spread), space=self._at_ratios_of(free.chosen))
         return setting_trade(quantile, free, values)
@@ -341,7 +344,7 @@ class DrawingQuestion:
 
     def shares(
         self, space: DesignSpace, design: Float[np.ndarray, " variable"]
-    ) -> tuple[SobolIndices, SobolIndices] | tuple[None, None]:
+    ) -> tuple[SourceIndices, SourceIndices] | tuple[None, None]:
         """Return the indices of the leading output at the zones and the settings of a design, none if it is constant.
 
         By source, and by dimension of the drawing.
@@ -360,11 +363,6 @@ class DrawingQuestion:
         """Return what the model says of random units of a design."""
         units = design.space.units(design.design, self.seeds("examination"), _EXAMINED)
         return self.model.at(design.settings).examined(units)
-
-
-def _denser_below(low: float, high: float, steps: int) -> Float[np.ndarray, " step"]:
-    """Return values of a range, denser towards its lower end, where zones are cheap."""
-    return np.unique(np.round(low + (high - low) * np.linspace(0.0, 1.0, steps) ** 2, 2))
 
 
 def allocate_drawing(
@@ -484,12 +482,6 @@ class AssembledQuestion:
             left_over=max((own.leftover_of(drawn) for own in acting), default=0.0),
         )
 
-    def start(self, found: AllocationResult) -> Float[np.ndarray, " variable"]:
-        """Return a drawing as the start of the next search: its zones over those of the table [-], and its settings."""
-        drawn = found.chosen
-        scales = drawn.space.first_zones * drawn.scales / self.question.space.first_zones
-        return np.concatenate([scales, drawn.settings])
-
     def as_they_come(self, found: AllocationResult) -> KeptLimits:
         """Return which random units of a drawing keep its limits if nothing is chosen."""
         design, question = found.chosen, self.question
@@ -531,7 +523,7 @@ def allocate_assembled(
         found = allocate_drawing(alone, record, name)
         tried.append(asked.tried(acting, found))
         starts.append(start)
-        start = asked.start(found)
+        start = found.chosen.design_in(asked.question.space)
     best = min(range(len(tried)), key=lambda at: (not tried[at].met, tried[at].cost if tried[at].met else at))
     drawn = replace(asked.of(asked.choices[best]), start=starts[best])
     found = allocate_drawing(drawn, record, name, digest, checkpoint)

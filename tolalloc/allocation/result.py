@@ -17,7 +17,6 @@ from tolalloc.allocation.search.discrete import GradedAllocation
 from tolalloc.allocation.search.proven_bound import ProvenBound
 from tolalloc.allocation.search.zone_allocation import ModelRange, ZoneAllocation, model_range
 from tolalloc.allocation.space.design_space import DesignSpace
-from tolalloc.allocation.space.joint_yield import JointRequirement
 from tolalloc.allocation.space.output_sample import LimitedSample
 from tolalloc.allocation.space.problem import OneSidedConstraint, Solution
 from tolalloc.allocation.space.requirement import AtYield, Check, Requirement
@@ -29,7 +28,7 @@ from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.sources import Source
 from tolalloc.models.model import Model
 from tolalloc.reading.units import unit_of
-from tolalloc.sensitivity.sobol import SobolIndices
+from tolalloc.sensitivity.sobol import SourceIndices
 
 _SAME = 1e-12
 """Distance up to which two zones are one number on a drawing [m]."""
@@ -99,9 +98,9 @@ class AllocationResult:
     free: ZoneAllocation  # The allocation of tolerances and settings together
     graded: GradedAllocation | None  # The same on ladders of zones, if the question asks for it
     # Sobol indices of the leading output at the zones of the drawing, none where it is the same for all units
-    shares: SobolIndices | None
+    shares: SourceIndices | None
     # The same of the dimensions of the drawing: all members of a group exchanged together
-    shares_of_dimensions: SobolIndices | None
+    shares_of_dimensions: SourceIndices | None
     trade: SettingTrade | None  # Cost of the cheapest zones over the settings, if asked for
     fronts: Fronts | None  # What can be had at which cost, if asked for
     robustness: Robustness | None  # Answers under changed assumptions, if asked for
@@ -150,8 +149,8 @@ class AllocationResult:
     @property
     def yields(self) -> dict[str, Yield]:
         """Limited output → share of units of the drawing that keep its limits, the leading one first."""
-        own = (check.requirement for check in self.chosen.checks)
-        return {asked.output: self.chosen.yield_of(asked) for asked in own if not isinstance(asked, JointRequirement)}
+        asked = (check.requirement for check in self.chosen.checks_alone)
+        return {own.output: self.chosen.yield_of(own) for own in asked}
 
     @property
     def cost(self) -> float:

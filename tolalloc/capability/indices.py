@@ -38,9 +38,16 @@ class Limits:
         lower: tuple[tuple[Literal[1, -1], float], ...] = () if self.lower is None else ((-1, self.lower),)
         return (*upper, *lower)
 
-    def excess(self, values: Float[np.ndarray, "*unit"]) -> Float[np.ndarray, "side *unit"]:
-        """Return how far values lie beyond each limit, negative inside [unit of the characteristic]."""
-        return np.stack([sign * (values - limit) for sign, limit in self.turned])
+    def excess(self, values: Float[np.ndarray, "*unit"], *, relative: bool = False) -> Float[np.ndarray, "side *unit"]:
+        """Return how far values lie beyond each limit, negative inside [unit of the characteristic, or of the limit].
+
+        Parameters
+        ----------
+        relative
+            Whether over the limit, where that is not 0.
+        """
+        scales = [(abs(limit) or 1.0) if relative else 1.0 for _, limit in self.turned]
+        return np.stack([sign * (values - limit) / by for (sign, limit), by in zip(self.turned, scales, strict=True)])
 
     def side(self, sign: int) -> Limits:
         """Return the limit of one side, the upper one for 1."""
@@ -95,7 +102,6 @@ class Capability:
     # Units beyond the limits per million if the characteristic is normal with the sample's mean and overall deviation;
     # the only figure here besides the indices that assumes a normal distribution [-]
     normal_ppm: float
-    empirical_ppm: float  # Units of the sample beyond the limits per million [-]
     # Units of the sample, and how many lie beyond a limit [-]
     units: int
     outside: int
@@ -128,34 +134,20 @@ class QuantileInterval:
     units: int
     needed: int
 
-    @property
-    def bounded(self) -> bool:
-        """Whether the sample bounds both sides."""
-        return self.units >= self.needed
 
-    @property
-    def status(self) -> str:
-        """One sentence for a person."""
-        if self.bounded:
-            return f"The {self.share:.4%} quantile lies in the interval with {self.attained:.2%} confidence."
-        return f"{self.units} units do not bound the {self.share:.4%} quantile on both sides; {self.needed} would."
-
-
-def capability(sample: Float[np.ndarray, " unit"], limits: Limits, subgroup: int = 1) -> Capability:
+def capability(sample: Float[np.ndarray, " unit"], limits: Limits) -> Capability:
     """Return the capability of a sample in the order of its making.
 
     Parameters
     ----------
     sample
         Values of the characteristic [unit of the characteristic].
-    subgroup
-        Consecutive units that form a subgroup; 1 takes the mean moving range of neighbours instead [-].
 
     Notes
     -----
-    The deviation within subgroups is the root of the mean of their variances, or the mean moving range over
-    d₂ = 2/√π; that of the whole sample has the divisor n − 1. All indices read as yields only for a normal
-    distribution. For independent random units both deviations estimate the same.
+    The deviation within subgroups is the mean moving range of neighbours over d₂ = 2/√π; that of the whole sample has
+    the divisor n − 1. All indices read as yields only for a normal distribution. For independent random units both
+    deviations estimate the same.
 
     References
     ----------
@@ -164,7 +156,7 @@ def capability(sample: Float[np.ndarray, " unit"], limits: Limits, subgroup: int
     if sample.size < 2 or not np.isfinite(sample).all():
         raise InputError.at("capability", "sample", f"{sample.size} values", "at least 2 values, all finite")
     mean, overall = float(sample.mean()), float(sample.std(ddof=1))
-    within = _deviation_within(sample, subgroup)
+    within = float(np.abs(np.diff(sample)).mean() / _MOVING_RANGE)
     if min(within, overall) <= 0:
         raise InputError("Capability: the sample does not vary, so no index can be given.")
     width, distance, outside = limits.width, limits.distance(mean), limits.outside(sample)
@@ -177,7 +169,6 @@ def capability(sample: Float[np.ndarray, " unit"], limits: Limits, subgroup: int
         pp=None if width is None else width / (6 * overall),
         ppk=distance / (3 * overall),
         normal_ppm=MILLION * limits.normal_share_outside(mean, overall),
-        empirical_ppm=MILLION * outside / sample.size,
         units=sample.size,
         outside=outside,
     )
@@ -334,15 +325,6 @@ def holm(probabilities: Sequence[float], level: float) -> Bool[np.ndarray, " tes
     rejected = np.zeros(values.size, dtype=bool)
     rejected[order[np.logical_and.accumulate(kept)]] = True
     return rejected
-
-
-def _deviation_within(sample: Float[np.ndarray, " unit"], subgroup: int) -> float:
-    """Return the standard deviation within subgroups [unit of the characteristic]."""
-    if subgroup < 1 or sample.size % subgroup:
-        raise InputError.at("capability", "subgroup", subgroup, f"a divisor of the {sample.size} values")
-    if subgroup == 1:
-        return float(np.abs(np.diff(sample)).mean() / _MOVING_RANGE)
-    return float(np.sqrt(sample.reshape(-1, subgroup).var(axis=1, ddof=1).mean()))
 
 
 def _require_share(place: str, field: str, value: float) -> None:

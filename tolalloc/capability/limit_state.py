@@ -98,20 +98,6 @@ class RareFailure:
         """Standard error over probability, infinite for a probability of zero [-]."""
         return self.standard_error / self.probability if self.probability > 0 else float("inf")
 
-    @property
-    def trustworthy(self) -> bool:
-        """Whether the method sees no reason against its own estimate."""
-        return not self.cautions
-
-    @property
-    def status(self) -> str:
-        """One sentence for a person."""
-        text = (
-            f"{self.method}: probability {self.probability:.3g} with standard error {self.standard_error:.2g} "
-            f"from {self.calls} calls"
-        )
-        return f"{text}; do not rely on it: {'; '.join(self.cautions)}." if self.cautions else f"{text}."
-
 
 @dataclass(frozen=True, kw_only=True)
 class ResponseLimit:
@@ -218,7 +204,7 @@ class Level:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class ChainedRun:
     """One run from independent samples to the failure."""
 
     levels: tuple[Level, ...]  # Levels, the first from independent samples
@@ -251,11 +237,11 @@ class Run:
 
 def run_of(
     levels: list[Level], chains: Chains, failing: Bool[np.ndarray, "chain state"], samples: int, caution: str = ""
-) -> Run:
+) -> ChainedRun:
     """Return the run that ends with chains of which some states fail, from so many first samples."""
     found = np.bincount(chains.ancestors, weights=failing.sum(axis=1), minlength=samples)
     some = failing.any(axis=1)
-    return Run(
+    return ChainedRun(
         levels=tuple(levels),
         lineages=found / max(found.sum(), 1.0),
         failing=chains.u[some, np.argmax(failing[some], axis=1)],
@@ -294,7 +280,7 @@ def level(chains: Chains, inside: Bool[np.ndarray, "chain state"], bound: float)
 class ChainedEstimate(RareFailure):
     """The mean of independent runs."""
 
-    runs: tuple[Run, ...] = field(repr=False, compare=False)
+    runs: tuple[ChainedRun, ...] = field(repr=False, compare=False)
 
     @property
     def failing(self) -> Float[np.ndarray, "state variable"]:
@@ -302,7 +288,7 @@ class ChainedEstimate(RareFailure):
         return np.concatenate([run.failing for run in self.runs])
 
     @staticmethod
-    def of(method: str, runs: tuple[Run, ...], counted: CountedLimitState) -> ChainedEstimate:
+    def of(method: str, runs: tuple[ChainedRun, ...], counted: CountedLimitState) -> ChainedEstimate:
         """Return the mean of runs.
 
         Notes

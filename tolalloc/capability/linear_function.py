@@ -92,7 +92,7 @@ class LinearFunction:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Part:
+class _AddedColumn:
     """What one column that is not normal adds: width·marginal."""
 
     source: int  # Position of its source
@@ -148,7 +148,10 @@ class LinearLaw:
 
         So it is where every density is symmetric and its logarithm concave (Lagoa, Li & Sznaier 2005).
         """
-        return all(_is_symmetric(source) and source.feature in _KNOWN for source in self.errors.active)
+        return all(
+            source.distribution.form.is_symmetric(source.shapes) and source.feature in _KNOWN
+            for source in self.errors.active
+        )
 
     @property
     def is_normal(self) -> bool:
@@ -291,7 +294,7 @@ class LinearLaw:
         return np.bincount(self._source_of_column, self._covariances, self.zones.size) / variance
 
     @cached_property
-    def _parts(self) -> tuple[_Part, ...]:
+    def _parts(self) -> tuple[_AddedColumn, ...]:
         found = []
         for at, (source, own) in enumerate(zip(self.errors.active, self.errors.columns_of_source, strict=False)):
             if _is_normal(source):
@@ -299,7 +302,7 @@ class LinearLaw:
             for slope in self.function.slopes[own]:
                 width = float(slope * self.zones[at] / 2 / source.lever)
                 if width != 0.0:
-                    found.append(_Part(source=at, marginal=source.zone_mapping.marginal, width=width))
+                    found.append(_AddedColumn(source=at, marginal=source.zone_mapping.marginal, width=width))
         return tuple(found)
 
     @cached_property
@@ -336,7 +339,7 @@ class NearPlane:
     What bends in one direction alone, such as an angle over a chain of sizes, is a plane behind a curve: normal scores
     of its values are regressed on the deviations, and the curve is a polynomial of degree 5 through what the plane says
     over the values (one step of alternating conditional expectations, Breiman & Friedman 1985). Nothing is believed of
-    it (`tolalloc.allocation.space.output_sample.Control`).
+    it (`tolalloc.allocation.space.output_sample.ControlPlane`).
     """
 
     law: LinearLaw  # Of the plane
@@ -423,8 +426,3 @@ def _is_normal(source: Source) -> bool:
     if source.feature is Feature.SIZE:
         return mapping.base == NORMAL and not mapping.sorted
     return mapping.marginal == RAYLEIGH
-
-
-def _is_symmetric(source: Source) -> bool:
-    """Return whether a density is symmetric and its logarithm concave, as a beta density of equal shapes is."""
-    return source.distribution.form.is_symmetric(source.shapes)

@@ -1,6 +1,6 @@
 """Monte Carlo: random units, their yield and its confidence, limits of any side, and changes on the same units.
 
-What few measured parts leave open of their processes widens the interval of a yield (`ProcessDoubt`).
+What few measured parts leave open of their processes widens the interval of a yield (`ProcessUncertainty`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from tolalloc.capability.halving import halved
 from tolalloc.capability.indices import Limits
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.measured_parts import MeasuredParts
-from tolalloc.drawings.seeds import CHUNK, SamplingDesign, uniform_chunks
+from tolalloc.drawings.seeds import CHUNK, SamplingDesign
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import FailedUnitsError
 from tolalloc.models.model import Evaluation, Response
@@ -43,27 +43,27 @@ class Yield:
     rejected: int
     widening: Widening | None = None  # Why the interval is wider than these units alone make it, if it is
 
-    def doubted(self, doubt: ProcessDoubt | None, limits: Limits) -> Yield:
+    def widened_by(self, uncertainty: ProcessUncertainty | None, limits: Limits) -> Yield:
         """Return the yield with an interval that also holds what measured parts leave open, if any do."""
-        return Widening(doubt=doubt, limits=limits, counted=self).found if doubt else self
+        return Widening(uncertainty=uncertainty, limits=limits, counted=self).found if uncertainty else self
 
 
 @dataclass(frozen=True, kw_only=True)
 class Widening:
     """What an interval of a yield holds beside the error of counted units."""
 
-    doubt: ProcessDoubt  # What measured parts leave open
+    uncertainty: ProcessUncertainty  # What measured parts leave open
     limits: Limits  # Limits that the yield is of [output]
     counted: Yield  # Yield of the units alone
 
     @property
     def found(self) -> Yield:
         """The yield with both."""
-        return replace(self.doubt.widened(self.counted, self.limits), widening=self)
+        return replace(self.uncertainty.widened(self.counted, self.limits), widening=self)
 
     def with_parts(self, least: int) -> Yield:
         """Return the yield that so many measured parts of every source would leave, were they like these."""
-        return replace(self, doubt=self.doubt.with_parts(least)).found
+        return replace(self, uncertainty=self.uncertainty.with_parts(least)).found
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,7 +173,7 @@ _HALVINGS = 40
 
 
 @dataclass(frozen=True, kw_only=True)
-class ProcessDoubt:
+class ProcessUncertainty:
     """What measured parts leave open of their processes, and what that does to one output.
 
     Notes
@@ -193,17 +193,6 @@ class ProcessDoubt:
     References
     ----------
     Gelman et al., Bayesian Data Analysis, 3rd ed. (2014), section 3.2: the posterior.
-
-    Examples
-    --------
-    An output that is the measured size itself, with 20 parts of σ = 1: 99.73 % keep 2.78 as far as the parts say, and
-    with 95 % confidence 3.9; the tables of one-sided tolerance limits say so, too. With 200 parts they keep 3.1.
-
-    >>> from tolalloc.capability.experiment import measured_size
-    >>> errors, x = measured_size(parts=20), np.random.default_rng(1).standard_normal((50_000, 1))
-    >>> doubt, limits = ProcessDoubt.of(errors, x, x[:, 0]), Limits(upper=4.0)
-    >>> [round(2.78 + own.margin(limits, 0.0027), 1) for own in (doubt, doubt.with_parts(200))]
-    [3.9, 3.1]
     """
 
     values: Float[np.ndarray, " good"]  # The output of the units that have one, ascending [output]
@@ -217,8 +206,8 @@ class ProcessDoubt:
     @classmethod
     def of(
         cls, errors: ErrorModel, x: Float[np.ndarray, "sample column"], values: Float[np.ndarray, " sample"]
-    ) -> ProcessDoubt | None:
-        """Return the doubt about an output, none where no part was measured or the output does not vary.
+    ) -> ProcessUncertainty | None:
+        """Return the process uncertainty of an output, none where no part was measured or the output does not vary.
 
         Parameters
         ----------
@@ -256,12 +245,12 @@ class ProcessDoubt:
         )
 
     @classmethod
-    def about(cls, errors: ErrorModel, x: Float[np.ndarray, "sample column"]) -> Doubting | None:
+    def about(cls, errors: ErrorModel, x: Float[np.ndarray, "sample column"]) -> UncertaintyOf | None:
         """Return what tells of an output of random units what is left open of it, none where no part was measured."""
         return partial(cls.of, errors, x) if any(source.measured for source in errors.active) else None
 
-    def with_parts(self, least: int) -> ProcessDoubt:
-        """Return the doubt that so many parts of every source would leave, or more where more were measured."""
+    def with_parts(self, least: int) -> ProcessUncertainty:
+        """Return the uncertainty that so many parts of every source would leave, or more where more were measured."""
         return replace(self, parts=tuple(max(own, least) for own in self.parts))
 
     @cached_property
@@ -407,7 +396,7 @@ def monte_carlo(
     """
     errors, seeds = experiment.errors, experiment.seeds
     x = np.empty((units, len(errors.columns)))
-    for index, uniform in enumerate(uniform_chunks(design, seeds, units, len(errors.columns))):
+    for index, uniform in enumerate(seeds.uniform_chunks(units, len(errors.columns), design)):
         x[index * CHUNK : (index + 1) * CHUNK] = experiment.deviations(errors.standard_values(uniform))
     result = MonteCarlo(x=x, evaluation=experiment.response(x))
     require_few_failures(result, "random units", experiment.largest_failed_share)
@@ -553,8 +542,8 @@ def quantile_change(
     return Change(estimate=estimate, low=float(found.low), high=float(found.high))
 
 
-Doubting = Callable[[Float[np.ndarray, " sample"]], ProcessDoubt | None]
-"""Returns what measured parts leave open of an output of random units, as `ProcessDoubt.of` does."""
+UncertaintyOf = Callable[[Float[np.ndarray, " sample"]], ProcessUncertainty | None]
+"""Returns what measured parts leave open of an output of random units, as `ProcessUncertainty.of` does."""
 
 ANY_LIMIT = Limits(upper=0.0)
 """Limits of `largest_excess` [-]."""
@@ -580,7 +569,7 @@ def largest_excess(
 
 
 def kept_at_once(
-    evaluation: Evaluation, outputs: Sequence[str], limits: Mapping[str, Limits], doubting: Doubting | None = None
+    evaluation: Evaluation, outputs: Sequence[str], limits: Mapping[str, Limits], uncertain: UncertaintyOf | None = None
 ) -> Yield:
     """Return the share of units that keep all limits at once; one without an answer keeps none.
 
@@ -592,7 +581,7 @@ def kept_at_once(
         Names of its outputs, in their order.
     limits
         Output → limits.
-    doubting
+    uncertain
         Tells what measured parts of these units leave open, which the interval then holds, too.
 
     References
@@ -603,7 +592,7 @@ def kept_at_once(
     good = evaluation.good & np.all(kept, axis=0)
     found = proportion(good.size, good.size - int(np.count_nonzero(good)))
     known = {name: np.where(evaluation.good, evaluation.values[:, outputs.index(name)], np.nan) for name in limits}
-    return found.doubted(doubting(largest_excess(known, limits)), ANY_LIMIT) if doubting else found
+    return found.widened_by(uncertain(largest_excess(known, limits)), ANY_LIMIT) if uncertain else found
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -619,8 +608,8 @@ class KeptLimits:
         evaluation: Evaluation,
         outputs: Sequence[str],
         limits: Mapping[str, Limits],
-        doubting: Doubting | None = None,
+        uncertain: UncertaintyOf | None = None,
     ) -> KeptLimits:
         """Return what units say, as `kept_at_once` reads them."""
-        each = {name: kept_at_once(evaluation, outputs, {name: own}, doubting) for name, own in limits.items()}
-        return cls(each=each, joint=kept_at_once(evaluation, outputs, limits, doubting))
+        each = {name: kept_at_once(evaluation, outputs, {name: own}, uncertain) for name, own in limits.items()}
+        return cls(each=each, joint=kept_at_once(evaluation, outputs, limits, uncertain))

@@ -10,6 +10,7 @@ leaves more units to solve, or far ones beyond the limit, each of which weighs m
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -102,36 +103,21 @@ class Drawn:
         With K_f = j the near units are among N − j others, M − j of them with a probability of p_n/(1 − p_f), the rest
         with p_n; p_n for all of them makes the probability larger.
         """
-        far, near = _parts(share)
-        return float(self._at_most(weight, far, near).max())
-
-    def _at_most(
-        self, weight: float, far: Float[np.ndarray, "part 1"], near: Float[np.ndarray, "part 1"]
-    ) -> Float[np.ndarray, " part"]:
         from scipy.stats import binom
 
+        far = np.append(0.0, np.geomspace(_LEAST_PART * share, share, _PARTS))[:, np.newaxis]
+        near = np.maximum(share - far, 0.0)
         many = np.arange(int(weight // self.weight) + 1)
         left = np.floor(weight - self.weight * many + _ROUNDING / 2)
-        return np.asarray((binom.pmf(many, self.whatever, far) * binom.cdf(left, self.units - many, near)).sum(axis=1))
-
-
-def _parts(share: float) -> tuple[Float[np.ndarray, "part 1"], Float[np.ndarray, "part 1"]]:
-    """Return shares of far and of near units that add up to a share [-]."""
-    far = np.append(0.0, np.geomspace(_LEAST_PART * share, share, _PARTS))[:, np.newaxis]
-    return far, np.maximum(share - far, 0.0)
+        found = (binom.pmf(many, self.whatever, far) * binom.cdf(left, self.units - many, near)).sum(axis=1)
+        return float(found.max())
 
 
 @lru_cache(maxsize=256)
 def _allowed(drawn: Drawn, target: float, confidence: float) -> float:
     share = 1.0 - target
-    allowed, too_much = -1, int(np.ceil(drawn.units * share)) + 1
-    while too_much - allowed > 1:
-        tried = (allowed + too_much) // 2
-        if drawn.probability_of_no_more(float(tried), share) <= 1 - confidence:
-            allowed = tried
-        else:
-            too_much = tried
-    return float(allowed)
+    weights = range(int(np.ceil(drawn.units * share)) + 1)
+    return float(bisect_right(weights, 1 - confidence, key=lambda own: drawn.probability_of_no_more(own, share)) - 1)
 
 
 @lru_cache(maxsize=4096)

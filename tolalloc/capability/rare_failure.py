@@ -18,11 +18,11 @@ from jaxtyping import Bool, Float, Int
 from tolalloc.capability.limit_state import (
     LENGTH,
     ChainedEstimate,
+    ChainedRun,
     Chains,
     CountedLimitState,
     Level,
     LimitState,
-    Run,
     Values,
     level,
     require_samples,
@@ -56,9 +56,8 @@ def subset_simulation(
     --------
     A plane at a distance of 3 has the probability Φ(−3) = 1.35e-3.
 
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> from tolalloc.capability.limit_state import ResponseLimit
-    >>> plane = ResponseLimit(experiment=sum_of_sizes(6.0, 12.0), limit=3.0 * np.sqrt(5.0))
+    >>> plane = lambda u: 3.0 - u.sum(axis=1) / np.sqrt(2.0)
+    >>> plane.variables = 2
     >>> found = subset_simulation(plane, SeedTree(1), samples=1000)
     >>> abs(found.probability - 1.35e-3) < 3 * found.standard_error
     True
@@ -69,7 +68,7 @@ def subset_simulation(
     return ChainedEstimate.of(_SUBSET, found, counted)
 
 
-def _subset_run(counted: CountedLimitState, generator: np.random.Generator, samples: int) -> Run:
+def _subset_run(counted: CountedLimitState, generator: np.random.Generator, samples: int) -> ChainedRun:
     """Return one run, whose last level counts the failures."""
     chains = Chains.independent(counted.values, generator, samples, counted.variables)
     levels: list[Level] = []
@@ -115,9 +114,8 @@ _FAILING = float(np.nextafter(0.0, -1.0))
 class ScaledSigmaEstimate(ChainedEstimate):
     """What scaled-sigma sampling found, and what it can see of known failures."""
 
-    seen_share: (
-        float  # Share of the known failing states that fail at every width of the runs too, 1 if none is known [-]
-    )
+    # Share of the known failing states that fail at every width of the runs too, 1 if none is known [-]
+    seen_share: float
 
 
 def scaled_sigma_sampling(
@@ -156,9 +154,8 @@ def scaled_sigma_sampling(
     --------
     A plane at a distance of 3 has the probability Φ(−3) = 1.35e-3.
 
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> from tolalloc.capability.limit_state import ResponseLimit
-    >>> plane = ResponseLimit(experiment=sum_of_sizes(6.0, 12.0), limit=3.0 * np.sqrt(5.0))
+    >>> plane = lambda u: 3.0 - u.sum(axis=1) / np.sqrt(2.0)
+    >>> plane.variables = 2
     >>> found = scaled_sigma_sampling(plane, SeedTree(1), samples=1000)
     >>> abs(found.probability - 1.35e-3) < 3 * found.standard_error
     True
@@ -236,7 +233,7 @@ def _narrower(
 
 def _scaled_run(
     counted: CountedLimitState, generator: np.random.Generator, samples: int, first: int, widths: list[float]
-) -> Run:
+) -> ChainedRun:
     """Return one run, whose last level counts the failures at width 1."""
     chains = Chains.independent(_scaled(counted, widths[0]), generator, first, counted.variables)
     failing = chains.values < 0

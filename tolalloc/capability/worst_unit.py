@@ -69,8 +69,14 @@ def worst_unit(
     --------
     Sizes with zones of 6 and 8 add up to 3 + 4 at worst.
 
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> worst_unit(sum_of_sizes(6.0, 8.0), starts=2, steps=4).value
+    >>> from tolalloc.drawings.seeds import SeedTree
+    >>> import tolalloc as ta
+    >>> row = {"unit": "mm", "min": 1, "max": 60, "cost": 1}
+    >>> rows = [{"id": "a", "plus": 3, "minus": -3, **row}, {"id": "b", "plus": 4, "minus": -4, **row}]
+    >>> errors = ta.Drawing.of_rows(rows).errors
+    >>> y = ta.model(lambda a, b: a + b, inputs=("a", "b"), outputs=("y [mm]",)).bound(errors, "")
+    >>> experiment = Experiment.of(y, errors, SeedTree(1))
+    >>> round(worst_unit(experiment, starts=2, steps=4).value, 6)
     7.0
     """
     errors, allowed = experiment.errors, experiment.largest_failed_share
@@ -164,7 +170,7 @@ def _extreme_in_zone(
     directions = np.concatenate([np.eye(orders.size), orders[np.newaxis] / orders.max()])
     phases = _phases(units)
     furthest = along(phases)
-    moves = [_phases(gradients) - phases, *(turn * way for turn in _TURNS for way in (*directions, *-directions))]
+    moves = [_phases(gradients) - phases, *(turn * own for turn in _TURNS for own in (*directions, *-directions))]
     for move in moves:
         found = along(phases + move)
         better = found > furthest
@@ -188,8 +194,8 @@ def _moved_towards(
     if not source.spectrum:
         return np.asarray(units + part * (targets - units))
     phases = _phases(units)
-    way = np.remainder(_phases(targets) - phases + 0.5, 1.0) - 0.5
-    return _filled(source, phases + part * way)
+    apart = np.remainder(_phases(targets) - phases + 0.5, 1.0) - 0.5
+    return _filled(source, phases + part * apart)
 
 
 def _phases(columns: Float[np.ndarray, "unit column"]) -> Float[np.ndarray, "unit vector"]:

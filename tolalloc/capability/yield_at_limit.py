@@ -18,7 +18,7 @@ from scipy.stats import t as student
 from tolalloc.capability.experiment import FEWEST_RUNS
 from tolalloc.capability.indices import MILLION, Capability, Limits, ShareInterval, capability
 from tolalloc.capability.limit_state import ChainedEstimate, LimitState, RareFailure, ResponseLimit
-from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo, ProcessDoubt, Yield, require_few_failures
+from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo, ProcessUncertainty, Yield, require_few_failures
 from tolalloc.capability.rare_failure import MOST_KNOWN, ScaledSigmaEstimate, scaled_sigma_sampling, subset_simulation
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
@@ -84,8 +84,8 @@ def agreement(
     --------
     A limit 4σ away is exceeded with Φ(−4) = 3.17e-5.
 
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> state = ResponseLimit(experiment=sum_of_sizes(6.0, 12.0), limit=4.0 * np.sqrt(5.0))
+    >>> state = lambda u: 4.0 - u.sum(axis=1) / np.sqrt(2.0)
+    >>> state.variables = 2
     >>> plain = RareFailure(probability=0.0, standard_error=np.inf, calls=1000, method="Monte Carlo")
     >>> found = agreement(state, plain, SeedTree(1), samples=1000, runs=2, scaled=500).estimate
     >>> abs(found.probability - 3.17e-5) < 3.0 * found.standard_error
@@ -121,19 +121,6 @@ def judged(plain: RareFailure, levels: ChainedEstimate, scaled: ScaledSigmaEstim
     References
     ----------
     Birge 1932, Phys. Rev. 40: the error of a weighted mean times the ratio √(χ²/(n − 1)) where that is above 1.
-
-    Examples
-    --------
-    Two estimates of Φ(−4) = 3.17e-5 have a smaller error together than one alone.
-
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> state = ResponseLimit(experiment=sum_of_sizes(6.0, 12.0), limit=4.0 * np.sqrt(5.0))
-    >>> plain = RareFailure(probability=0.0, standard_error=np.inf, calls=1000, method="Monte Carlo")
-    >>> levels = subset_simulation(state, SeedTree(1), 1000, 2)
-    >>> scaled = scaled_sigma_sampling(state, SeedTree(2), 500, 2, known=levels.failing)
-    >>> found = judged(plain, levels, scaled).estimate
-    >>> abs(found.probability - 3.17e-5) < 3.0 * found.standard_error
-    True
     """
     methods = (levels,) if isinstance(scaled, SolveError) else (levels, scaled)
     if not any(item.probability for item in methods):
@@ -296,9 +283,15 @@ def yield_at_limit(
     --------
     A limit 2σ away is kept by Φ(2) = 97.7 % of the units.
 
-    >>> from tolalloc.capability.experiment import sum_of_sizes
+    >>> from tolalloc.capability.experiment import Experiment
     >>> from tolalloc.capability.monte_carlo import monte_carlo
-    >>> state = ResponseLimit(experiment=sum_of_sizes(6.0, 12.0), limit=2.0 * np.sqrt(5.0))
+    >>> import tolalloc as ta
+    >>> row = {"unit": "mm", "min": 1, "max": 60, "cost": 1}
+    >>> rows = [{"id": "a", "plus": 3, "minus": -3, **row}, {"id": "b", "plus": 6, "minus": -6, **row}]
+    >>> errors = ta.Drawing.of_rows(rows).errors
+    >>> y = ta.model(lambda a, b: a + b, inputs=("a", "b"), outputs=("y [mm]",)).bound(errors, "")
+    >>> experiment = Experiment.of(y, errors, SeedTree(1))
+    >>> state = ResponseLimit(experiment=experiment, limit=2.0 * np.sqrt(5.0))
     >>> round(yield_at_limit(state, monte_carlo(state.experiment, 10_000)).interval.estimate, 2)
     0.98
     """
@@ -315,7 +308,7 @@ def yield_at_limit(
     interval = counted if found.estimate.method == _RANDOM_UNITS else log_normal_interval(found.estimate, runs)
     return YieldAtLimit(
         limit=limit,
-        interval=_doubted(interval, limit_state, sample),
+        interval=_widened_by(interval, limit_state, sample),
         estimate=found.estimate,
         estimates=found.estimates,
         verdict=found.verdict,
@@ -323,17 +316,17 @@ def yield_at_limit(
     )
 
 
-def _doubted(interval: ShareInterval, limit_state: ResponseLimit, sample: MonteCarlo) -> ShareInterval:
+def _widened_by(interval: ShareInterval, limit_state: ResponseLimit, sample: MonteCarlo) -> ShareInterval:
     """Return the interval of a yield that also holds what measured parts leave open of their processes."""
     evaluation = sample.evaluation
     values = np.where(evaluation.good, evaluation.values[:, 0], np.nan)
-    doubt = ProcessDoubt.of(limit_state.experiment.errors, sample.x, values)
-    if doubt is None:
+    uncertainty = ProcessUncertainty.of(limit_state.experiment.errors, sample.x, values)
+    if uncertainty is None:
         return interval
     limits, tail = Limits(upper=limit_state.limit), (1 - interval.confidence) / 2
     # The worst process at the worse end of the counted interval, and the best one at its better end.
     least, most = (
-        1.0 - float(np.quantile(doubt.shares(limits, 1.0 - end), at))
+        1.0 - float(np.quantile(uncertainty.shares(limits, 1.0 - end), at))
         for end, at in ((interval.low, 1.0 - tail), (interval.high, tail))
     )
     return replace(interval, low=min(interval.low, least), high=max(interval.high, most))

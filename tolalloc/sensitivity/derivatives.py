@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.capability.experiment import Experiment
-from tolalloc.capability.monte_carlo import AnsweredUnits, MonteCarlo, require_few_failures
+from tolalloc.capability.monte_carlo import AnsweredUnits, require_few_failures
 from tolalloc.exceptions import SolveError
 from tolalloc.models.model import Response, ResponseWithDerivatives
 from tolalloc.reading.units import MICROMETRE
@@ -81,9 +81,13 @@ def local_derivatives(experiment: Experiment[ResponseWithDerivatives], units: in
     amplitude of a wave (own derivation).
     """
     errors = experiment.errors
-    sample, by_column = _sampled(experiment, units)
+    x = experiment.deviations(errors.standard_values(experiment.uniform(units)))
+    answer = experiment.response.with_derivatives(x)
+    sample, good = AnsweredUnits(evaluation=answer.evaluation), answer.evaluation.good
+    require_few_failures(sample, "derivatives", experiment.largest_failed_share)
+    by_column = answer.by_column[good]
     where, slope = np.array(errors.source_of_column), []
-    variance, mean_square = sample.x[sample.evaluation.good].var(axis=0), (by_column**2).mean(axis=0)
+    variance, mean_square = x[good].var(axis=0), (by_column**2).mean(axis=0)
     by_zone, per_micrometre = [], []
     for source in errors.active:
         own, per_length = where == source.name, MICROMETRE / source.lever
@@ -96,17 +100,6 @@ def local_derivatives(experiment: Experiment[ResponseWithDerivatives], units: in
         by_zone=np.array(by_zone),
         per_micrometre=np.array(per_micrometre),
     )
-
-
-def _sampled(
-    experiment: Experiment[ResponseWithDerivatives], units: int
-) -> tuple[MonteCarlo, Float[np.ndarray, "good column"]]:
-    """Return random units, and of the good ones the derivatives."""
-    x = experiment.deviations(experiment.errors.standard_values(experiment.uniform(units)))
-    answer = experiment.response.with_derivatives(x)
-    sample = MonteCarlo(x=x, evaluation=answer.evaluation)
-    require_few_failures(sample, "derivatives", experiment.largest_failed_share)
-    return sample, answer.by_column[answer.evaluation.good]
 
 
 DIRECTIONS = 16
@@ -149,14 +142,12 @@ def classical_estimate(experiment: Experiment[Response]) -> ClassicalEstimate:
     """
     errors = experiment.errors
     middle = experiment.deviations(np.zeros((1, len(errors.columns))))
-    x, start = [middle], 0
-    for source, zone in zip(errors.active, experiment.zones, strict=True):
-        own = slice(start, start + len(source.columns))
+    x, columns = [middle], zip(errors.active, errors.columns_of_source, experiment.zones, strict=True)
+    for source, own, zone in columns:
         rows = np.repeat(middle, DIRECTIONS, axis=0)
         uniform = next(experiment.seeds.child(source.name).uniform_chunks(DIRECTIONS, len(source.columns)))
         rows[:, own] += zone * source.at_limit(uniform)
         x.append(rows)
-        start = own.stop
     evaluation = experiment.response(np.concatenate(x))
     require_few_failures(AnsweredUnits(evaluation=evaluation), "classical estimate", experiment.largest_failed_share)
     values = np.where(evaluation.good, evaluation.values[:, 0], -np.inf)

@@ -147,7 +147,7 @@ class RankingEffort(NamedFields):
         Examples
         --------
         >>> QUICK_RANKING.counted(48)
-        11272
+        10112
         """
         blocks = self.sobol.limit * (sources + 2)
         return self.units + blocks + 2 * self.derivative_units + 9 * self.surrogate_units

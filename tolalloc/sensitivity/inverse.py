@@ -91,8 +91,14 @@ def inverse_sensitivity(
     With σ of 1 and 2 a limit of 8 at 97.72 % (2σ) leaves a spread of 4: the first σ may be √(16 − 4) = 3.46, the second
     √(16 − 1)/2 = 1.94 of what it is; estimates of 2,048 units scatter by some percent.
 
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> inverse_sensitivity(sum_of_sizes(6.0, 12.0), limit=8.0, target=0.9772).factor.round(1).tolist()
+    >>> from tolalloc.drawings.seeds import SeedTree
+    >>> import tolalloc as ta
+    >>> row = {"unit": "mm", "min": 1, "max": 60, "cost": 1}
+    >>> rows = [{"id": "a", "plus": 3, "minus": -3, **row}, {"id": "b", "plus": 6, "minus": -6, **row}]
+    >>> errors = ta.Drawing.of_rows(rows).errors
+    >>> y = ta.model(lambda a, b: a + b, inputs=("a", "b"), outputs=("y [mm]",)).bound(errors, "")
+    >>> experiment = Experiment.of(y, errors, SeedTree(1))
+    >>> inverse_sensitivity(experiment, limit=8.0, target=0.9772).factor.round(1).tolist()
     [3.5, 2.0]
     """
     needed = fewest_units(target)

@@ -13,8 +13,7 @@ from tolalloc.capability.monte_carlo import MonteCarlo, OneSided, monte_carlo
 from tolalloc.capability.yield_at_limit import YieldAtLimit, yield_at_limit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.models.differences import derived
-from tolalloc.models.model import KeepsTables, Model, Response, ResponseWithDerivatives
+from tolalloc.models.model import KeepsTables, Model, Response, ResponseWithDerivatives, derived
 from tolalloc.running.chunks import one_blas_thread
 from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.derivatives import classical_estimate, local_derivatives
@@ -22,7 +21,7 @@ from tolalloc.sensitivity.effort import RankingEffort
 from tolalloc.sensitivity.inverse import InverseSensitivity, fewest_units, inverse_sensitivity
 from tolalloc.sensitivity.result import RankingResult
 from tolalloc.sensitivity.shapley import ShapleyEffects, shapley_effects
-from tolalloc.sensitivity.sobol import SobolAnalysis, SobolIndices, order_contribution, regrouped, sobol_indices
+from tolalloc.sensitivity.sobol import SobolAnalysis, SourceIndices, order_contribution, regrouped, sobol_indices
 from tolalloc.sensitivity.surrogate.control_variate import MOST_CONTROLLED, cheap_model
 from tolalloc.sensitivity.surrogate.regression import (
     Regression,
@@ -96,7 +95,7 @@ class Measures:
         experiment, further = self._sobol_experiment("sobol", (*self.outputs, *waves)), self._with_uncertain(limited)
         return sobol_indices(experiment, self.effort.sobol, ranked=limited, further=further, cheap=cheap)
 
-    def dimensions(self, analysis: SobolAnalysis, cheap: Regression | None = None) -> SobolIndices | None:
+    def dimensions(self, analysis: SobolAnalysis, cheap: Regression | None = None) -> SourceIndices | None:
         """Return the indices of the leading output by the dimensions of the drawing, from the blocks of an analysis.
 
         All members of a dimension are exchanged together, as one number of the drawing limits them all. None where
@@ -179,25 +178,16 @@ class Measures:
                     ("sparse quadratic regression", sparse_quadratic_regression),
                 )
             ]
-        learnt = _first(sample, self.effort.surrogate_units)
+        few, evaluation = self.effort.surrogate_units, sample.evaluation
         return choose(
             self.response,
             candidates,
-            learnt.x,
+            sample.x[:few],
             self.seeds.child("surrogates"),
             quantile=self.target,
             largest_failed_share=self.largest_failed_share,
-            evaluation=learnt.evaluation,
+            evaluation=replace(evaluation, values=evaluation.values[:few], status=evaluation.status[:few]),
         )
-
-
-def _first(sample: MonteCarlo, units: int) -> MonteCarlo:
-    """Return the first units of a sample."""
-    evaluation = sample.evaluation
-    return MonteCarlo(
-        x=sample.x[:units],
-        evaluation=replace(evaluation, values=evaluation.values[:units], status=evaluation.status[:units]),
-    )
 
 
 def rank(asked: Measures, record: RunRecord) -> RankingResult:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from tolalloc.capability.indices import Capability, Limits, QuantileInterval, capability, quantile_interval
-from tolalloc.capability.monte_carlo import Doubting, MonteCarlo, OneSided, ProcessDoubt, Yield, kept_at_once
+from tolalloc.capability.monte_carlo import MonteCarlo, OneSided, ProcessUncertainty, UncertaintyOf, Yield, kept_at_once
 from tolalloc.capability.yield_at_limit import YieldAtLimit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SamplingDesign
@@ -17,7 +17,7 @@ from tolalloc.models.model import Model
 from tolalloc.sensitivity.derivatives import ClassicalEstimate, LocalDerivatives
 from tolalloc.sensitivity.inverse import InverseSensitivity
 from tolalloc.sensitivity.shapley import ShapleyEffects
-from tolalloc.sensitivity.sobol import OrderContribution, SalibArrays, SobolAnalysis, SobolIndices
+from tolalloc.sensitivity.sobol import OrderContribution, SalibArrays, SobolAnalysis, SourceIndices
 from tolalloc.sensitivity.surrogate.validation import Choice
 from tolalloc.sensitivity.target import TargetSensitivity
 from tolalloc.sensitivity.uncertain import UncertainEffect
@@ -53,7 +53,7 @@ class RankingResult:
     design: SamplingDesign
     sobol: SobolAnalysis  # Indices of these outputs and of the waves of the model's spectra
     # Indices of the leading output by the dimensions of the drawing; none where each dimension is one source
-    dimensions: SobolIndices | None
+    dimensions: SourceIndices | None
     orders: OrderContribution | None  # What each source adds to each order; none for a model without spectra
     # What not knowing the model itself does to the leading output; none where all of it is known
     effect: UncertainEffect | None
@@ -71,7 +71,7 @@ class RankingResult:
         return self.outputs[0]
 
     @cached_property
-    def indices(self) -> SobolIndices:
+    def indices(self) -> SourceIndices:
         """Sobol indices of the leading output."""
         return self.sobol.of(self.leading)
 
@@ -101,11 +101,11 @@ class RankingResult:
     @cached_property
     def joint(self) -> Yield:
         """Share of the random units that keep all limits at once; one without an answer keeps none."""
-        return kept_at_once(self.sample.evaluation, self.outputs, self.limits, self._doubting)
+        return kept_at_once(self.sample.evaluation, self.outputs, self.limits, self._uncertainty_of)
 
     @property
-    def _doubting(self) -> Doubting | None:
-        return ProcessDoubt.about(self.errors, self.sample.x)
+    def _uncertainty_of(self) -> UncertaintyOf | None:
+        return ProcessUncertainty.about(self.errors, self.sample.x)
 
     def _capability(self, at: int, output: str) -> OutputCapability:
         evaluation, limits = self.sample.evaluation, self.limits.get(output)
@@ -118,6 +118,6 @@ class RankingResult:
             most=float(values.max()),
             quantile=quantile_interval(values, self.target),
             limits=limits,
-            inside=kept_at_once(evaluation, self.outputs, {output: limits}, self._doubting) if limits else None,
+            inside=kept_at_once(evaluation, self.outputs, {output: limits}, self._uncertainty_of) if limits else None,
             capability=capability(values, limits) if limits and np.ptp(values) > 0 else None,
         )

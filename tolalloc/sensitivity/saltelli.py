@@ -29,7 +29,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Evaluation
 from tolalloc.running.chunks import one_blas_thread
-from tolalloc.sensitivity.surrogate.control_variate import Control, optimal_weights
+from tolalloc.sensitivity.surrogate.control_variate import CheapAnswers, optimal_weights
 
 SAMPLES_AT_ONCE = 8192
 """Samples of a chunk at most, unless one block has more [-]."""
@@ -96,10 +96,10 @@ class SaltelliDesign:
         If players are named, of every block only the samples AB of these, in this order.
         """
         at_once = 1 << max(0, (SAMPLES_AT_ONCE // (len(only) or self.samples_per_block)).bit_length() - 1)
-        points = self._points(start, stop)
+        points, exchanged = self._points(start, stop), self._own[[self.names.index(name) for name in only]]
         for first in range(0, stop - start, at_once):
             a, b = points[:, first : first + at_once]
-            yield self._exchanged(a, b, only) if only else self._samples(a, b)
+            yield np.where(exchanged, b, a).reshape(-1, a.shape[-1]) if only else self._samples(a, b)
 
     @property
     def problem(self) -> dict[str, Any]:
@@ -132,13 +132,6 @@ class SaltelliDesign:
     def _own(self) -> Bool[np.ndarray, "group column"]:
         """Which columns belong to each factor group."""
         return np.asarray(np.array(self.factor_groups) == np.array(self.names)[:, np.newaxis])
-
-    def _exchanged(
-        self, a: Float[np.ndarray, "block 1 column"], b: Float[np.ndarray, "block 1 column"], only: tuple[str, ...]
-    ) -> Float[np.ndarray, "sample column"]:
-        """Return the samples AB of some players."""
-        own = self._own[[self.names.index(name) for name in only]]
-        return np.where(own, b, a).reshape(-1, len(self.factor_groups))
 
     def _samples(
         self, a: Float[np.ndarray, "block 1 column"], b: Float[np.ndarray, "block 1 column"]
@@ -217,7 +210,7 @@ def saltelli_indices(
     second_order: bool = False,
     resamples: int = 400,
     largest_failed_share: float = 0.01,
-    control: Control | None = None,
+    control: CheapAnswers | None = None,
 ) -> SaltelliIndices:
     """Return the indices of all outputs of a Saltelli design.
 
@@ -272,7 +265,8 @@ def saltelli_indices(
         raise SolveError(f"Sobol indices: {blocks} of {whole.size} blocks are left; at least 2 are needed.")
     values = evaluation.values.reshape(whole.size, size, -1)
     present, replicate = np.unique(np.flatnonzero(whole) % min(replicates, whole.size), return_inverse=True)
-    _require_replicates(present.size, blocks)
+    if present.size < 2:  # without two scramblings there is no error
+        raise SolveError(f"Sobol indices: the {blocks} blocks that are left are all of one scrambling; 2 are needed.")
     counts = without_each(replicate, present.size)
     weights = t_weights(present.size, resamples, seeds)
     with one_blas_thread():
@@ -617,9 +611,3 @@ def _over_variance(
 ) -> Float[np.ndarray, "output row index"]:
     """Return parts of the variance over it, 0 where there is none [-]."""
     return np.asarray(np.divide(part, variance, out=np.zeros_like(part), where=variance > np.finfo(float).eps))
-
-
-def _require_replicates(present: int, blocks: int) -> None:
-    """Raise unless the blocks that are left belong to two scramblings, without which they have no error."""
-    if present < 2:
-        raise SolveError(f"Sobol indices: the {blocks} blocks that are left are all of one scrambling; 2 are needed.")

@@ -77,8 +77,14 @@ def shapley_effects(experiment: Experiment[Response], permutations: int) -> Shap
     --------
     Independent parts of a sum with σ of 1 and 2 have the shares 1/5 and 4/5.
 
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> shapley_effects(sum_of_sizes(6.0, 12.0), 4000).effects[0].round(1).tolist()
+    >>> from tolalloc.drawings.seeds import SeedTree
+    >>> import tolalloc as ta
+    >>> row = {"unit": "mm", "min": 1, "max": 60, "cost": 1}
+    >>> rows = [{"id": "a", "plus": 3, "minus": -3, **row}, {"id": "b", "plus": 6, "minus": -6, **row}]
+    >>> errors = ta.Drawing.of_rows(rows).errors
+    >>> y = ta.model(lambda a, b: a + b, inputs=("a", "b"), outputs=("y [mm]",)).bound(errors, "")
+    >>> experiment = Experiment.of(y, errors, SeedTree(1))
+    >>> shapley_effects(experiment, 4000).effects[0].round(1).tolist()
     [0.2, 0.8]
     """
     if permutations < 2:

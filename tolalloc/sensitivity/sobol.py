@@ -16,7 +16,6 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from tolalloc.capability.experiment import Experiment
-from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.exceptions import ConstantOutputError, InputError, UnknownNameError
 from tolalloc.models.model import Evaluation, Response
 from tolalloc.sensitivity.effort import SobolEffort
@@ -29,12 +28,12 @@ from tolalloc.sensitivity.ranking import (
     until_converged,
 )
 from tolalloc.sensitivity.saltelli import REPLICATES, SaltelliDesign, SaltelliIndices, drawn, saltelli_indices
-from tolalloc.sensitivity.surrogate.control_variate import Control
+from tolalloc.sensitivity.surrogate.control_variate import CheapAnswers
 from tolalloc.sensitivity.surrogate.regression import Regression
 
 
 @dataclass(frozen=True, kw_only=True)
-class SobolIndices(SourceRanking):
+class SourceIndices(SourceRanking):
     """Indices of every source for one output; a block of dependent sources counts as one source, named "a + b"."""
 
     # First-order index, and draws from its error [-]
@@ -148,7 +147,7 @@ class SobolAnalysis:
         """Return the median over all sources of how wide an interval is over that without a control variate [-]."""
         return float(np.median(self.indices.narrowed[self.position(output)]))
 
-    def of(self, output: str | int) -> SobolIndices:
+    def of(self, output: str | int) -> SourceIndices:
         """Return the indices of one output."""
         at, counts = self.position(output), self.outputs[self.position(output)] in self.ranked
         blocks = self.blocks if counts else self.blocks_of_others
@@ -157,11 +156,11 @@ class SobolAnalysis:
 
 def _indices_of(
     found: SaltelliIndices, at: int, output: str, sources: tuple[str, ...], blocks: int, samples: int
-) -> SobolIndices:
+) -> SourceIndices:
     """Return the indices at one place, of an output from so many blocks of an analysis with so many samples [-]."""
     if not found.varies[at]:
         raise ConstantOutputError(f"Sobol indices: {output} is the same for all samples; no source can be ranked.")
-    return SobolIndices(
+    return SourceIndices(
         sources=sources,
         first=found.first[at],
         total=found.total[at],
@@ -248,8 +247,14 @@ def order_contribution(analysis: SobolAnalysis, waves: Mapping[float, Sequence[s
     --------
     A wave whose cosine and sine are the same sum has the shares of that sum, 1/5 and 4/5.
 
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> found = sobol_indices(sum_of_sizes(6.0, 12.0), SobolEffort(start=4096, limit=4096, places=1))
+    >>> from tolalloc.drawings.seeds import SeedTree
+    >>> import tolalloc as ta
+    >>> row = {"unit": "mm", "min": 1, "max": 60, "cost": 1}
+    >>> rows = [{"id": "a", "plus": 3, "minus": -3, **row}, {"id": "b", "plus": 6, "minus": -6, **row}]
+    >>> errors = ta.Drawing.of_rows(rows).errors
+    >>> y = ta.model(lambda a, b: a + b, inputs=("a", "b"), outputs=("y [mm]",)).bound(errors, "")
+    >>> experiment = Experiment.of(y, errors, SeedTree(1))
+    >>> found = sobol_indices(experiment, SobolEffort(start=4096, limit=4096, places=1))
     >>> order_contribution(found, {1: (0, 0)}).total.round(2).tolist()
     [[0.2, 0.8]]
     """
@@ -333,8 +338,14 @@ def sobol_indices(
     --------
     A sum with σ of 1 and 2 has the total indices 1/5 and 4/5.
 
-    >>> from tolalloc.capability.experiment import sum_of_sizes
-    >>> found = sobol_indices(sum_of_sizes(6.0, 12.0), SobolEffort(start=4096, limit=4096, places=1))
+    >>> from tolalloc.drawings.seeds import SeedTree
+    >>> import tolalloc as ta
+    >>> row = {"unit": "mm", "min": 1, "max": 60, "cost": 1}
+    >>> rows = [{"id": "a", "plus": 3, "minus": -3, **row}, {"id": "b", "plus": 6, "minus": -6, **row}]
+    >>> errors = ta.Drawing.of_rows(rows).errors
+    >>> y = ta.model(lambda a, b: a + b, inputs=("a", "b"), outputs=("y [mm]",)).bound(errors, "")
+    >>> experiment = Experiment.of(y, errors, SeedTree(1))
+    >>> found = sobol_indices(experiment, SobolEffort(start=4096, limit=4096, places=1))
     >>> found.of(0).total.round(2).tolist()
     [0.2, 0.8]
     """
@@ -348,9 +359,10 @@ def sobol_indices(
         replicates=min(REPLICATES, effort.start),
     )
     blocks = _Blocks(experiment, design, effort, counted, further or experiment.response, cheap)
+    shared = {source.name: source.dimension for source in errors.sources}  # the tolerance that a source may share
     convergence = until_converged(
         blocks.resampled,
-        _groups(errors, design.names),
+        tuple(shared.get(name, name) for name in design.names),
         min(effort.places, len(design.names)),
         start=effort.start,
         limit=effort.limit,
@@ -433,7 +445,7 @@ def _control(
     design: SaltelliDesign,
     blocks: int,
     outputs: tuple[str, ...],
-) -> Control | None:
+) -> CheapAnswers | None:
     """Return what a cheap model says of so many blocks and of many others; a constant of outputs that it has not."""
     if cheap is None:
         return None
@@ -444,7 +456,7 @@ def _control(
         known = solved(experiment, cheap, own.chunks(0, count)).values
         places = [cheap.outputs.index(name) if name in cheap.outputs else known.shape[1] for name in outputs]
         answers.append(np.column_stack([known, np.zeros(len(known))])[:, places])
-    return Control(own=answers[0], many=answers[1])
+    return CheapAnswers(own=answers[0], many=answers[1])
 
 
 def solved(
@@ -456,18 +468,12 @@ def solved(
     return Evaluation.joined([response(experiment.deviations(own)) for own in standard])
 
 
-def _groups(errors: ErrorModel, factor_groups: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the tolerance group of each factor group: the tolerance that it shares with others, or itself."""
-    group_of = {source.name: source.dimension for source in errors.sources}
-    return tuple(group_of.get(name, name) for name in factor_groups)
-
-
 def regrouped(
     experiment: Experiment[Response],
     analysis: SobolAnalysis,
     factor_groups: tuple[str, ...],
     cheap: Regression | None = None,
-) -> SobolIndices:
+) -> SourceIndices:
     """Return the indices of the first output of an analysis by other groups of the columns, from the same blocks.
 
     The samples A and B are the same for any groups, and so are those in which columns are exchanged that are a group

@@ -109,11 +109,16 @@ def target_sensitivity(
     --------
     Of the 5 % largest sums with σ of 1 and 2, excess mean squares are as the variances, 1 to 4 but for chance.
 
-    >>> from tolalloc.capability.experiment import sum_of_sizes
+    >>> from tolalloc.capability.experiment import Experiment
     >>> from tolalloc.capability.monte_carlo import monte_carlo
-    >>> experiment = sum_of_sizes(6.0, 12.0)
+    >>> import tolalloc as ta
+    >>> row = {"unit": "mm", "min": 1, "max": 60, "cost": 1}
+    >>> rows = [{"id": "a", "plus": 3, "minus": -3, **row}, {"id": "b", "plus": 6, "minus": -6, **row}]
+    >>> errors = ta.Drawing.of_rows(rows).errors
+    >>> y = ta.model(lambda a, b: a + b, inputs=("a", "b"), outputs=("y [mm]",)).bound(errors, "")
+    >>> experiment = Experiment.of(y, errors, SeedTree(1))
     >>> sample = monte_carlo(experiment, 8192)
-    >>> found = target_sensitivity(sample, experiment.errors, np.inf, SeedTree(2), resamples=10, permutations=19)
+    >>> found = target_sensitivity(sample, errors, np.inf, SeedTree(2), resamples=10, permutations=19)
     >>> round(float(found.excess[1] / found.excess[0]))
     4
     """
@@ -125,9 +130,11 @@ def target_sensitivity(
     if outside.all():
         raise SolveError("Target sensitivity: the output is the same for all units, so none is set apart.")
     measures, squares = limited_measures(errors, x), _mean_squares(errors, x)
+    sources, where = tuple(dict.fromkeys(errors.source_of_column)), np.array(errors.source_of_column)
+    varies = x.std(axis=0) > 0.0
     tables = np.stack([_table(measure, outside) for measure in measures.T])
     return TargetSensitivity(
-        sources=tuple(dict.fromkeys(errors.source_of_column)),
+        sources=sources,
         threshold=threshold,
         is_limit=is_limit,
         units=values.size,
@@ -137,7 +144,7 @@ def target_sensitivity(
         first_resamples=_first_resamples(tables, seeds.child("first"), resamples),
         lift=squares[outside].mean(axis=0) / squares.mean(axis=0),
         lift_resamples=_lift_resamples(squares, outside, seeds.child("lift"), resamples),
-        columns=_varying_columns(errors, x),
+        columns=np.array([np.count_nonzero(varies[where == name]) for name in sources]),
         p_value=_p_value(squares, outside, seeds.child("permutations"), permutations),
         median=np.median(measures, axis=0),
         median_outside=np.median(measures[outside], axis=0),
@@ -167,12 +174,6 @@ def _mean_squares(errors: ErrorModel, x: Float[np.ndarray, "sample column"]) -> 
     squares = ((x - x.mean(axis=0)) / np.where(deviation > 0.0, deviation, np.inf)) ** 2
     where = np.array(errors.source_of_column)
     return np.column_stack([squares[:, where == name].mean(axis=1) for name in dict.fromkeys(errors.source_of_column)])
-
-
-def _varying_columns(errors: ErrorModel, x: Float[np.ndarray, "sample column"]) -> Int[np.ndarray, " source"]:
-    """Return how many of each source's columns vary [-]."""
-    where, varies = np.array(errors.source_of_column), x.std(axis=0) > 0.0
-    return np.array([np.count_nonzero(varies[where == name]) for name in dict.fromkeys(errors.source_of_column)])
 
 
 def _threshold(values: Float[np.ndarray, " good_unit"], limit: float, *, units: int) -> tuple[float, bool]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.linalg import block_diag
 
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.drawings.seeds import SeedTree
@@ -67,7 +68,7 @@ def uncertain_effect(
     σ² = gᵀ·C·g to first order, g the gradient by the uncertain columns, C their covariance: JCGM 100:2008, eq. (13). It
     holds where `FirstOrderError.fails` is false.
     """
-    factor = _factor(model.uncertain)
+    factor = block_diag(*(source.factor for source in model.uncertain))
     gradient = _gradient(model, output, x[:_UNITS])
     known = gradient[np.isfinite(gradient).all(axis=1)]
     directions = seeds.generator().standard_normal((_DIRECTIONS, len(factor)))
@@ -138,14 +139,3 @@ def _gradient(model: Model, output: str, x: Float[np.ndarray, "unit column"]) ->
     found = model.with_uncertain((output,))(rows)
     values = np.where(found.good, found.values[:, 0], np.nan).reshape(len(x), -1)
     return values[:, 1:] - values[:, :1]
-
-
-def _factor(sources: tuple[CorrelatedSource, ...]) -> Float[np.ndarray, "uncertain uncertain"]:
-    """Return the symmetric root of the covariance of all uncertain columns."""
-    size = sum(len(source.columns) for source in sources)
-    factor, start = np.zeros((size, size)), 0
-    for source in sources:
-        stop = start + len(source.columns)
-        factor[start:stop, start:stop] = source.factor
-        start = stop
-    return factor

@@ -76,7 +76,8 @@ class ReciprocalPower(_FallingCost):
     References
     ----------
     G. H. Sutherland, B. Roth, Mechanism design: accounting for manufacturing tolerances and costs in function
-    generating problems, J. Eng. Ind. 97 (1975) 283–286.
+    generating problems, J. Eng. Ind. 97 (1975) 283–286; n = 2: M. F. Spotts, Allocation of tolerances to minimize cost
+    of assembly, J. Eng. Ind. 95 (1973) 762–764.
 
     Examples
     --------
@@ -106,21 +107,6 @@ class ReciprocalPower(_FallingCost):
     def rescaled(self, unit: float) -> ReciprocalPower:
         """Return the same cost as a function of zone / unit."""
         return replace(self, factor=self.factor * unit**-self.exponent)
-
-
-def reciprocal_squared(*, fixed: float = 0.0, factor: float) -> ReciprocalPower:
-    """Return the cost a + b/t².
-
-    References
-    ----------
-    M. F. Spotts, Allocation of tolerances to minimize cost of assembly, J. Eng. Ind. 95 (1973) 762–764.
-
-    Examples
-    --------
-    >>> float(reciprocal_squared(fixed=2.0, factor=300.0).value(np.array(10.0)))
-    5.0
-    """
-    return ReciprocalPower(fixed=fixed, factor=factor, exponent=2.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,7 +143,7 @@ class Exponential(_FallingCost):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Combined(_FallingCost):
+class PowerExponential(_FallingCost):
     """Cost a + b·t⁻ⁿ·exp(−t/s).
 
     References
@@ -167,7 +153,7 @@ class Combined(_FallingCost):
 
     Examples
     --------
-    >>> round(float(Combined(fixed=2.0, factor=30.0, exponent=0.5, scale=9.0).value(np.array(9.0))), 3)
+    >>> round(float(PowerExponential(fixed=2.0, factor=30.0, exponent=0.5, scale=9.0).value(np.array(9.0))), 3)
     5.679
     """
 
@@ -186,12 +172,12 @@ class Combined(_FallingCost):
         """Return the cost as a convex expression."""
         return self.fixed + cvx.exp(log(self.factor) - self.exponent * cvx.log(zone) - zone / self.scale)
 
-    def rescaled(self, unit: float) -> Combined:
+    def rescaled(self, unit: float) -> PowerExponential:
         """Return the same cost as a function of zone / unit."""
         return replace(self, factor=self.factor * unit**-self.exponent, scale=self.scale / unit)
 
 
-ClosedForm = Reciprocal | ReciprocalPower | Exponential | Combined
+ClosedForm = Reciprocal | ReciprocalPower | Exponential | PowerExponential
 
 
 def stacked(costs: Sequence[ClosedForm]) -> ClosedForm:

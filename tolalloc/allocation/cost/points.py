@@ -14,7 +14,14 @@ import numpy as np
 from jaxtyping import Float
 from pydantic import Field
 
-from tolalloc.allocation.cost.model import ClosedForm, Combined, Exponential, Expression, Reciprocal, ReciprocalPower
+from tolalloc.allocation.cost.model import (
+    ClosedForm,
+    Exponential,
+    Expression,
+    PowerExponential,
+    Reciprocal,
+    ReciprocalPower,
+)
 from tolalloc.drawings.fields import LARGEST_ZONE, SMALLEST_COST, SMALLEST_ZONE, UNITS
 from tolalloc.drawings.heads import split_header
 from tolalloc.drawings.table_file import read_rows, read_text_table, stated_currency
@@ -304,7 +311,7 @@ def _highest(
     return cvx.reshape(cvx.max(slopes[:, np.newaxis] @ flat + heights, axis=0), zone.shape, order="C")
 
 
-FORMS: tuple[type[ClosedForm], ...] = (Reciprocal, ReciprocalPower, Exponential, Combined)
+FORMS: tuple[type[ClosedForm], ...] = (Reciprocal, ReciprocalPower, Exponential, PowerExponential)
 
 _BOUNDS = {"exponent": (0.05, 10.0), "scale": (0.02, 100.0)}
 """Bounds of what bends a curve, the scale over the middle zone of the points [-]."""

@@ -12,13 +12,12 @@ from pydantic import Field, model_validator
 
 from tolalloc.allocation.cost.model import (
     ClosedForm,
-    Combined,
     CostModel,
     Exponential,
+    PowerExponential,
     Process,
     Reciprocal,
     ReciprocalPower,
-    reciprocal_squared,
 )
 from tolalloc.allocation.cost.points import Points, ShopPoints, Spline, Tabulated, best_fit, load_shop_points, points_of
 from tolalloc.drawings.drawing import Costs
@@ -119,9 +118,9 @@ class ProcessCostRow(Record):
 
     def _closed_form(self, fixed: float, factor: float) -> ClosedForm:
         if self.model == "reciprocal squared":
-            return reciprocal_squared(fixed=fixed, factor=factor)
+            return ReciprocalPower(fixed=fixed, factor=factor, exponent=2.0)
         if self.exponent and self.scale:
-            return Combined(fixed=fixed, factor=factor, exponent=self.exponent, scale=self.scale)
+            return PowerExponential(fixed=fixed, factor=factor, exponent=self.exponent, scale=self.scale)
         if self.exponent:
             return ReciprocalPower(fixed=fixed, factor=factor, exponent=self.exponent)
         if self.scale:

@@ -18,11 +18,10 @@ from tolalloc.allocation.front.pareto_problem import (
     to_genes,
 )
 from tolalloc.allocation.search import process_choice
-from tolalloc.allocation.search.convex_program import front
 from tolalloc.allocation.search.zone_allocation import Programs
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import FrontEffort
-from tolalloc.allocation.space.problem import OneSidedConstraint, Solution, Stack
+from tolalloc.allocation.space.problem import LeastInfeasible, OneSidedConstraint, Solution, Stack
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import SolveError
@@ -175,13 +174,13 @@ def exact_front(
         The limits over that one [-].
     """
     budgets = stacks[0].budget + (shares - 1) * limit
+    solved: tuple[Solution | LeastInfeasible | None, ...]
     if space.has_choices:
-        chosen = process_choice.front(space.problem(stacks), 0, budgets)
-        solved = [found if isinstance(found, Solution) else None for found in chosen]
+        solved = process_choice.front(space.problem(stacks), 0, budgets)
     else:
         program = Programs(space, len(stacks)).of(np.zeros(len(space.groups), dtype=int))
-        solved = [*front(program, stacks, 0, budgets)]
-    known = [(share, found) for share, found in zip(shares.tolist(), solved, strict=True) if found]
+        solved = tuple(program.solve((replace(stacks[0], budget=own), *stacks[1:])) for own in budgets.tolist())
+    known = [(share, own) for share, own in zip(shares.tolist(), solved, strict=True) if isinstance(own, Solution)]
     designs = [np.concatenate([found.zones, found.shared]) for _, found in known]
     return ConvexFront(
         limits=np.array([share * limit for share, _ in known]),

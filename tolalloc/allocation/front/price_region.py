@@ -154,7 +154,8 @@ def _break_even(problem: DiscreteProblem, optimum: DiscreteSolution, at: int, *,
     factor = 1.0
     for _ in range(len(rivals) + 1):
         priced = tuple(replace(step, cost=step.cost + (factor - 1) * made(step)) for step in rivals)
-        found = problem.with_options(at, priced).solve() if priced else None
+        others = (*problem.options[:at], priced, *problem.options[at + 1 :])
+        found = replace(problem, options=others).solve() if priced else None
         if found is None:
             return never
         _require_proven(found)
@@ -162,8 +163,8 @@ def _break_even(problem: DiscreteProblem, optimum: DiscreteSolution, at: int, *,
         saved = made(own) - made(rival)
         if saved == 0 or (saved > 0) != coarser:
             return never  # no price tells them apart in this direction
-        others = (found.cost - factor * made(rival)) - (optimum.cost - made(own))
-        before, factor = factor, others / saved
+        rest = (found.cost - factor * made(rival)) - (optimum.cost - made(own))
+        before, factor = factor, rest / saved
         if np.isclose(factor, before, rtol=_SAME_PRICE):
             break
     return factor if factor > _SAME_PRICE else 0.0
@@ -173,7 +174,6 @@ def _break_even(problem: DiscreteProblem, optimum: DiscreteSolution, at: int, *,
 class WorstPrices:
     """The prices at which the answer loses most against the zones that are cheapest then."""
 
-    factors: Float[np.ndarray, " feature"]  # Of the cost of every zone [-]
     cheapest: Solution  # At these prices
     lost: float  # What the answer costs more than these, at these prices [cost units]
     most: float  # What it costs more at any prices of the box at most, proven [cost units]
@@ -207,7 +207,8 @@ def worst_prices(problem: AllocationProblem, optimum: Solution, nodes: int = 100
     )
     kept = float(costs.sum() + problem.losses @ optimum.zones**2)
     # Whatever is searched: the answer costs no more than all prices raised say, others no less than all lowered.
-    most, start = (1 + COST_CHANGE) * kept - (1 - COST_CHANGE) * optimum.bound, _half_raised(costs)
+    most = (1 + COST_CHANGE) * kept - (1 - COST_CHANGE) * optimum.bound
+    start = np.where(costs > np.median(costs), 1 + COST_CHANGE, 1 - COST_CHANGE)  # where no search says better
     with suppress(SolveError):  # no zones within so many nodes, so nothing is proven besides
         searched = process_choice.allocate(replace(problem, features=cut), nodes)
         if isinstance(searched, Solution):
@@ -231,11 +232,6 @@ def _costs(features: Sequence[PricedFeature], found: Solution) -> Float[np.ndarr
     )
 
 
-def _half_raised(costs: Float[np.ndarray, " feature"]) -> Float[np.ndarray, " feature"]:
-    """Return prices from which the worst are looked for where no search says better: those of dear zones raised [-]."""
-    return np.where(costs > np.median(costs), 1 + COST_CHANGE, 1 - COST_CHANGE)
-
-
 def _against(answer: Float[np.ndarray, " feature"], other: Float[np.ndarray, " feature"]) -> Float[np.ndarray, "..."]:
     """Return the prices at which an answer loses most against other zones [-]."""
     return np.where(other <= answer, 1 + COST_CHANGE, 1 - COST_CHANGE)
@@ -249,7 +245,7 @@ def _lost(problem: AllocationProblem, optimum: Solution, factors: Float[np.ndarr
     if not isinstance(found, Solution):
         raise SolveError("At other prices the allocation has no solution, although prices change no limit.")
     lost = max(changed.cost(optimum.zones, optimum.processes) - found.cost, 0.0)
-    return WorstPrices(factors=factors, cheapest=found, lost=lost, most=np.inf)
+    return WorstPrices(cheapest=found, lost=lost, most=np.inf)
 
 
 def _priced(feature: PricedFeature, factor: float) -> PricedFeature:

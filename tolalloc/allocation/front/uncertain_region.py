@@ -15,6 +15,7 @@ from tolalloc.allocation.search.convex_program import ConvexProgram
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
 from tolalloc.allocation.space.problem import Solution, Stack
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier
+from tolalloc.capability.halving import halved
 from tolalloc.exceptions import SolveError
 from tolalloc.models.model import Model
 
@@ -24,8 +25,8 @@ COVERED = 2.0
 """Standard uncertainties within which the least favourable change is looked for [-]."""
 _SHARES = (0.25, 0.5, 0.75, 1.0)
 """Shares of the span at which zones are looked at before the place where one leaves is halved [-]."""
-_FOUND = 1e-3
-"""Error of that place as a share of the span [-]."""
+_FOUND, _HALVINGS = 1e-3, 8
+"""Error of that place as a share of the span [-], and halvings of a quarter of it that leave no more."""
 _LEFT = 1.0
 """What stands for a change of zones where no zones keep the limits: ln of a ratio above any that counts [-]."""
 
@@ -92,7 +93,7 @@ class UncertainRegion:
 
 
 @dataclass(frozen=True)
-class _Moved:
+class _ChangedModels:
     """Local models of the chosen design under a change, and by how much its excess over every limit rises."""
 
     stacks: tuple[Stack, ...]
@@ -110,14 +111,14 @@ class _Undisturbed:
     def verified(self) -> VerifiedDesign:
         return self.verifier.verify(self.allocation.chosen.design, "robustness")
 
-    def moved(self, change: Float[np.ndarray, " column"]) -> _Moved:
+    def moved(self, change: Float[np.ndarray, " column"]) -> _ChangedModels:
         """Return the local models of another model, on units of the same name and so the same units."""
         design = self.allocation.chosen.design
         other, before = replace(self.verifier, model=self.verifier.model.changed(change)), self.verified.constraints
         try:
             now = other.verify(design, self.verified.name).constraints
         except SolveError:  # too many units have no answer under such a change, so nothing is known beyond none of it
-            return _Moved(stacks=self.allocation.stacks, rises=np.full(len(before), np.nan))
+            return _ChangedModels(stacks=self.allocation.stacks, rises=np.full(len(before), np.nan))
         pairs = zip(now, before, strict=True)
         rises = np.array([float(after.predicted(design) - own.predicted(design)) for after, own in pairs])
         together = zip(self.allocation.stacks, now, before, rises.tolist(), strict=True)
@@ -126,7 +127,7 @@ class _Undisturbed:
             changed_stack(aimed, own.stack, after.stack, chosen.scales, chosen.settings, rise)
             for aimed, after, own, rise in together
         )
-        return _Moved(stacks=stacks, rises=np.where(np.isfinite([own.value for own in now]), rises, np.nan))
+        return _ChangedModels(stacks=stacks, rises=np.where(np.isfinite([own.value for own in now]), rises, np.nan))
 
 
 def uncertain_region(verifier: Verifier, allocation: ZoneAllocation) -> UncertainRegion | None:
@@ -156,18 +157,6 @@ def uncertain_region(verifier: Verifier, allocation: ZoneAllocation) -> Uncertai
     ----------
     Own derivation; A. V. Fiacco, Introduction to sensitivity and stability analysis in nonlinear programming (1983);
     A. Ben-Tal, A. Nemirovski, Math. Oper. Res. 23 (1998) 769–805, for the least favourable point of an ellipsoid.
-
-    Examples
-    --------
-    Nothing is uncertain of a sum.
-
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
-    >>> from tolalloc.allocation.search.zone_allocation import allocate, scale_in_proportion
-    >>> from tolalloc.allocation.space.effort import SearchEffort
-    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
-    >>> found = allocate(verifier, scale_in_proportion(verifier, 3), SearchEffort(steps=1))
-    >>> uncertain_region(verifier, found) is None
-    True
     """
     verifier = replace(verifier, model=doubted(verifier.model))
     if not verifier.model.uncertain:
@@ -237,7 +226,7 @@ class _Path:
         made = allocation.inside.processes
         self._program = ConvexProgram(self.problem.features, made, len(allocation.stacks), self.problem.shared)
 
-    def ratios(self, end: _Moved, share: float) -> Float[np.ndarray, " group"]:
+    def ratios(self, end: _ChangedModels, share: float) -> Float[np.ndarray, " group"]:
         """Return zones at a share of the way to an end over the undisturbed ones, not numbers where none keep all."""
         nothing = np.full(len(self.groups), np.nan)
         if not np.isfinite(end.rises).all():
@@ -246,13 +235,13 @@ class _Path:
         found = self._program.solve([_between(here, there, share) for here, there in pairs])
         return nothing if found is None else found.zones / self.allocation.inside.zones
 
-    def beyond(self, end: _Moved, share: float) -> float:
+    def beyond(self, end: _ChangedModels, share: float) -> float:
         """Return by how much the zone that moves most has moved beyond `SAME`, ln of a ratio [-]."""
         ratios = self.ratios(end, share)
         moved = _LEFT if np.isnan(ratios).any() else float(np.abs(np.log(ratios)).max())
         return moved - float(np.log1p(SAME))
 
-    def place(self, end: _Moved) -> tuple[float, str]:
+    def place(self, end: _ChangedModels) -> tuple[float, str]:
         """Return the share of the way at which the first zone leaves, and its name; one and nothing where none does."""
         inside, outside = 0.0, 0.0
         for share in _SHARES if np.isfinite(end.rises).all() else ():
@@ -262,9 +251,7 @@ class _Path:
             inside = share
         if not outside:
             return 1.0, ""
-        while outside - inside > _FOUND:
-            middle = (inside + outside) / 2
-            inside, outside = (inside, middle) if self.beyond(end, middle) > 0 else (middle, outside)
+        inside = float(halved(lambda share: self.beyond(end, share) <= 0, inside, outside, _HALVINGS))
         ratios = self.ratios(end, inside)
         first = 0 if np.isnan(ratios).any() else int(np.abs(np.log(ratios)).argmax())
         return inside, self.groups[first]
@@ -288,7 +275,7 @@ def _between(here: Stack, there: Stack, share: float) -> Stack:
     )
 
 
-def _range(path: _Path, column: str, span: float, ends: tuple[_Moved, _Moved]) -> UncertainRange:
+def _range(path: _Path, column: str, span: float, ends: tuple[_ChangedModels, _ChangedModels]) -> UncertainRange:
     """Return the range of one column between the ends of its span."""
     tried = tuple(span * np.isfinite(end.rises).all() for end in ends)
     (low, first_low), (high, first_high) = (path.place(end) for end in ends)
@@ -302,7 +289,7 @@ def _range(path: _Path, column: str, span: float, ends: tuple[_Moved, _Moved]) -
     )
 
 
-def _kept_share(allocation: ZoneAllocation, end: _Moved) -> float:
+def _kept_share(allocation: ZoneAllocation, end: _ChangedModels) -> float:
     """Return up to which share of the way to an end the chosen design keeps every requirement [-]."""
     if not np.isfinite(end.rises).all():
         return 0.0
@@ -340,7 +327,7 @@ def _least_favourable(
     return np.asarray(COVERED * covariance @ slopes[:, at] / spreads[at])
 
 
-def _variant(verifier: Verifier, allocation: ZoneAllocation, moved: _Moved, name: str) -> Variant:
+def _variant(verifier: Verifier, allocation: ZoneAllocation, moved: _ChangedModels, name: str) -> Variant:
     """Return the answer of a changed model."""
     named = f"{name}, least favourable within {COVERED:g} standard uncertainties"
     problem, optimum = verifier.space.problem(moved.stacks), allocation.inside

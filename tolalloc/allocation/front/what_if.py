@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -94,11 +95,18 @@ def cost_at_yield(space: DesignSpace, allocation: ZoneAllocation, target: float)
     --------
     99 % of a normal sum needs less than 99.73 %: the cost falls.
 
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
     >>> from tolalloc.allocation.search.zone_allocation import allocate, scale_in_proportion
     >>> from tolalloc.allocation.space.effort import SearchEffort
-    >>> from tolalloc.allocation.space.requirement import AtYield
-    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0, guarantee=AtYield(target=0.9973))
+    >>> from tolalloc.allocation.space.requirement import Requirement
+    >>> from tolalloc.capability.indices import Limits
+    >>> from tolalloc.drawings.seeds import SeedTree
+    >>> import tolalloc as ta
+    >>> row = {"unit": "mm", "min": 1, "max": 60, "cost": 1}
+    >>> rows = [{"id": "a", "plus": 3, "minus": -3, **row}, {"id": "b", "plus": 4, "minus": -4, **row}]
+    >>> space = DesignSpace(errors=ta.Drawing.of_rows(rows).errors)
+    >>> model = ta.model(lambda a, b: a + b, inputs=("a", "b"), outputs=("y [mm]",)).bound(space.errors, "")
+    >>> asked = Requirement(output="y [mm]", limits=Limits(upper=5.0), guarantee=ta.AtYield(0.9973))
+    >>> verifier = Verifier(space=space, model=model, requirements=(asked,), seeds=SeedTree(1), units=2000)
     >>> found = allocate(verifier, scale_in_proportion(verifier, 3), SearchEffort(steps=1))
     >>> round(found.chosen.cost, 1), round(cost_at_yield(verifier.space, found, 0.99), 1)
     (2.0, 1.7)
@@ -180,10 +188,18 @@ def setting_trade(
     --------
     Without settings it is the least cost itself, 1.9731 of `lower_bound`.
 
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
     >>> from tolalloc.allocation.search.zone_allocation import allocate, scale_in_proportion
     >>> from tolalloc.allocation.space.effort import SearchEffort
-    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
+    >>> from tolalloc.allocation.space.requirement import Requirement
+    >>> from tolalloc.capability.indices import Limits
+    >>> from tolalloc.drawings.seeds import SeedTree
+    >>> import tolalloc as ta
+    >>> row = {"unit": "mm", "min": 1, "max": 60, "cost": 1}
+    >>> rows = [{"id": "a", "plus": 3, "minus": -3, **row}, {"id": "b", "plus": 4, "minus": -4, **row}]
+    >>> space = DesignSpace(errors=ta.Drawing.of_rows(rows).errors)
+    >>> model = ta.model(lambda a, b: a + b, inputs=("a", "b"), outputs=("y [mm]",)).bound(space.errors, "")
+    >>> asked = Requirement(output="y [mm]", limits=Limits(upper=5.0), guarantee=ta.RootSumSquare())
+    >>> verifier = Verifier(space=space, model=model, requirements=(asked,), seeds=SeedTree(1), units=2000)
     >>> found = allocate(verifier, scale_in_proportion(verifier, 3), SearchEffort(steps=1))
     >>> standard = np.random.default_rng(1).normal(size=(500, 2)) / 6
     >>> response = QuantileResponse(
@@ -298,22 +314,33 @@ def robustness(
     --------
     With every cost 20 % up or down the answer loses less than 1 %.
 
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
     >>> from tolalloc.allocation.search.zone_allocation import allocate, scale_in_proportion
     >>> from tolalloc.allocation.space.effort import SearchEffort
-    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
+    >>> from tolalloc.allocation.space.requirement import Requirement
+    >>> from tolalloc.capability.indices import Limits
+    >>> from tolalloc.drawings.seeds import SeedTree
+    >>> import tolalloc as ta
+    >>> row = {"unit": "mm", "min": 1, "max": 60, "cost": 1}
+    >>> rows = [{"id": "a", "plus": 3, "minus": -3, **row}, {"id": "b", "plus": 4, "minus": -4, **row}]
+    >>> space = DesignSpace(errors=ta.Drawing.of_rows(rows).errors)
+    >>> model = ta.model(lambda a, b: a + b, inputs=("a", "b"), outputs=("y [mm]",)).bound(space.errors, "")
+    >>> asked = Requirement(output="y [mm]", limits=Limits(upper=5.0), guarantee=ta.RootSumSquare())
+    >>> verifier = Verifier(space=space, model=model, requirements=(asked,), seeds=SeedTree(1), units=2000)
     >>> found = allocate(verifier, scale_in_proportion(verifier, 3), SearchEffort(steps=1))
     >>> robustness(verifier, found, nodes=10).at_worst.regret < 0.01
     True
     """
     problem, optimum, locked = verifier.space.problem(allocation.stacks), allocation.inside, allocation.locked_cost
     worst = worst_prices(problem, optimum, nodes)
-    cost = worst.cheapest.cost + locked
+    cost, steps = worst.cheapest.cost + locked, tuple[PriceRange, ...]()
+    if graded and graded.chosen.met:
+        with suppress(SolveError):  # a choice that is not proven would claim too much
+            steps = graded_price_ranges(graded.problem, graded.solution)
     return Robustness(
         groups=verifier.space.groups,
         optimum=optimum.zones,
         prices=price_ranges(problem, optimum),
-        graded=_of_steps(graded) if graded and graded.chosen.met else (),
+        graded=steps,
         worst=worst,
         at_worst=Variant(
             name="worst prices found", scales=worst.cheapest.zones, cost=cost, regret=worst.lost / cost, kept=True
@@ -321,14 +348,6 @@ def robustness(
         uncertain=uncertain_region(verifier, allocation),
         second_best=_second_best(problem, optimum, locked),
     )
-
-
-def _of_steps(graded: GradedAllocation) -> tuple[PriceRange, ...]:
-    """Return the ranges of prices on ladders, none where a choice is not proven: those would claim too much."""
-    try:
-        return graded_price_ranges(graded.problem, graded.solution)
-    except SolveError:
-        return ()
 
 
 def _second_best(problem: AllocationProblem, optimum: Solution, locked: float) -> Variant | None:

@@ -43,19 +43,19 @@ class Candidates:
             **grades,
         }
 
-    def admitted(self, free_label: str = FREE) -> dict[str, VerifiedDesign]:
+    def admitted(self) -> dict[str, VerifiedDesign]:
         """Return those that may be drawn: the table always, the others where their zones and amounts may be so.
 
         Where grades are asked for, nothing but them and the table may.
         """
-        found = self.designs(free_label)
+        found = self.designs()
         if self.graded:
             return {TABLE: found[TABLE], GRADES: found[GRADES]}
-        return {name: design for name, design in found.items() if name == TABLE or self._allows(design)}
-
-    def _allows(self, design: VerifiedDesign) -> bool:
-        """Return whether zones and settings of a design may be so, its members rounded each on their own."""
-        return replace(self._space, errors=design.space.errors).allows(design.design)
+        return {
+            name: own  # its members may be rounded each on their own
+            for name, own in found.items()
+            if name == TABLE or replace(self._space, errors=own.space.errors).allows(own.design)
+        }
 
     @property
     def shown(self) -> tuple[str, VerifiedDesign]:

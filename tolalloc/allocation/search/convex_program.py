@@ -213,16 +213,6 @@ class ConvexProgram:
         )
 
 
-def front(
-    program: ConvexProgram, stacks: Sequence[Stack], at: int, budgets: Float[np.ndarray, " point"]
-) -> tuple[Solution | None, ...]:
-    """Return the exact front: the cheapest design for every budget of the stack at a position, None where none is."""
-    return tuple(
-        program.solve([*stacks[:at], replace(stacks[at], budget=float(budget)), *stacks[at + 1 :]])
-        for budget in budgets
-    )
-
-
 @dataclass(frozen=True, kw_only=True)
 class WholeNumbers:
     """What a mixed-integer program says of choices of zeros and ones."""

@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.allocation.search.lower_bound import least_cost
-from tolalloc.allocation.search.multiple_choice import MultipleChoice, ProvenChoice, best_choice
-from tolalloc.allocation.search.zone_allocation import aimed, kept_stacks
+from tolalloc.allocation.search.multiple_choice import MultipleChoice, best_choice
+from tolalloc.allocation.search.zone_allocation import ROUNDING, aimed, kept_stacks
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Shared, Stack
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, cheapest_met
@@ -73,9 +73,6 @@ class DiscreteSolution:
     shared: Float[np.ndarray, " shared"]  # Values of the shared variables [unit of the variable]
     cost: float  # Cost [cost units]
     bound: float  # Lower bound on the cost of every allowed choice, infinite where none is allowed [cost units]
-    # Budget that every stack has left, below zero where it is broken [unit of the stack]
-    slack: Float[np.ndarray, " stack"]
-    tightest: str  # The stack with the least slack over its scale; where stacks are broken, the one that blocks most
 
     @property
     def zones(self) -> Float[np.ndarray, " feature"]:
@@ -165,50 +162,15 @@ class DiscreteProblem:
 
     def solve(self, most_nodes: int = MOST_NODES) -> DiscreteSolution | None:
         """Return the cheapest allowed choice, None where none is allowed; see `best_choice` for the nodes [-]."""
-        return self._solution(best_choice(self._program, most_nodes))
-
-    def with_options(self, at: int, options: tuple[Option, ...]) -> DiscreteProblem:
-        """Return the problem in which the feature at a position takes one of other options."""
-        return replace(self, options=(*self.options[:at], options, *self.options[at + 1 :]))
-
-    def least_violating(self) -> DiscreteSolution:
-        """Return the choice whose largest violation over the stack's scale is least, which names the blocking stack.
-
-        Notes
-        -----
-        The tightest options of all features load every stack least, whatever the shared variables are, so only the
-        points of the grid have to be compared.
-        """
-        program = self._program
-        tightest = [min(options, key=lambda option: (option.zone, option.cost)) for options in self.options]
-        ends = [0, *np.cumsum([len(options) for options in self.options])]
-        taken = [
-            start + options.index(option) for start, options, option in zip(ends, self.options, tightest, strict=False)
-        ]
-        grid = range(program.starts[-1], program.cost.size)
-        best = min(
-            (np.array([*taken, at]) for at in grid), key=lambda own: float(program.violation(own).max(initial=-1))
-        )
-        cost = float(program.cost[best].sum())
-        found = self._solution((best, cost, cost if program.allows(best) else np.inf))
-        assert found
-        return found
-
-    def _solution(self, choice: ProvenChoice | None) -> DiscreteSolution | None:
-        if choice is None:
+        found = best_choice(self._program, most_nodes)
+        if found is None:
             return None
-        taken, cost, bound = choice
-        options = tuple(self._flat[at] for at in taken[:-1])
-        shared = self._points[taken[-1] - len(self._flat)]
-        violation = self.problem.violation(np.array([option.zone for option in options]), shared)
-        names = [stack.name for stack in self._stacks]
+        taken, cost, bound = found
         return DiscreteSolution(
-            options=options,
-            shared=shared,
+            options=tuple(self._flat[at] for at in taken[:-1]),
+            shared=self._points[taken[-1] - len(self._flat)],
             cost=cost,
             bound=bound,
-            slack=-violation,
-            tightest=names[int((violation / self._scales).argmax())] if names else "",
         )
 
 
@@ -252,17 +214,7 @@ class GradedAllocation:
         self, drawn: DrawnAmounts, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...]
     ) -> GradedAllocation:
         """Return the allocation with another choice, which was found beside those of the search."""
-        grid, every = _Grid(self.space, drawn, chosen.design), (*self.tried, *tried)
-        problem = _problem(grid, chosen, every)
-        return replace(
-            self,
-            chosen=chosen,
-            tried=every,
-            labels=_labels(grid, chosen),
-            problem=problem,
-            solution=_proof(problem, chosen),
-            least=_least_cost(grid, chosen),
-        )
+        return _graded(_Grid(self.space, drawn, chosen.design), chosen, (*self.tried, *tried))
 
 
 def with_shared_zones(space: DesignSpace) -> DesignSpace:
@@ -278,10 +230,8 @@ def with_shared_zones(space: DesignSpace) -> DesignSpace:
     zone = exp(mean of ln zoneᵢ) (own derivation), which keeps the product of the zones; for zones above 0.
     """
     active = [source for source in space.errors.active if not source.locked]
-    shared = {
-        group: float(np.exp(np.mean([np.log(source.zone) for source in active if source.dimension == group])))
-        for group in space.groups
-    }
+    logarithms = {group: [np.log(source.zone) for source in space.members(group)] for group in space.groups}
+    shared = {group: float(np.exp(np.mean(own))) for group, own in logarithms.items()}
     sources = space.errors.sources
     zones = [shared[source.dimension] if source in active else source.zone for source in sources]
     return replace(space, errors=replace(space.errors, sources=with_zones(sources, zones)))
@@ -301,8 +251,7 @@ def group_options(space: DesignSpace) -> tuple[tuple[Option, ...], ...]:
 
 def group_ladders(space: DesignSpace) -> tuple[Ladder, ...]:
     """Return the ladder of every group [m]."""
-    active = [source for source in space.errors.active if not source.locked]
-    return tuple(group_ladder([source for source in active if source.dimension == group]) for group in space.groups)
+    return tuple(group_ladder(space.members(group)) for group in space.groups)
 
 
 class _Grid:
@@ -392,8 +341,16 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
     --------
     Zones a, b of 1/a and 1/b with √(a² + b²)/2 ≤ 50 µm: of R′10 50 and 80 µm are the cheapest.
 
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
-    >>> verifier = verifier_of_sum(0.06, 0.08, limit=0.05)
+    >>> from tolalloc.allocation.space.requirement import Requirement
+    >>> from tolalloc.capability.indices import Limits
+    >>> from tolalloc.drawings.seeds import SeedTree
+    >>> import tolalloc as ta
+    >>> row = {"unit": "mm", "min": 0.01, "max": 0.6, "cost": 1}
+    >>> rows = [{"id": "a", "plus": 0.03, "minus": -0.03, **row}, {"id": "b", "plus": 0.04, "minus": -0.04, **row}]
+    >>> space = DesignSpace(errors=ta.Drawing.of_rows(rows).errors)
+    >>> model = ta.model(lambda a, b: a + b, inputs=("a", "b"), outputs=("y [mm]",)).bound(space.errors, "")
+    >>> asked = Requirement(output="y [mm]", limits=Limits(upper=0.05), guarantee=ta.RootSumSquare())
+    >>> verifier = Verifier(space=space, model=model, requirements=(asked,), seeds=SeedTree(1), units=2000)
     >>> found = allocate_grades(verifier, verifier.verify(verifier.space.uniform(1.0), "as drawn"), steps=6).chosen
     >>> (1e6 * found.space.zones(found.design)).round().tolist(), round(found.cost, 6)
     ([50.0, 80.0], 2.2)
@@ -414,15 +371,23 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
             verified = own.verify(choice, f"graded {len(tried)}")
             tried.append(verified)
         missed, kept = (missed, margin) if verified.met else (margin, kept)
-    chosen = cheapest_met(tuple(tried[1:]))
-    problem = _problem(grid, chosen, tuple(tried))
+    return _graded(grid, cheapest_met(tuple(tried[1:])), tuple(tried))
+
+
+def _graded(grid: _Grid, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...]) -> GradedAllocation:
+    """Return a choice with what proves it: the cheapest by its own models of those that keep the limits."""
+    problem = grid.problem(kept_stacks(chosen, tried, margin=0.0, room=ROUNDING))
+    solution = problem.solve()
+    if solution is None:
+        raise SolveError(f"{chosen.name}: the choice among ladders does not find the design that it was built around.")
+    steps = zip(grid.options, chosen.scales, strict=True)
     return GradedAllocation(
-        space=space,
+        space=grid.space,
         chosen=chosen,
-        tried=tuple(tried),
-        labels=_labels(grid, chosen),
+        tried=tried,
+        labels=tuple(min(own, key=lambda option: abs(option.zone - scale)).label for own, scale in steps),
         problem=problem,
-        solution=_proof(problem, chosen),
+        solution=solution,
         least=_least_cost(grid, chosen),
     )
 
@@ -460,14 +425,6 @@ def _inside(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float) ->
     )
 
 
-def _labels(grid: _Grid, chosen: VerifiedDesign) -> tuple[str, ...]:
-    """Return the name of every zone of a choice."""
-    return tuple(
-        min(options, key=lambda option: abs(option.zone - scale)).label
-        for options, scale in zip(grid.options, chosen.scales, strict=True)
-    )
-
-
 def _least_cost(grid: _Grid, chosen: VerifiedDesign) -> float:
     """Return what no choice near by that keeps the limits costs less than [cost units]."""
 
@@ -480,21 +437,3 @@ def _least_cost(grid: _Grid, chosen: VerifiedDesign) -> float:
         return found[0] if found else np.inf
 
     return least_cost(chosen, cheapest, near_by)
-
-
-def _problem(grid: _Grid, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...]) -> DiscreteProblem:
-    """Return the choices that keep the limits, by the models of the chosen one."""
-    # A load that is its own budget may lie beyond it by rounding.
-    stacks = tuple(
-        replace(stack, budget=stack.budget + 1e-9 * abs(stack.budget))
-        for stack in kept_stacks(chosen, tried, margin=0.0)
-    )
-    return grid.problem(stacks)
-
-
-def _proof(problem: DiscreteProblem, chosen: VerifiedDesign) -> DiscreteSolution:
-    """Return the cheapest of these choices."""
-    found = problem.solve()
-    if found is None:
-        raise SolveError(f"{chosen.name}: the choice among ladders does not find the design that it was built around.")
-    return found

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.search import process_choice
-from tolalloc.allocation.space.joint_yield import JointCheck, JointRequirement
+from tolalloc.allocation.space.joint_yield import JointCheck
 from tolalloc.allocation.space.output_sample import LimitedSample
 from tolalloc.allocation.space.problem import OneSidedConstraint, Solution, Stack, root_sum_square_stack
 from tolalloc.allocation.space.requirement import AtYield, Check, QuantileBound, RootSumSquare, Sampled
@@ -68,8 +68,18 @@ def lower_bound(design: VerifiedDesign) -> LowerBound:
     --------
     Least 1/a + 1/b with (3a)² + (4b)² ≤ 5²: (3^⅔ + 4^⅔)^(3/2)/5 = 1.9731.
 
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
-    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
+    >>> from tolalloc.allocation.space.design_space import DesignSpace
+    >>> from tolalloc.allocation.space.requirement import Requirement
+    >>> from tolalloc.allocation.verify.verification import Verifier
+    >>> from tolalloc.capability.indices import Limits
+    >>> from tolalloc.drawings.seeds import SeedTree
+    >>> import tolalloc as ta
+    >>> row = {"unit": "mm", "min": 1, "max": 60, "cost": 1}
+    >>> rows = [{"id": "a", "plus": 3, "minus": -3, **row}, {"id": "b", "plus": 4, "minus": -4, **row}]
+    >>> space = DesignSpace(errors=ta.Drawing.of_rows(rows).errors)
+    >>> model = ta.model(lambda a, b: a + b, inputs=("a", "b"), outputs=("y [mm]",)).bound(space.errors, "")
+    >>> asked = Requirement(output="y [mm]", limits=Limits(upper=5.0), guarantee=ta.RootSumSquare())
+    >>> verifier = Verifier(space=space, model=model, requirements=(asked,), seeds=SeedTree(1), units=2000)
     >>> round(lower_bound(verifier.verify(verifier.space.uniform(1.0), "as drawn")).cost, 4)
     1.9731
     """
@@ -160,7 +170,7 @@ def _least_of_divisions(design: VerifiedDesign, joint: JointCheck, least: Callab
         rises = np.zeros(len(joint.tails))
         for at, part in zip(counting, upper, strict=True):
             alone = 1 - yields[at]
-            rises[at] = joint.tails[at].rise(min(part * joint.joint.failures, alone), alone)
+            rises[at] = joint.tails[at].extrapolation(min(part * joint.joint.failures, alone), alone)
         return least(rises)
 
     lower, upper = np.zeros(len(counting)), np.ones(len(counting))
@@ -207,7 +217,7 @@ def _coinciding(design: VerifiedDesign, joint: JointCheck) -> float:
     """
     from scipy.stats import beta
 
-    samples = [_sample(design, check) for check in _alone(design)]
+    samples = [_sample(design, check) for check in design.checks_alone]
     excess = np.stack([own.excess for own in samples])
     wider = max(1.0, _COUNTED / (samples[0].units.drawn.units * joint.joint.failures))
     limits = [tail.excess(min(joint.joint.share(at, 1.0, wider), _WIDEST)) for at, tail in enumerate(joint.tails)]
@@ -225,7 +235,7 @@ def _is_certified(design: VerifiedDesign) -> bool:
         return False
     if np.any(shared.upper > shared.lower):
         return False
-    return all(_is_exact(check, design) for check in _alone(design))
+    return all(_is_exact(check, design) for check in design.checks_alone)
 
 
 def _is_exact(check: Check, design: VerifiedDesign) -> bool:
@@ -247,12 +257,11 @@ def _weaker(design: VerifiedDesign) -> list[tuple[int, OneSidedConstraint, Stack
 
     The position of its check stands before it.
     """
-    constraints = sum(len(check.constraints) for check in _alone(design))
     found = []
-    for number, check in enumerate(_alone(design)):
+    for number, check in enumerate(design.checks_alone):
         bounds: tuple[QuantileBound, ...] = ()
         if isinstance(check.requirement.guarantee, Sampled):
-            confidence = 1 - (1 - CONFIDENCE) / (2 * constraints)  # the other half is that of the derivatives
+            confidence = 1 - (1 - CONFIDENCE) / (2 * len(design.alone))  # the other half is that of the derivatives
             bounds = check.requirement.guarantee.counted_bounds(_sample(design, check), 1 - confidence)
         for at, constraint in enumerate(check.constraints):
             if constraint.law and constraint is not max(check.constraints, key=lambda side: side.excess):
@@ -263,11 +272,6 @@ def _weaker(design: VerifiedDesign) -> list[tuple[int, OneSidedConstraint, Stack
                 budget = load - excess + _ROUNDING * (abs(load) + abs(excess))
                 found.append((number, constraint, replace(_touching(constraint, design), budget=budget)))
     return found
-
-
-def _alone(design: VerifiedDesign) -> tuple[Check, ...]:
-    """Return the checks of every limit alone: what keeps all of them at once keeps each of them."""
-    return tuple(check for check in design.checks if not isinstance(check.requirement, JointRequirement))
 
 
 def _sample(design: VerifiedDesign, check: Check) -> LimitedSample:
@@ -301,4 +305,4 @@ def _derivative_error(
         loads = [float(own.load(each[:groups], each[groups:])) for each in (other, design.design)]
         changes.append(loads[0] - loads[1])
     error = float(np.std(changes, ddof=1)) / np.sqrt(len(changes)) if len(changes) > 1 else 0.0
-    return float(norm.ppf(1 - (1 - CONFIDENCE) / (2 * sum(len(check.constraints) for check in _alone(design))))) * error
+    return float(norm.ppf(1 - (1 - CONFIDENCE) / (2 * len(design.alone)))) * error

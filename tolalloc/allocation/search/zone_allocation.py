@@ -152,6 +152,8 @@ def _factor(tried: VerifiedDesign) -> float:
 
 REACH_OF_MODELS = 1.25
 """Ratio of zones up to which designs share their models [-]."""
+ROUNDING = 1e-9
+"""Part of a budget by which rounding may lay a load that is its own budget beyond it [-]."""
 _LARGEST_LOG = float(np.log(REACH_OF_MODELS)) + 1e-9
 _REACH_OF_SETTINGS = 1.0
 """Difference of settings, over ten steps of theirs, up to which they do [-]."""
@@ -233,15 +235,17 @@ def model_range(chosen: VerifiedDesign, tried: Iterable[VerifiedDesign]) -> Mode
         moved = np.abs(own.settings - chosen.settings) / (10 * chosen.space.setting_steps)
         if same or np.abs(np.log(ratios)).max() > _LARGEST_LOG or moved.max(initial=0.0) > _REACH_OF_SETTINGS:
             continue
-        scales = own.space.first_zones * own.scales / chosen.space.first_zones
-        design = np.concatenate([scales, own.design[groups:]])
-        predicted = [float(side.predicted(design) + side.relief @ (scales - chosen.scales)) for side in sides]
+        design = own.design_in(chosen.space)
+        wider = design[:groups] - chosen.scales
+        predicted = [float(side.predicted(design) + side.relief @ wider) for side in sides]
         compared.append(np.abs(np.subtract([side.excess for side in own.alone], predicted)))
     off = np.max(compared, axis=0).tolist() if compared else [float("nan")] * len(sides)
     return ModelRange(factor=REACH_OF_MODELS, designs=len(compared), off=tuple(off))
 
 
-def kept_stacks(chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margin: float) -> tuple[Stack, ...]:
+def kept_stacks(
+    chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margin: float, room: float = 0.0
+) -> tuple[Stack, ...]:
     """Return the models of a design whose budget is what is aimed at, or what the design itself takes of it.
 
     Parameters
@@ -250,6 +254,8 @@ def kept_stacks(chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margi
         All designs of its search, which tell how lucky its own sample was.
     margin
         How far inside each limit the aim is; 0 for the limits themselves [standard errors].
+    room
+        Part of a budget that is added, as rounding may lay a load that is its own budget beyond it [-].
 
     Notes
     -----
@@ -257,7 +263,8 @@ def kept_stacks(chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margi
     """
     loads = [float(constraint.stack.load(chosen.scales, chosen.settings)) for constraint in chosen.constraints]
     stacks = aimed(chosen, list(tried), margin)
-    return tuple(replace(stack, budget=max(stack.budget, load)) for stack, load in zip(stacks, loads, strict=True))
+    budgets = [max(stack.budget, load) for stack, load in zip(stacks, loads, strict=True)]
+    return tuple(replace(own, budget=most + room * abs(most)) for own, most in zip(stacks, budgets, strict=True))
 
 
 def step_from(
@@ -314,8 +321,16 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
     --------
     Least 1/a + 1/b with (3a)² + (4b)² ≤ 5² is where a/b = (4/3)^⅔.
 
-    >>> from tolalloc.allocation.verify.verification import verifier_of_sum
-    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
+    >>> from tolalloc.allocation.space.requirement import Requirement
+    >>> from tolalloc.capability.indices import Limits
+    >>> from tolalloc.drawings.seeds import SeedTree
+    >>> import tolalloc as ta
+    >>> row = {"unit": "mm", "min": 1, "max": 60, "cost": 1}
+    >>> rows = [{"id": "a", "plus": 3, "minus": -3, **row}, {"id": "b", "plus": 4, "minus": -4, **row}]
+    >>> space = DesignSpace(errors=ta.Drawing.of_rows(rows).errors)
+    >>> model = ta.model(lambda a, b: a + b, inputs=("a", "b"), outputs=("y [mm]",)).bound(space.errors, "")
+    >>> asked = Requirement(output="y [mm]", limits=Limits(upper=5.0), guarantee=ta.RootSumSquare())
+    >>> verifier = Verifier(space=space, model=model, requirements=(asked,), seeds=SeedTree(1), units=2000)
     >>> start = verifier.verify(verifier.space.uniform(1.0), "as drawn")
     >>> step_to_optimum(verifier, start, steps=3, reach=2.0)[-1].scales.round(3).tolist()
     [1.121, 0.925]
@@ -323,7 +338,8 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
     space, tried = verifier.space, [start]
     programs, processes = Programs(space, len(start.constraints)), space.process_positions(start.design)
     for step in range(steps + _REPAIRS):
-        if step >= steps and not _is_worth_mending(tried):
+        kept = [own.cost for own in tried if own.met]
+        if step >= steps and (tried[-1].met or tried[-1].cost >= (1 - SETTLED) * min(kept, default=np.inf)):
             break
         processes = programs.choose(aimed(tried[-1], tried), processes)
         if step < _DIVIDING_STEPS:
@@ -369,12 +385,6 @@ def _divided(
         else:
             way /= 2
     return last
-
-
-def _is_worth_mending(tried: list[VerifiedDesign]) -> bool:
-    """Return whether the last design keeps not all limits and is cheaper than every one that does."""
-    kept = [own.cost for own in tried if own.met]
-    return not tried[-1].met and tried[-1].cost < (1 - SETTLED) * min(kept, default=np.inf)
 
 
 def _explains(last: VerifiedDesign, new: VerifiedDesign) -> bool:
@@ -464,13 +474,8 @@ class ZoneAllocation:
         return found
 
     @property
-    def saving(self) -> float:
-        """Cost saved against proportional scaling, as a share of its cost [-]."""
-        return 1 - self.chosen.cost / self.proportional.cost
-
-    @property
     def saving_at_least(self) -> float:
-        """The same had proportional scaling used the limit to its last arcsecond: so its cost moved with it [-].
+        """Cost saved against proportional scaling that uses its limit up, as a share of its cost [-].
 
         The quantile grows nearly in proportion to a common scale of all zones, and the cost falls with it.
         """
@@ -488,10 +493,7 @@ def _cheapest_by_models(
     space: DesignSpace, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margin: float
 ) -> Solution:
     """Return the cheapest design that the models of a verified one let keep the limits, as far inside as it is."""
-    # A load that is its own budget may lie beyond it by rounding.
-    kept = kept_stacks(chosen, tried, margin)
-    stacks = tuple(replace(stack, budget=stack.budget + 1e-9 * abs(stack.budget)) for stack in kept)
-    found = process_choice.allocate(space.problem(stacks))
+    found = process_choice.allocate(space.problem(kept_stacks(chosen, tried, margin, ROUNDING)))
     if not isinstance(found, Solution):
         raise SolveError(f"{chosen.name}: the convex program does not find the design that it was built around.")
     return found

@@ -133,7 +133,7 @@ class DesignSpace:
 
     def _processes(self, group: str) -> tuple[Process, ...]:
         """Return the processes that all members of a group have."""
-        members = self._members(group)
+        members = self.members(group)
         known = [{made.name for made in self._ways(source)} for source in members]
         common = [made.name for made in self._ways(members[0]) if all(made.name in names for names in known)]
         if not common:
@@ -160,9 +160,10 @@ class DesignSpace:
     @cached_property
     def first_zones(self) -> Float[np.ndarray, " group"]:
         """Zone of the first member of every group in the tolerance table [m]."""
-        return np.array([self._members(group)[0].zone for group in self.groups])
+        return np.array([self.members(group)[0].zone for group in self.groups])
 
-    def _members(self, group: str) -> list[Source]:
+    def members(self, group: str) -> list[Source]:
+        """Return the sources of a group."""
         return [source for source in self.errors.active if not source.locked and source.dimension == group]
 
     def zones(self, design: Float[np.ndarray, " variable"]) -> Float[np.ndarray, " source"]:
@@ -192,7 +193,7 @@ class DesignSpace:
         usual = STEPS if drawn is not None and drawn.finest else ()
         found, zones = design.copy(), {own.name: own.zone for own in self.errors.sources}
         for at, group in enumerate(self.groups):
-            members, scale = self._members(group), float(design[at])
+            members, scale = self.members(group), float(design[at])
             if abs(scale - 1.0) <= _ROUNDING:
                 continue
             rounded = [own.rounded_down(own.zone * scale, usual) for own in members]

@@ -8,7 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-from tolalloc.allocation.space.output_sample import Control, DesignSample, LimitedSample, OutputSample, Surprises
+from tolalloc.allocation.space.output_sample import (
+    ControlPlane,
+    ControlResiduals,
+    DesignSample,
+    LimitedSample,
+    OutputSample,
+)
 from tolalloc.allocation.space.problem import OneSidedConstraint, Stack
 from tolalloc.allocation.space.requirement import AtYield, Check, QuantileBound, Requirement
 from tolalloc.capability.halving import halved
@@ -79,12 +85,8 @@ class JointRequirement(Requirement):
 
     def read(self, values: Mapping[str, Float[np.ndarray, " unit"]]) -> Float[np.ndarray, " unit"]:
         """Return the largest excess of every unit [-]."""
-        excesses = [
-            sign * (values[own.output] - limit) / (abs(limit) or 1.0)
-            for own in self.requirements
-            for sign, limit in own.limits.turned
-        ]
-        return np.asarray(np.max(excesses, axis=0))
+        excesses = [own.limits.excess(values[own.output], relative=True) for own in self.requirements]
+        return np.asarray(np.concatenate(excesses).max(axis=0))
 
     def controls(
         self,
@@ -92,7 +94,7 @@ class JointRequirement(Requirement):
         planes: Mapping[str, Float[np.ndarray, " unit"]],
         *,
         relative: bool = True,  # noqa: ARG002
-    ) -> tuple[Control, ...]:
+    ) -> tuple[ControlPlane, ...]:
         """Return the planes near all that is limited, with an excess over the limit."""
         return tuple(plane for own in self.requirements for plane in own.controls(nearest, planes, relative=True))
 
@@ -106,7 +108,7 @@ class JointRequirement(Requirement):
         """Return whether all limits are kept at once; the search is steered by the limits."""
         values = self.read({own: sample.units.values(own) for own in self.outputs})
         controls = self.controls(sample.units.nearest, sample.units.planes)
-        limited = LimitedSample.all_of(values, self.limits, None, controls, sample.units.doubt(values))
+        limited = LimitedSample.all_of(values, self.limits, None, controls, sample.units.uncertainty(values))
         (bound,) = self.guarantee.bounds(limited, sample.confidence)
         nothing, settings = np.zeros(sample.groups), np.zeros(sample.design.size - sample.groups)
         verdict = OneSidedConstraint(
@@ -140,7 +142,7 @@ class JointRequirement(Requirement):
 
 @dataclass(frozen=True, kw_only=True)
 class Tail:
-    """How far units lie beyond the limits of an output, over the share of units that lie further beyond.
+    """Tail of an output: excess over its limit as a function of the failing share.
 
     Notes
     -----
@@ -160,8 +162,8 @@ class Tail:
     @classmethod
     def of(cls, sample: LimitedSample, share: float) -> Tail:
         """Return the tail of units around a share of failures [-]."""
-        margin = sample.doubt.margin(sample.limits, share) if sample.doubt else 0.0
-        return replace(cls._counted(replace(sample, doubt=None), share), margin=margin)
+        margin = sample.uncertainty.margin(sample.limits, share) if sample.uncertainty else 0.0
+        return replace(cls._counted(replace(sample, uncertainty=None), share), margin=margin)
 
     @classmethod
     def _counted(cls, sample: LimitedSample, share: float) -> Tail:
@@ -181,7 +183,7 @@ class Tail:
         error = error if sample.controls else max(error, float(counted))
         return cls(share=share, limits=limits, bounds=bounds, slope=slope, error=error)
 
-    def rise(self, share: float, before: float | None = None) -> float:
+    def extrapolation(self, share: float, before: float | None = None) -> float:
         """Return how much further out another share of failures is than one before it [unit of the output]."""
         from scipy.special import ndtri
 
@@ -192,10 +194,10 @@ class Tail:
 
     def excess(self, share: float) -> float:
         """Return how far beyond the limits a share of the units lies further out than [unit of the output]."""
-        return max(own.excess for own in self.bounds) + self.rise(share)
+        return max(own.excess for own in self.bounds) + self.extrapolation(share)
 
     @property
-    def failing(self) -> float:
+    def failing_share(self) -> float:
         """Share of units that fail the limits [-]."""
         from scipy.special import ndtr, ndtri
 
@@ -206,12 +208,12 @@ class Tail:
             return float(beyond > 0)
         return float(ndtr(ndtri(self.share) + beyond / self.slope))
 
-    def bounds_at(self, share: float, doubt: float = 0.0) -> tuple[QuantileBound, ...]:
+    def bounds_at(self, share: float, relative_error: float = 0.0) -> tuple[QuantileBound, ...]:
         """Return what of each limit is left to a share of failures, which has a relative standard error [-]."""
-        rise = self.rise(share)
-        by_share = self.rise(share * max(1 - doubt, _LEAST_PART), share) if doubt else 0.0
+        by = self.extrapolation(share)
+        by_share = self.extrapolation(share * max(1 - relative_error, _LEAST_PART), share) if relative_error else 0.0
         error = float(np.hypot(self.error, by_share))
-        return tuple(replace(own.further(rise + self.margin), standard_error=error) for own in self.bounds)
+        return tuple(replace(own.moved_out(by + self.margin), standard_error=error) for own in self.bounds)
 
 
 def _slope(sample: LimitedSample, share: float) -> float:
@@ -251,14 +253,23 @@ def _overlap(
         limits = [tail.excess(joint.share(at, overlap, wider)) for at, tail in enumerate(tails)]
         return np.asarray((excesses > np.array(limits)[:, np.newaxis]).any(axis=0))
 
-    low, high = np.log(_LEAST_PART), np.log(1 / min(joint.parts))
-    counted = beyond(float(np.exp(high)))
+    counted = beyond(_most_overlap(joint))
     excesses, weights = excesses[:, counted], weights[counted]
-    if weights.sum() > room:
-        low = halved(lambda by: weights[beyond(float(np.exp(by)))].sum() <= room, low, high, _HALVINGS)
-    else:
-        low = high
-    return float(np.exp(low)) * (1.0 if wider == 1.0 else max(allowed, 0.5) / (joint.failures * drawn))
+    found = _largest_overlap(joint, lambda overlap: weights[beyond(overlap)].sum() <= room)
+    return found * (1.0 if wider == 1.0 else max(allowed, 0.5) / (joint.failures * drawn))
+
+
+def _most_overlap(joint: JointRequirement) -> float:
+    """Return κ with which a limit may take all failures [-]."""
+    return float(np.exp(np.log(1 / min(joint.parts))))
+
+
+def _largest_overlap(joint: JointRequirement, holds: Callable[[float], bool]) -> float:
+    """Return the largest κ for which something holds, by halving its logarithm [-]."""
+    if holds(_most_overlap(joint)):
+        return _most_overlap(joint)
+    low, high = np.log(_LEAST_PART), np.log(1 / min(joint.parts))
+    return float(np.exp(halved(lambda by: holds(float(np.exp(by))), low, high, _HALVINGS)))
 
 
 def _controlled_overlap(
@@ -269,10 +280,9 @@ def _controlled_overlap(
     Notes
     -----
     Σ fᵢ of what is linear is exact, and units tell by how much fewer fail, since some fail two limits, and what fails
-    beside it (`Surprises`): κ is the largest with which no more than is allowed is shown; by halving, in 24 steps.
+    beside it (`ControlResiduals`): κ is the largest with which no more than is allowed is shown; by 24 halvings.
     """
-    high = float(np.log(1 / min(joint.parts)))
-    furthest = [tail.excess(joint.share(at, float(np.exp(high)))) for at, tail in enumerate(tails)]
+    furthest = [tail.excess(joint.share(at, _most_overlap(joint))) for at, tail in enumerate(tails)]
     counted = np.zeros(samples[0].values.size, bool)
     for own, limit in zip(samples, furthest, strict=True):
         counted |= own.excess > limit
@@ -281,7 +291,7 @@ def _controlled_overlap(
     excesses = [own.excess[counted] for own in samples]
     planes = [[plane.excess[counted] for plane in own.controls] for own in samples]
 
-    def surprises(overlap: float) -> Surprises:
+    def residuals(overlap: float) -> ControlResiduals:
         fails, called, by_law = np.zeros(excesses[0].size, bool), np.zeros(excesses[0].size, int), 0.0
         for at, (tail, own) in enumerate(zip(tails, samples, strict=True)):
             limit = tail.excess(joint.share(at, overlap))
@@ -289,15 +299,10 @@ def _controlled_overlap(
             for plane, of_unit in zip(own.controls, planes[at], strict=True):
                 called += of_unit > limit
                 by_law += plane.share(limit)
-        return Surprises.among(fails, called, by_law, counted.size)
+        return ControlResiduals.among(fails, called, by_law, counted.size)
 
-    low = float(np.log(_LEAST_PART))
-    if surprises(float(np.exp(high))).share(confidence) > joint.failures:
-        low = halved(lambda by: surprises(float(np.exp(by))).share(confidence) <= joint.failures, low, high, _HALVINGS)
-    else:
-        low = high
-    overlap = float(np.exp(low))
-    return overlap, surprises(overlap).standard_error / joint.failures
+    found = _largest_overlap(joint, lambda overlap: residuals(overlap).share(confidence) <= joint.failures)
+    return found, residuals(found).standard_error / joint.failures
 
 
 Modelled = Callable[[Check, tuple[QuantileBound, ...], int], tuple[OneSidedConstraint, ...]]
@@ -327,10 +332,10 @@ class JointCheck(Check):
 
         pᵢ ∝ P(eᵢ > 0) by the tail of the output (own derivation): so all limits are reached by one factor of all zones.
         """
-        return self._parts(np.array([tail.failing for tail in self.tails]), 1.0)
+        return self._parts(np.array([tail.failing_share for tail in self.tails]), 1.0)
 
     def parts_towards(
-        self, of_limit: tuple[int, ...], prices: Float[np.ndarray, " side"], way: float
+        self, of_limit: tuple[int, ...], prices: Float[np.ndarray, " side"], portion: float
     ) -> tuple[float, ...]:
         """Return the parts of the failures nearer to those at which no other division would be cheaper.
 
@@ -340,7 +345,7 @@ class JointCheck(Check):
             Number of constraints of every limit [-].
         prices
             Shadow price of every constraint that steers the search [cost units per unit of the output].
-        way
+        portion
             How far the parts go there from the present ones [-].
 
         Notes
@@ -349,13 +354,13 @@ class JointCheck(Check):
         fᵢ ∝ λᵢ·sᵢ (own derivation).
         """
         own = np.array([part.sum() for part in np.split(prices, np.cumsum(of_limit)[:-1])])
-        return self._parts(own * [tail.slope for tail in self.tails], way)
+        return self._parts(own * [tail.slope for tail in self.tails], portion)
 
-    def _parts(self, weights: Float[np.ndarray, " limit"], way: float) -> tuple[float, ...]:
-        """Return parts on the way to some in proportion to weights; a limit without weight keeps 2 %."""
+    def _parts(self, weights: Float[np.ndarray, " limit"], portion: float) -> tuple[float, ...]:
+        """Return parts nearer by a portion to those in proportion to weights; a limit without weight keeps 2 %."""
         if not weights.sum() > 0:
             return self.joint.parts
-        parts = np.maximum(way * weights / weights.sum() + (1 - way) * np.array(self.joint.parts), _LEAST_PART)
+        parts = np.maximum(portion * weights / weights.sum() + (1 - portion) * np.array(self.joint.parts), _LEAST_PART)
         return tuple((parts / parts.sum()).tolist())
 
 
@@ -382,13 +387,15 @@ def tightened(
     limited = [samples(check.requirement) for check in own]
     tails = tuple(Tail.of(sample, joint.failures) for sample in limited)
     if any(sample.controls for sample in limited):
-        overlap, doubt = _controlled_overlap(joint, tails, limited, confidence)
+        overlap, relative_error = _controlled_overlap(joint, tails, limited, confidence)
     else:
-        overlap, doubt = _overlap(joint, tails, limited, confidence), 0.0
+        overlap, relative_error = _overlap(joint, tails, limited, confidence), 0.0
     found = JointCheck(requirement=joint, constraints=last.constraints, tightened=(), tails=tails, overlap=overlap)
     steered = []
     for at, (check, tail, share) in enumerate(zip(own, tails, found.shares, strict=True)):
-        steered.append(replace(check, tightened=(*_apart(check), *modelled(check, tail.bounds_at(share, doubt), at))))
+        steered.append(
+            replace(check, tightened=(*_apart(check), *modelled(check, tail.bounds_at(share, relative_error), at)))
+        )
     return (*steered, found)
 
 
@@ -405,28 +412,28 @@ def divided(checks: tuple[Check, ...], parts: tuple[float, ...]) -> tuple[Check,
     found = replace(last, requirement=replace(last.joint, parts=parts))
     moved = []
     for check, tail, before, share in zip(own, last.tails, last.shares, found.shares, strict=True):
-        rise, apart = tail.rise(share, before), len(_apart(check))
+        by, apart = tail.extrapolation(share, before), len(_apart(check))
         moved.append(
             replace(
-                check, tightened=(*check.steering[:apart], *(_moved(side, rise) for side in check.steering[apart:]))
+                check, tightened=(*check.steering[:apart], *(_moved_out(side, by) for side in check.steering[apart:]))
             )
         )
     return (*moved, found)
 
 
-def _moved(side: OneSidedConstraint, rise: float) -> OneSidedConstraint:
+def _moved_out(side: OneSidedConstraint, by: float) -> OneSidedConstraint:
     """Return a constraint whose value lies further out."""
-    stack = replace(side.stack, budget=side.stack.budget - rise)
-    return replace(side, value=side.value + side.sign * rise, stack=stack)
+    stack = replace(side.stack, budget=side.stack.budget - by)
+    return replace(side, value=side.value + side.sign * by, stack=stack)
 
 
 def limited_by(sample: DesignSample) -> Callable[[Requirement], LimitedSample]:
-    """Return what tells of a requirement what units of a search say of it."""
+    """Return a reader that gives, for a requirement, the sample it is judged on."""
 
     def read(requirement: Requirement) -> LimitedSample:
         values = requirement.read({own: sample.values(own) for own in requirement.outputs})
         controls = requirement.controls(sample.nearest, sample.planes)
-        law, doubt = sample.laws.get(requirement.output), sample.doubt(values)
-        return LimitedSample.all_of(values, requirement.limits, law, controls, doubt)
+        law, uncertainty = sample.laws.get(requirement.output), sample.uncertainty(values)
+        return LimitedSample.all_of(values, requirement.limits, law, controls, uncertainty)
 
     return read

@@ -14,14 +14,13 @@ from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.halving import halved
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.linear_function import LinearFunction, LinearLaw, NearPlane
-from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo, ProcessDoubt
+from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo, ProcessUncertainty
 from tolalloc.capability.near_limit import SolvedUnits, largest_first
 from tolalloc.capability.worst_unit import worst_unit
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError
-from tolalloc.models.differences import derived
-from tolalloc.models.model import Evaluation, Model, ResponseWithDerivatives, SettingDerivatives, is_fast
+from tolalloc.models.model import Evaluation, Model, ResponseWithDerivatives, SettingDerivatives, derived, is_fast
 from tolalloc.sensitivity.derivatives import mean_slope
 
 _EVEN_ODDS, _TENTH = 0.5, 0.1
@@ -33,7 +32,7 @@ _STEP = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Control:
+class ControlPlane:
     """A plane through an output whose law is known: what units say beside it bounds what they do.
 
     Notes
@@ -51,16 +50,12 @@ class Control:
     @cached_property
     def excess(self) -> Float[np.ndarray, " solved"]:
         """How far every unit lies beyond the limits by the plane [unit of the output, or -]."""
-        sides = [sign * (self.values - limit) / self._scale(limit) for sign, limit in self.limits.turned]
-        return np.asarray(np.max(sides, axis=0))
+        return np.asarray(self.limits.excess(self.values, relative=self.relative).max(axis=0))
 
     def share(self, by: float) -> float:
         """Return the share of units that the plane has further beyond a limit than so far [-]."""
-        turned = self.limits.turned
-        return sum(self.near.share_above(sign, limit + sign * by * self._scale(limit)) for sign, limit in turned)
-
-    def _scale(self, limit: float) -> float:
-        return abs(limit) or 1.0 if self.relative else 1.0
+        sides = [(sign, limit, (abs(limit) or 1.0) if self.relative else 1.0) for sign, limit in self.limits.turned]
+        return sum(self.near.share_above(sign, limit + sign * by * scale) for sign, limit, scale in sides)
 
 
 def _half(error: float) -> float:
@@ -85,7 +80,7 @@ def _half(error: float) -> float:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Surprises:
+class ControlResiduals:
     """Units of which planes say something else than the units themselves, and what the planes say of all units."""
 
     units: int  # All [-]
@@ -97,7 +92,7 @@ class Surprises:
     @classmethod
     def among(
         cls, fails: Bool[np.ndarray, " unit"], called: Int[np.ndarray, " unit"], by_law: float, units: int
-    ) -> Surprises:
+    ) -> ControlResiduals:
         """Return those among units that hold all that fail or are called, of so many."""
         v = fails.astype(int) - called
         return cls(
@@ -117,8 +112,8 @@ class Surprises:
 
         Examples
         --------
-        >>> surprises = Surprises(units=1000, more=0, fewer=0, sum=0, by_law=0.01)
-        >>> round(surprises.share(0.95), 6)  # 0.01 + 1 − 0.025^(1/1000)
+        >>> residuals = ControlResiduals(units=1000, more=0, fewer=0, sum=0, by_law=0.01)
+        >>> round(residuals.share(0.95), 6)  # 0.01 + 1 − 0.025^(1/1000)
         0.013682
         """
         if confidence == _EVEN_ODDS:
@@ -151,8 +146,8 @@ class LimitedSample:
     limits: Limits  # [unit of the output]
     law: LinearLaw | None = None  # Law of the output, known before these units were drawn or the same units' own
     leaving: int = 0  # Units solved whatever was predicted whose value the law does not give [-]
-    controls: tuple[Control, ...] = ()  # Planes near what is limited, none where not all units were solved
-    doubt: ProcessDoubt | None = None  # What measured parts leave open of what is limited
+    controls: tuple[ControlPlane, ...] = ()  # Planes near what is limited, none where not all units were solved
+    uncertainty: ProcessUncertainty | None = None  # What measured parts leave open of what is limited
 
     @classmethod
     def all_of(
@@ -160,12 +155,12 @@ class LimitedSample:
         values: Float[np.ndarray, " unit"],
         limits: Limits,
         law: LinearLaw | None = None,
-        controls: tuple[Control, ...] = (),
-        doubt: ProcessDoubt | None = None,
+        controls: tuple[ControlPlane, ...] = (),
+        uncertainty: ProcessUncertainty | None = None,
     ) -> LimitedSample:
         """Return plain random units, all of which were solved."""
         units = SolvedUnits.all_of(values.size)
-        return cls(values=values, units=units, limits=limits, law=law, controls=controls, doubt=doubt)
+        return cls(values=values, units=units, limits=limits, law=law, controls=controls, uncertainty=uncertainty)
 
     def side(self, sign: int) -> LimitedSample:
         """Return the units with the limit of one side."""
@@ -189,25 +184,25 @@ class LimitedSample:
 
         Notes
         -----
-        By halving, in 40 steps, where `Surprises.share` is the share; on the right side of the limits themselves.
+        By halving, in 40 steps, where `ControlResiduals.share` is the share; on the right side of the limits.
         """
         own, planes = self._furthest(share)
         ends = np.maximum(own, planes.max(axis=0))
         finite = ends[np.isfinite(ends)]
 
-        def surprises(by: float) -> Surprises:
+        def residuals(by: float) -> ControlResiduals:
             called = sum(control.share(by) for control in self.controls)
-            return Surprises.among(own > by, (planes > by).sum(axis=0), called, self.values.size)
+            return ControlResiduals.among(own > by, (planes > by).sum(axis=0), called, self.values.size)
 
-        if not finite.size or surprises(float(finite.max())).share(confidence) > share:
+        if not finite.size or residuals(float(finite.max())).share(confidence) > share:
             return np.inf, np.nan
         low, high = float(finite.min()), float(finite.max())
         if low < 0 < high:
-            low, high = (low, 0.0) if surprises(0.0).share(confidence) <= share else (0.0, high)
-        high = float(halved(lambda by: surprises(by).share(confidence) <= share, high, low, _HALVINGS))
+            low, high = (low, 0.0) if residuals(0.0).share(confidence) <= share else (0.0, high)
+        high = float(halved(lambda by: residuals(by).share(confidence) <= share, high, low, _HALVINGS))
         step = _STEP * (float(np.ptp(finite)) or 1.0)
         fall = sum(control.share(high - step) - control.share(high + step) for control in self.controls) / (2 * step)
-        return high, surprises(high).standard_error / max(fall, np.finfo(float).tiny)
+        return high, residuals(high).standard_error / max(fall, np.finfo(float).tiny)
 
     def _furthest(self, share: float) -> tuple[Float[np.ndarray, " few"], Float[np.ndarray, "control few"]]:
         """Return how far the units furthest beyond the limits lie, by themselves and by every plane.
@@ -347,10 +342,10 @@ class DesignSample:
         """What these planes say of every unit [unit of the output]."""
         return {output: near(self.x) for output, near in self.nearest.items()}
 
-    def doubt(self, values: Float[np.ndarray, " unit"]) -> ProcessDoubt | None:
+    def uncertainty(self, values: Float[np.ndarray, " unit"]) -> ProcessUncertainty | None:
         """Return what measured parts leave open of what the units have, not a number where one has none."""
-        doubting = ProcessDoubt.about(self.space.errors, self.x)
-        return doubting(values) if doubting else None
+        uncertainty_of = ProcessUncertainty.about(self.space.errors, self.x)
+        return uncertainty_of(values) if uncertainty_of else None
 
     def sensitivity(self, output: str) -> Float[np.ndarray, " source"]:
         """Return the change of an output with a deviation of each source; one of `exact` [unit of the output per m].
@@ -500,23 +495,18 @@ class OutputSample:
         values = self.units.values(self.output)
         return np.asarray(values[np.isfinite(values)])
 
-    @property
-    def failed(self) -> int:
-        """Number of units without a usable answer [-]."""
-        return len(self.units.standard) - self.values.size
-
     def limited(self, limits: Limits) -> LimitedSample:
         """Return what the units say of limits; a search solves all of them."""
         if near := self.near:
-            control = Control(near=near, values=self.units.planes[self.output], limits=limits)
-            return LimitedSample.all_of(self.units.values(self.output), limits, None, (control,), self.doubt)
-        values = np.append(self.values, np.full(self.failed, np.nan))
-        return LimitedSample.all_of(values, limits, self.law, doubt=self.doubt)
+            control = ControlPlane(near=near, values=self.units.planes[self.output], limits=limits)
+            return LimitedSample.all_of(self.units.values(self.output), limits, None, (control,), self.uncertainty)
+        values = np.append(self.values, np.full(len(self.units.standard) - self.values.size, np.nan))
+        return LimitedSample.all_of(values, limits, self.law, uncertainty=self.uncertainty)
 
     @cached_property
-    def doubt(self) -> ProcessDoubt | None:
+    def uncertainty(self) -> ProcessUncertainty | None:
         """What measured parts leave open of the output."""
-        return self.units.doubt(self.units.values(self.output))
+        return self.units.uncertainty(self.units.values(self.output))
 
     @property
     def near(self) -> NearPlane | None:

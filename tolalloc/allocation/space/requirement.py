@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.allocation.space.output_sample import Control, DesignSample, LimitedSample, OutputSample
+from tolalloc.allocation.space.output_sample import ControlPlane, DesignSample, LimitedSample, OutputSample
 from tolalloc.allocation.space.problem import OneSidedConstraint, Stack, root_sum_square_stack, worst_case_stack
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.linear_function import LinearLaw, NearPlane
@@ -43,7 +43,7 @@ class QuantileBound:
     value: float  # What is compared with the limit, infinite where too few units answered [unit of the output]
     standard_error: float  # Standard error of the value [unit of the output]
 
-    def further(self, by: float) -> QuantileBound:
+    def moved_out(self, by: float) -> QuantileBound:
         """Return the bound with a value that lies further out [unit of the output]."""
         return replace(self, value=self.value + self.sign * by)
 
@@ -65,14 +65,14 @@ def _order_statistic(sample: LimitedSample, sign: Literal[1, -1], limit: float, 
     C. J. Clopper, E. S. Pearson, Biometrika 26 (1934) 404–413; G. J. Hahn, W. Q. Meeker, Statistical Intervals (1991).
     """
     turned = np.where(np.isfinite(sample.values), sign * sample.values, np.inf)
-    further = min(int(np.count_nonzero(turned - sign * limit > beyond)), turned.size - 1)
-    outermost = largest_first(turned, _SURROUNDED * further + _SURROUNDING)
+    rank = min(int(np.count_nonzero(turned - sign * limit > beyond)), turned.size - 1)
+    outermost = largest_first(turned, _SURROUNDED * rank + _SURROUNDING)
     return QuantileBound(
         sign=sign,
         limit=limit,
-        value=sign * (float(turned[outermost[further]]) if np.isfinite(beyond) else np.inf),
+        value=sign * (float(turned[outermost[rank]]) if np.isfinite(beyond) else np.inf),
         standard_error=_order_statistic_error(
-            turned[outermost], sample.units.stand_for[outermost], further, float(sample.units.stand_for.sum())
+            turned[outermost], sample.units.stand_for[outermost], rank, float(sample.units.stand_for.sum())
         ),
     )
 
@@ -108,7 +108,7 @@ def bounds_of_law(sample: LimitedSample, law: LinearLaw, beyond: float) -> tuple
 
 
 def _order_statistic_error(
-    outermost: Float[np.ndarray, " unit"], stand_for: Float[np.ndarray, " unit"], further: int, drawn: float
+    outermost: Float[np.ndarray, " unit"], stand_for: Float[np.ndarray, " unit"], rank: int, drawn: float
 ) -> float:
     """Return the standard error of the value that so many of the outermost ones lie further beyond than [unit of it].
 
@@ -118,10 +118,10 @@ def _order_statistic_error(
     """
     from scipy.stats import beta
 
-    above = stand_for[:further] if further else stand_for[:1]
+    above = stand_for[:rank] if rank else stand_for[:1]
     equal = drawn * above.sum() / (above @ above)
     places = np.append(0.0, np.cumsum(stand_for)) / drawn
-    at = equal * places[further]
+    at = equal * places[rank]
     weights, finite = np.diff(beta.cdf(places, at + 1, equal - at)), np.isfinite(outermost)
     weights, outermost = weights[finite], outermost[finite]
     return float(np.sqrt(weights @ (outermost - weights @ outermost) ** 2))
@@ -164,7 +164,7 @@ class Sampled(Guarantee, Protocol):
         ...
 
     def counted_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
-        """Return the same of what units show without doubt of their processes; below even odds what it is at least."""
+        """Return the same for processes as their measured parts say; below even odds what it is at least."""
         ...
 
 
@@ -183,7 +183,7 @@ class AtYield(NamedFields):
     sample may reject. So they are inside exactly where the bound of the yield reaches the target, Clopper–Pearson's
     where all units were solved. Where the output is linear in the deviations, its exact law takes their place. Where
     parts were measured, the values lie further out by what keeps the target with 95 % of the processes that these
-    leave possible (`tolalloc.capability.monte_carlo.ProcessDoubt`).
+    leave possible (`tolalloc.capability.monte_carlo.ProcessUncertainty`).
 
     Two limits are kept by so many units together, one excess beyond either deciding. What is told of a side is its own
     quantile: that of half of the failures, or of as many as lie there where these are more.
@@ -225,8 +225,8 @@ class AtYield(NamedFields):
 
     def bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what units show of every limit, or what its law does where they keep to it."""
-        margin = sample.doubt.margin(sample.limits, 1 - self.target) if sample.doubt else 0.0
-        found = tuple(bound.further(margin) for bound in self.counted_bounds(sample, confidence))
+        margin = sample.uncertainty.margin(sample.limits, 1 - self.target) if sample.uncertainty else 0.0
+        found = tuple(bound.moved_out(margin) for bound in self.counted_bounds(sample, confidence))
         if len(found) == 1:
             return found
         half = AtYield((1 + self.target) / 2)
@@ -306,9 +306,9 @@ class AtCpk(NamedFields):
     def bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what units show of every limit."""
         found = self.counted_bounds(sample, confidence)
-        if sample.doubt is None:
+        if sample.uncertainty is None:
             return found
-        return tuple(own.further(sample.doubt.margin_of_spread(own.sign, 3 * self.target)) for own in found)
+        return tuple(own.moved_out(sample.uncertainty.margin_of_spread(own.sign, 3 * self.target)) for own in found)
 
     def counted_bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what units show of processes that are as their measured parts say."""
@@ -361,7 +361,9 @@ def _spread_constraint(sample: OutputSample, bound: QuantileBound, limits: Limit
     for sign, limit in limits.turned:
         part, at = (own, value) if sign == bound.sign else (1.0 - own, sign * limit + excess)
         weights += part * sign * spread_weights(sign * sample.values, sign * known, at)
-    gradient, batches = weights @ derivative / weights.size, _batches(weights, derivative)
+    gradient = weights @ derivative / weights.size
+    split = (np.array_split(each, min(_BATCHES, weights.size)) for each in (weights, derivative))
+    batches = np.stack([own @ slopes / own.size for own, slopes in zip(*split, strict=True)])
     if sample.law:
         gradient[:groups] = sample.units.space.by_scale(sample.law.excess_by_zone(limits, excess))
         batches[:, :groups] = gradient[:groups]
@@ -407,15 +409,6 @@ def spread_weights(
     """
     spread = (value - values.mean()) / values.std() if values.std() > 0 else 0.0
     return np.asarray(1.0 + spread * (known - known.mean()) / (known.std() or 1.0))
-
-
-def _batches(
-    weights: Float[np.ndarray, " known"], derivative: Float[np.ndarray, "known variable"]
-) -> Float[np.ndarray, "batch variable"]:
-    """Return the same derivative by batches of units."""
-    parts = min(_BATCHES, weights.size)
-    split = (np.array_split(each, parts) for each in (weights, derivative))
-    return np.stack([own @ slopes / own.size for own, slopes in zip(*split, strict=True)])
 
 
 _MISSED = 0.005
@@ -545,7 +538,7 @@ class Requirement:
         planes: Mapping[str, Float[np.ndarray, " unit"]],
         *,
         relative: bool = False,
-    ) -> tuple[Control, ...]:
+    ) -> tuple[ControlPlane, ...]:
         """Return the planes near what is limited.
 
         Parameters
@@ -560,7 +553,7 @@ class Requirement:
         if self.output not in nearest:
             return ()
         near, values = nearest[self.output], planes[self.output]
-        return (Control(near=near, values=values, limits=self.limits, relative=relative),)
+        return (ControlPlane(near=near, values=values, limits=self.limits, relative=relative),)
 
     def check(self, sample: OutputSample) -> Check:
         """Return how a design stands against the requirement."""
@@ -580,9 +573,8 @@ class OwnLimit(Requirement):
 
     most: float  # Limit at the settings of the study [unit of the output]
 
-    slopes: tuple[
-        float, ...
-    ] = ()  # Change of the limit with every setting [unit of the output per unit of the setting]
+    # Change of the limit with every setting [unit of the output per unit of the setting]
+    slopes: tuple[float, ...] = ()
 
     def at(
         self, model: Model, settings: Float[np.ndarray, " setting"], steps: Float[np.ndarray, " setting"]

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.space.design_space import DesignSpace
-from tolalloc.allocation.space.joint_yield import JointRequirement, tightened
+from tolalloc.allocation.space.joint_yield import tightened
 from tolalloc.allocation.space.output_sample import LimitedSample
 from tolalloc.allocation.space.problem import OneSidedConstraint
 from tolalloc.allocation.space.requirement import AtYield, Check, QuantileBound, Requirement, Sampled
@@ -237,7 +237,12 @@ class AcceptanceTest:
         solved: list[SolvedPart] = []
         for look, share in enumerate(_LOOKS, start=1):
             wanted = Drawn(units=int(np.ceil(share * final.units)), whatever=int(np.ceil(share * final.whatever)))
-            solved.append(solver.solved(seeds.child(f"look {look}"), _more(wanted, solved)))
+            before = [own.units.drawn for own in solved]
+            missing = Drawn(
+                units=wanted.units - sum(own.units for own in before),
+                whatever=wanted.whatever - sum(own.whatever for own in before),
+            )
+            solved.append(solver.solved(seeds.child(f"look {look}"), missing))
             together = SolvedPart.joined(solved)
             plain = AnsweredUnits(evaluation=together.plain)
             require_few_failures(plain, "of a drawing that was tried", self.largest_failed_share)
@@ -273,14 +278,12 @@ class AcceptanceTest:
 
     def _screen(self, design: VerifiedDesign) -> Screen | None:
         """Return what tells units near a limit from far ones; none where solving all of them costs little."""
-        alone = [check for check in design.checks if not isinstance(check.requirement, JointRequirement)]
+        alone = design.checks_alone
         if is_fast(self.model) or len(design.laws) == len(alone):
             return None
         with one_blas_thread():  # the same units are near for any number of threads
             # A unit fails one limit at least if it fails all limits at once.
-            own = (check.requirement for check in design.checks)
-            requirements = tuple(own for own in own if not isinstance(own, JointRequirement))
-            return Screen.through(requirements, design.outputs, design.sample.redraw)
+            return Screen.through(tuple(check.requirement for check in alone), design.outputs, design.sample.redraw)
 
     def _planned(self, design: VerifiedDesign, screen: Screen | None, spending: AlphaSpending) -> Drawn:
         """Return how many units are drawn for a design, and how many of them are solved whatever is predicted.
@@ -311,15 +314,6 @@ def _plain_units(
     return np.concatenate([space.units(design, *look) for look in looks])
 
 
-def _more(wanted: Drawn, before: list[SolvedPart]) -> Drawn:
-    """Return how many units are missing."""
-    drawn = [own.units.drawn for own in before]
-    return Drawn(
-        units=wanted.units - sum(own.units for own in drawn),
-        whatever=wanted.whatever - sum(own.whatever for own in drawn),
-    )
-
-
 def _tested(
     design: VerifiedDesign,
     solved: SolvedPart,
@@ -331,14 +325,14 @@ def _tested(
     independent = IndependentSample(units=units, outputs=values, leaving=solved.leaving, planes=solved.planes)
     checks = _checks(design, independent, confidence)
     kept = np.array([own.requirement.limits.kept_by(own.requirement.read(values)) for own in checks])
-    leading, doubts = checks[0].requirement, design.doubts
+    leading, uncertainties = checks[0].requirement, design.uncertainties
     achieved, joint = (units.yield_of(np.logical_not(own)) for own in (kept[0], kept.all(axis=0)))
     return replace(
         design,
         sample=RedrawnUnits(evaluation=solved.plain, redraw=redraw),
-        achieved=achieved.doubted(doubts.get(leading.output), leading.limits),
+        achieved=achieved.widened_by(uncertainties.get(leading.output), leading.limits),
         checks=checks,
-        joint=joint.doubted(doubts.get(ALL_LIMITS), ANY_LIMIT),
+        joint=joint.widened_by(uncertainties.get(ALL_LIMITS), ANY_LIMIT),
         outputs={name: own[units.whatever] for name, own in values.items()},
         independent=independent,
         confidence=confidence,
@@ -373,7 +367,7 @@ def _read(
     """Return the constraints of a requirement at other values of what is compared with the limits."""
     values = requirement.read(independent.outputs)
     good = values[np.isfinite(values)]
-    return tuple(_moved(own, bound, design, bound.turned(good)) for own, bound in zip(sides, bounds, strict=True))
+    return tuple(_with_bound(own, bound, design, bound.turned(good)) for own, bound in zip(sides, bounds, strict=True))
 
 
 def _bounds(
@@ -388,11 +382,11 @@ def _bounds(
 
 def _limited(design: VerifiedDesign, requirement: Requirement, independent: IndependentSample) -> LimitedSample:
     """Return what units say of a requirement, with what measured parts leave open as the search found it."""
-    law, doubt = design.laws.get(requirement.output), design.doubts.get(requirement.output)
-    return independent.limited(requirement, law, design.nearest, doubt)
+    law, uncertainty = design.laws.get(requirement.output), design.uncertainties.get(requirement.output)
+    return independent.limited(requirement, law, design.nearest, uncertainty)
 
 
-def _moved(
+def _with_bound(
     constraint: OneSidedConstraint, bound: QuantileBound, design: VerifiedDesign, turned: float
 ) -> OneSidedConstraint:
     """Return a constraint at another value, its model with the same slopes through it."""

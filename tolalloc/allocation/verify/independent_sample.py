@@ -13,7 +13,7 @@ from tolalloc.allocation.space.output_sample import LimitedSample
 from tolalloc.allocation.space.requirement import AtYield, Requirement
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.linear_function import LinearLaw, NearPlane
-from tolalloc.capability.monte_carlo import ProcessDoubt
+from tolalloc.capability.monte_carlo import ProcessUncertainty
 from tolalloc.capability.near_limit import Drawn, SolvedUnits
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models.model import Evaluation, Response
@@ -113,7 +113,7 @@ class IndependentSample:
         requirement: Requirement,
         law: LinearLaw | None,
         nearest: Mapping[str, NearPlane],
-        doubt: ProcessDoubt | None = None,
+        uncertainty: ProcessUncertainty | None = None,
     ) -> LimitedSample:
         """Return what the units say of a requirement.
 
@@ -125,7 +125,7 @@ class IndependentSample:
             Of its output, none where it has none.
         nearest
             Output → plane near it.
-        doubt
+        uncertainty
             What measured parts leave open of what is limited.
         """
         plain = self.units.drawn.whatever == self.units.drawn.units
@@ -136,7 +136,7 @@ class IndependentSample:
             law=law,
             leaving=self.leaving.get(requirement.output, 0),
             controls=requirement.controls(nearest, self.planes) if plain else (),
-            doubt=doubt,
+            uncertainty=uncertainty,
         )
 
 

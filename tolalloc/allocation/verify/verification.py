@@ -15,33 +15,25 @@ from tolalloc.allocation.space.output_sample import DesignSample
 from tolalloc.allocation.space.problem import OneSidedConstraint
 from tolalloc.allocation.space.requirement import (
     Check,
-    Guarantee,
     Requirement,
-    RootSumSquare,
     spread_constraints,
     spread_weights,
 )
 from tolalloc.allocation.verify.independent_sample import IndependentSample
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
-from tolalloc.capability.indices import Limits
 from tolalloc.capability.linear_function import LinearLaw, NearPlane
 from tolalloc.capability.monte_carlo import (
     ANY_LIMIT,
     CONFIDENCE,
-    ProcessDoubt,
+    ProcessUncertainty,
     RedrawnUnits,
     Yield,
     largest_excess,
     proportion,
     require_few_failures,
 )
-from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import Source
-from tolalloc.drawings.zones import Feature
-from tolalloc.models.function_model import FunctionModel
 from tolalloc.models.model import Model, is_fast
-from tolalloc.reading.units import MILLIMETRE
 
 SLOPE_UNITS = 1024
 """Units that differences of an output without derivatives are averaged over [-]."""
@@ -73,7 +65,7 @@ class VerifiedDesign:
     confidence: float  # With which the units show what is compared with the limits, one-sided [-]
     near: Mapping[str, NearPlane] = field(default_factory=dict)  # Output → plane that was found near it
     # What is limited → what measured parts leave open of it; all limits at once under `ALL_LIMITS`
-    doubts: Mapping[str, ProcessDoubt] = field(default_factory=dict)
+    uncertainties: Mapping[str, ProcessUncertainty] = field(default_factory=dict)
     independent: IndependentSample | None = None  # What tested it last, none if it was not tested
     accepted: bool = False  # Whether units that no search has seen showed every requirement, with the stated error
     # Cost before its zones and amounts were rounded to what the drawing states, none if they were not [cost units]
@@ -103,7 +95,7 @@ class VerifiedDesign:
             found = self.independent.units.yield_of(outside)
         else:
             found = proportion(outside.size, int(np.count_nonzero(outside)))
-        return found.doubted(self.doubts.get(requirement.output), limits)
+        return found.widened_by(self.uncertainties.get(requirement.output), limits)
 
     @property
     def constraints(self) -> tuple[OneSidedConstraint, ...]:
@@ -116,9 +108,14 @@ class VerifiedDesign:
         return tuple((check, constraint) for check in self.checks for constraint in check.constraints)
 
     @property
+    def checks_alone(self) -> tuple[Check, ...]:
+        """Checks of every requirement but that of all limits at once: what keeps all of them keeps each of them."""
+        return tuple(check for check in self.checks if not isinstance(check, JointCheck))
+
+    @property
     def alone(self) -> tuple[OneSidedConstraint, ...]:
         """One-sided constraints of every limit as if it were the only one."""
-        return tuple(side for check, side in self.limited_sides if not isinstance(check, JointCheck))
+        return tuple(side for check in self.checks_alone for side in check.constraints)
 
     @property
     def laws(self) -> dict[str, LinearLaw]:
@@ -137,8 +134,7 @@ class VerifiedDesign:
     def blocking(self) -> Check:
         """The limit with the largest relative excess; all limits at once only where each one alone is kept."""
         last = self.jointly
-        alone = self.checks[: -1 if last else None]
-        found = max(alone, key=lambda check: check.tightest.relative_excess)
+        found = max(self.checks_alone, key=lambda check: check.tightest.relative_excess)
         return last if last and found.tightest.excess <= 0 else found
 
     @property
@@ -174,6 +170,10 @@ class VerifiedDesign:
         """Parts of the failures that a joint yield allows, one for each limited output; none without one [-]."""
         return self.jointly.joint.parts if self.jointly else ()
 
+    def design_in(self, space: DesignSpace) -> Float[np.ndarray, " variable"]:
+        """Return the design as a vector of another space of the same groups: its zones over those of that one."""
+        return np.concatenate([self.space.first_zones * self.scales / space.first_zones, self.settings])
+
     def divided(self, parts: tuple[float, ...]) -> VerifiedDesign:
         """Return the design with those failures in other parts, as far as its tails tell."""
         return self if parts == self.parts else replace(self, checks=divided(self.checks, parts))
@@ -182,12 +182,12 @@ class VerifiedDesign:
         """Return the design with those failures divided as often as each limit fails."""
         return self.divided(self.jointly.parts_as_failing()) if self.jointly else self
 
-    def divided_towards(self, prices: Float[np.ndarray, " side"], way: float) -> VerifiedDesign:
+    def divided_towards(self, prices: Float[np.ndarray, " side"], portion: float) -> VerifiedDesign:
         """Return the design with those failures divided nearer to what the prices of its constraints ask for."""
         if self.jointly is None:
             return self
         sides = tuple(len(check.steering) for check in self.checks[:-1])
-        return self.divided(self.jointly.parts_towards(sides, prices, way))
+        return self.divided(self.jointly.parts_towards(sides, prices, portion))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -244,8 +244,8 @@ class Verifier:
             lambda check, bounds, at: spread_constraints(read[at], bounds, check.requirement.limits),
         )
         values = {output: sample.values(output) for output in outputs}
-        doubts = _doubts(sample, requirements, values)
-        leading, every = requirements[0], doubts.get(ALL_LIMITS)
+        uncertainties = _uncertainties(sample, requirements, values)
+        leading, every = requirements[0], uncertainties.get(ALL_LIMITS)
         kept = np.array([requirement.limits.kept_by(requirement.read(values)) for requirement in requirements])
         return VerifiedDesign(
             name=name,
@@ -256,35 +256,35 @@ class Verifier:
             sample=RedrawnUnits(
                 evaluation=sample.samples[0].evaluation, redraw=partial(self.space.units, design, seeds, self.units)
             ),
-            achieved=proportion(self.units, int(np.count_nonzero(~kept[0]))).doubted(
-                doubts.get(leading.output), leading.limits
+            achieved=proportion(self.units, int(np.count_nonzero(~kept[0]))).widened_by(
+                uncertainties.get(leading.output), leading.limits
             ),
             checks=checks,
-            joint=proportion(self.units, int(np.count_nonzero(~kept.all(axis=0)))).doubted(every, ANY_LIMIT),
+            joint=proportion(self.units, int(np.count_nonzero(~kept.all(axis=0)))).widened_by(every, ANY_LIMIT),
             outputs=values,
             by_zone=_by_zone(sample, checks[0].constraints[0].value),
             by_deviation=sample.sensitivity(sample.outputs[0]) if sample.outputs[0] in sample.exact else None,
             confidence=self.confidence,
             near=sample.nearest,
-            doubts=doubts,
+            uncertainties=uncertainties,
         )
 
 
 ALL_LIMITS = ""
-"""Key of the doubt about all limits at once."""
+"""Key of the process uncertainty of all limits at once."""
 
 
-def _doubts(
+def _uncertainties(
     sample: DesignSample, requirements: tuple[Requirement, ...], values: Mapping[str, Float[np.ndarray, " unit"]]
-) -> dict[str, ProcessDoubt]:
+) -> dict[str, ProcessUncertainty]:
     """Return what measured parts leave open of all that is limited, nothing where no part was measured."""
-    doubting = ProcessDoubt.about(sample.space.errors, sample.x)
-    if doubting is None:
+    uncertainty_of = ProcessUncertainty.about(sample.space.errors, sample.x)
+    if uncertainty_of is None:
         return {}
     read = {own.output: own.read(values) for own in requirements}
     every = largest_excess(read, {own.output: own.limits for own in requirements})
-    found = {name: doubting(own) for name, own in {**read, ALL_LIMITS: every}.items()}
-    return {name: doubt for name, doubt in found.items() if doubt}
+    found = {name: uncertainty_of(own) for name, own in {**read, ALL_LIMITS: every}.items()}
+    return {name: uncertainty for name, uncertainty in found.items() if uncertainty}
 
 
 def _by_zone(sample: DesignSample, quantile: float) -> Float[np.ndarray, " source"] | None:
@@ -304,36 +304,3 @@ def cheapest_met(tried: tuple[VerifiedDesign, ...]) -> VerifiedDesign:
     if met:
         return min(met, key=lambda design: design.cost)
     return min(tried, key=lambda design: design.blocking.tightest.relative_excess)
-
-
-def verifier_of_sum(*zones: float, limit: float, guarantee: Guarantee | None = None) -> Verifier:
-    """Return what verifies designs of y = Σ xᵢ ≤ limit, xᵢ normal of σᵢ = zoneᵢ/6, for worked numbers [mm].
-
-    Every zone costs 1, in proportion to 1/zone, and may change tenfold either way. Unless another guarantee is given,
-    √(Σ (zoneᵢ/2)²) must keep the limit (own derivation).
-
-    Examples
-    --------
-    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
-    >>> float(verifier.verify(verifier.space.uniform(1.0), "as drawn").constraints[0].value)
-    5.0
-    """
-    names = tuple(f"x{at}" for at in range(1, len(zones) + 1))
-    sources = tuple(
-        Source(
-            name=name,
-            part="part",
-            feature=Feature.SIZE,
-            zone=zone * MILLIMETRE,
-            minimum=zone * MILLIMETRE / 10,
-            maximum=zone * MILLIMETRE * 10,
-            cost=1.0,
-            group=name,
-        )
-        for name, zone in zip(names, zones, strict=True)
-    )
-    errors = ErrorModel(sources)
-    model = FunctionModel(function=lambda *x: sum(x), inputs=names, outputs=("y [mm]",)).bound(errors, "")
-    shown = Requirement(output="y [mm]", limits=Limits(upper=limit), guarantee=guarantee or RootSumSquare())
-    space = DesignSpace(errors=errors)
-    return Verifier(space=space, model=model, requirements=(shown,), seeds=SeedTree(1), units=2000)

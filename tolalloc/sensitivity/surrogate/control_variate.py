@@ -103,7 +103,7 @@ def _degree(columns: int, units: int) -> int:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Control:
+class CheapAnswers:
     """What a cheap model answers to the samples of some blocks, and to those of many others."""
 
     own: Float[np.ndarray, "sample output"]  # To the samples of the blocks whose indices it corrects [output]

@@ -249,12 +249,10 @@ def choose(
 
     Examples
     --------
-    >>> from tolalloc.capability.experiment import sum_of_sizes
     >>> from tolalloc.sensitivity.surrogate.regression import RegressionCandidate, quadratic_regression
-    >>> response, x = sum_of_sizes(6.0, 12.0).response, np.random.default_rng(1).normal(size=(400, 2))
-    >>> made = {"columns": response.columns, "outputs": response.outputs}
-    >>> candidate = RegressionCandidate(name="quadratic", estimator=quadratic_regression, **made)
-    >>> choice = choose(response, [candidate], x, SeedTree(1))
+    >>> names, x = {"columns": ("a", "b"), "outputs": ("y [m]",)}, np.random.default_rng(1).normal(size=(400, 2))
+    >>> candidate = RegressionCandidate(name="quadratic", estimator=quadratic_regression, **names)
+    >>> choice = choose(candidate.fit(x, x.sum(axis=1)), [candidate], x, SeedTree(1))
     >>> choice.chosen is not None, choice.best
     (True, 0)
     """
