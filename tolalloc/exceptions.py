@@ -26,6 +26,8 @@ _MOST_NAMES = 30
 """Most names that a sentence lists where none is spelled nearly as the unknown one [-]."""
 _UNBROKEN = re.compile(rf"\S{{{_LONGEST_VALUE + 1},}}")
 """What is written without a blank and is longer than any word or path that a sentence needs."""
+_MOST_FAULTS = 20
+"""Most faults of one file that are said; the others are counted [-]."""
 
 
 def in_short(text: str, longest: int = _LONGEST_VALUE) -> str:
@@ -71,6 +73,10 @@ class InputError(TolallocError):
         error.argument = argument
         return error
 
+    def named_among(self, names: Iterable[str]) -> str:
+        """Return the name from which the argument comes, which may carry its unit besides; empty if there is none."""
+        return next((name for name in names if self.argument == name or self.argument.startswith(f"{name}_")), "")
+
     def as_option(self, command: str, option: str) -> InputError:
         """Return the error as somebody needs it who gave an option of a command."""
         _, _, said = str(self).partition(f": {self.argument} is ")
@@ -107,10 +113,6 @@ class StoppedError(TolallocError):
 
 class SolveError(TolallocError):
     """Too many samples of a batch failed for its numbers to be trusted."""
-
-
-_MOST_FAULTS = 20
-"""Most faults of one file that are said; the others are counted [-]."""
 
 
 class FailedUnitsError(SolveError):

@@ -447,8 +447,17 @@ def regulator(
     0.75
     """
     from tolalloc.wings.assembly.control import regulator as found
+    from tolalloc.wings.assembly.steps import StateSpace
 
-    return found(_space(adjusting, effort), np.asarray(final_weight, dtype=float)).gains
+    turning = np.asarray(adjusting, dtype=float)
+    steps, states = turning.shape[:2]
+    space = StateSpace(
+        entering=np.zeros((steps, states, states)),
+        adjusting=turning,
+        effort=np.asarray(effort, dtype=float),
+        observing=(np.eye(states),) * steps,
+    )
+    return found(space, np.asarray(final_weight, dtype=float)).gains
 
 
 def adjusted_errors(
@@ -480,17 +489,6 @@ def adjusted_errors(
         known = state + errors @ entering[step + 1 :].sum(axis=0).T
         state = state - known @ (adjusting[step] @ gain).T
     return state
-
-
-def _space(adjusting: Any, effort: Any) -> Any:
-    from tolalloc.wings.assembly.steps import StateSpace
-
-    turning = np.asarray(adjusting, dtype=float)
-    steps, states = turning.shape[:2]
-    nothing = np.zeros((steps, states, states))
-    return StateSpace(
-        entering=nothing, adjusting=turning, effort=np.asarray(effort, dtype=float), observing=(np.eye(states),) * steps
-    )
 
 
 class SobolIndices(NamedTuple):

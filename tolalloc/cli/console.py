@@ -35,6 +35,17 @@ _PAUSE = 5.0
 """Time between two lines of a log [s]."""
 _SHORT = 2.0
 """Stages that solve nothing and take less are not worth a line [s]."""
+AsJson = Annotated[bool, typer.Option("--json", help="Print machine-readable output only.")]
+ReportFolder = Annotated[Path | None, typer.Option(help="Write a report into this folder, new or empty.")]
+_BETWEEN = 3
+"""Blanks between two columns [characters]."""
+_ROOM_FOR_BARS = 110
+"""Characters of a line from which a moving bar leaves room for its numbers [-]."""
+_NARROWEST = 40
+"""Characters of a line below which nothing is broken [-]."""
+_UNIT = re.compile(r"(?<=\d) (?=(?:%|µm|mm|N|N·m|s|units|arcmin|arcsec|K)(?![^\W\d_]))")
+_JOINED = "\u00a0"
+"""Blank between a number and its unit, which are not parted at the end of a line."""
 
 
 def shown_progress(counted: str = "units") -> AbstractContextManager[Progress]:
@@ -69,17 +80,13 @@ class _Stage:
         of = f" of {self.known:,}" if self.known and not over else ""
         rate = self.units / max(self.seconds, 1e-9)
         said = f"{self.units:,}{of} {self.counted}, {_rounded(rate)} {self.counted}/s"
-        return f"{said}, {_duration((self.known - self.units) / rate)} left" if of else said
+        left = (self.known - self.units) / rate
+        return f"{said}, {f'{left:.0f} s' if left < 100 else f'{left / 60:.0f} min'} left" if of else said
 
 
 def _rounded(rate: float) -> str:
     """Return a rate with two digits at least."""
     return f"{rate:,.0f}" if rate >= 10 else f"{rate:.2g}"
-
-
-def _duration(seconds: float) -> str:
-    """Return a time to come."""
-    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
 
 
 class Lines:
@@ -209,20 +216,6 @@ class Bars:
         self._task = None
 
 
-AsJson = Annotated[bool, typer.Option("--json", help="Print machine-readable output only.")]
-ReportFolder = Annotated[Path | None, typer.Option(help="Write a report into this folder, new or empty.")]
-
-_BETWEEN = 3
-"""Blanks between two columns [characters]."""
-_ROOM_FOR_BARS = 110
-"""Characters of a line from which a moving bar leaves room for its numbers [-]."""
-_NARROWEST = 40
-"""Characters of a line below which nothing is broken [-]."""
-_UNIT = re.compile(r"(?<=\d) (?=(?:%|µm|mm|N|N·m|s|units|arcmin|arcsec|K)(?![^\W\d_]))")
-_JOINED = "\u00a0"
-"""Blank between a number and its unit, which are not parted at the end of a line."""
-
-
 def note(sentence: str, *, dim: bool = False) -> None:
     """Tell something beside the answer, on standard error."""
     typer.secho(_broken(sentence, sys.stderr), dim=dim or None, err=True)
@@ -238,6 +231,10 @@ def announce_compilation() -> None:
 
 def announce_kernel(model: object) -> None:
     """Say the same of the kernel of a study's model; a user's own model has none."""
+    from tolalloc.models.function_model import FunctionModel
+
+    if isinstance(model, FunctionModel):  # the room of reducers takes a second to load
+        return
     from tolalloc.reducers.choice import ReducerChoice
     from tolalloc.reducers.equivalent.compiled_ahead import compile_ahead
 

@@ -19,7 +19,7 @@ def doctor(as_json: AsJson = False) -> None:
     """Tell versions, processor, threads and what is kept, and solve a published unit whose answer is known."""
     from tolalloc.reports.writer import versions
     from tolalloc.running.chunks import blas_libraries
-    from tolalloc.running.compiled import is_kept, kept_in, processor, thread_count
+    from tolalloc.running.compiled import KEPT, is_kept, processor, thread_count
 
     kept = [path.stat().st_size for path in Path("runs/.tolalloc-units").glob("*.units")]
     found = {
@@ -29,7 +29,7 @@ def doctor(as_json: AsJson = False) -> None:
         "threads": thread_count(),
         "BLAS": blas_libraries(),
         "kernel compiled before": is_kept("turn"),
-        "compiled code is kept in": str(kept_in() or "no folder: none can be written"),
+        "compiled code is kept in": str(KEPT or "no folder: none can be written"),
         "kept units in runs": f"{len(kept)} files, {sum(kept) / 2**20:.1f} MiB",
     }
     announce_compilation()

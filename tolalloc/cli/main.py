@@ -14,10 +14,9 @@ import typer
 
 from tolalloc.cli.console import answers_alone, note
 from tolalloc.cli.doctor import doctor
-from tolalloc.cli.inquiries import inquiry_command
 from tolalloc.cli.new import new, schema
 from tolalloc.cli.open import open_page
-from tolalloc.cli.options import SayingNumbers, saying_options
+from tolalloc.cli.options import SayingNumbers, inquiry_command, saying_options
 from tolalloc.cli.run import allocate, rank, run
 from tolalloc.cli.studies import check, series, whatif
 from tolalloc.exceptions import InputError, StoppedError, TolallocError, in_short

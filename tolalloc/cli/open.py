@@ -31,7 +31,7 @@ def open_page(
 
     study = load_study(script)
     session = Session(prepared=Prepared(study=study))
-    _ = session.requirements  # what is wrong with the study is said before a page opens
+    _ = session.prepared.requirements  # what is wrong with the study is said before a page opens
     announce_kernel(study.model)
     place = script.resolve()
     server = _server(Desk(session=session, script=place), Address.of(place), port)

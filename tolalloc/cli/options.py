@@ -1,17 +1,68 @@
-"""How an option is said: errors by the option's name, and a value that is no number in a sentence of ours."""
+"""How the record of an inquiry becomes a command, and how a refusal of any command names its option."""
 
 from __future__ import annotations
 
+import inspect
 import re
 from collections.abc import Callable
+from dataclasses import MISSING, fields
 from functools import wraps
-from typing import Any, get_type_hints
+from pathlib import Path
+from typing import Annotated, Any, get_args, get_type_hints
 
 import typer
 from typer.core import TyperGroup
 from typer.models import OptionInfo
 
+from tolalloc.cli.console import AsJson, ReportFolder, announce_compilation, note, shown_progress, tell, write_report
 from tolalloc.exceptions import InputError
+from tolalloc.study.inquiry import Inquiry, Word
+
+
+def inquiry_command(inquiry: type[Inquiry[Any]]) -> Callable[..., None]:
+    """Return the command of an inquiry."""
+
+    def command(out: Path | None, as_json: bool, **given: Any) -> None:
+        from tolalloc.reports.folder import require_usable
+
+        asked = inquiry(**given).with_reducer(out, argument="--reducer")
+        asked.apart_from(out)
+        require_usable(out)
+        prepared = asked.prepare()
+        if asked.room(prepared):
+            announce_compilation()
+        with shown_progress(inquiry.counted) as progress:
+            progress.begin(inquiry.word)
+            answer = asked.solve(prepared, progress)
+            write_report(answer, out, progress)
+        for sentence in asked.write(answer):
+            note(sentence)
+        tell(answer, as_json, *answer.teller.terminal)
+
+    command.__name__ = inquiry.word
+    command.__doc__ = inspect.cleandoc(inquiry.__doc__ or "").split("\n\n")[0]
+    own = [_parameter(inquiry, at) for at in range(len(fields(inquiry)))]
+    last = [_keyword("out", ReportFolder, None), _keyword("as_json", AsJson, False)]
+    command.__signature__ = inspect.Signature([*own, *last])  # type: ignore[attr-defined]
+    command.__annotations__ = {one.name: one.annotation for one in (*own, *last)}
+    return command
+
+
+def _parameter(inquiry: type[Inquiry[Any]], at: int) -> inspect.Parameter:
+    """Return the argument or option of a field."""
+    own = fields(inquiry)[at]
+    kind, word = get_args(get_type_hints(inquiry, include_extras=True)[own.name])[:2]
+    if not isinstance(word, Word):
+        raise TypeError(f"{inquiry.__name__}.{own.name}: its annotation has no Word")
+    names = (word.option,) if word.option else ()
+    said = typer.Argument(help=word.help) if at < inquiry.by_position else typer.Option(*names, help=word.help)
+    return _keyword(own.name, Annotated[kind, said], ... if own.default is MISSING else own.default)
+
+
+def _keyword(name: str, annotation: Any, default: Any) -> inspect.Parameter:
+    empty = inspect.Parameter.empty
+    given = empty if default is ... else default
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=given, annotation=annotation)
 
 
 def saying_options(command: Callable[..., None], word: str) -> Callable[..., None]:
@@ -22,21 +73,21 @@ def saying_options(command: Callable[..., None], word: str) -> Callable[..., Non
         try:
             command(**given)
         except InputError as error:
-            option = _option(command, error.argument)
+            option = _option(command, error)
             raise (error.as_option(f"tolalloc {word}", option) if option else error) from None
 
     return run
 
 
-def _option(command: Callable[..., None], argument: str) -> str:
-    """Return the option from which an argument comes, which may carry its unit besides; nothing if there is none."""
-    for name, kind in get_type_hints(command, include_extras=True).items():
-        if argument == name or argument.startswith(f"{name}_"):
-            for own in getattr(kind, "__metadata__", ()):
-                if isinstance(own, OptionInfo):
-                    # typer takes the first name of an option in an annotation for its default.
-                    stated = [each for each in (own.default, *(own.param_decls or ())) if str(each).startswith("--")]
-                    return str([*stated, f"--{name.replace('_', '-')}"][0])
+def _option(command: Callable[..., None], error: InputError) -> str:
+    """Return the option whose value an error refuses; nothing if there is none."""
+    kinds = get_type_hints(command, include_extras=True)
+    name = error.named_among(kinds)
+    for own in getattr(kinds.get(name), "__metadata__", ()):
+        if isinstance(own, OptionInfo):
+            # typer takes the first name of an option in an annotation for its default.
+            stated = [each for each in (own.default, *(own.param_decls or ())) if str(each).startswith("--")]
+            return str([*stated, f"--{name.replace('_', '-')}"][0])
     return ""
 
 

@@ -42,6 +42,8 @@ Pdf = Annotated[bool, typer.Option("--pdf", help="Print the report as report.pdf
 Paper = Annotated[str, typer.Option(help="Paper of --pdf: A4 or Letter.")]
 
 _ROWS = 16  # of an answer's first table that are printed
+_WARNINGS = 2
+"""Warnings of all answers together that are said where the report holds them all [-]."""
 
 
 def run(
@@ -258,10 +260,6 @@ def solvers(scheduler: str) -> AbstractContextManager[Mapper]:
     from tolalloc.running.workers import workers_at
 
     return workers_at(scheduler)
-
-
-_WARNINGS = 2
-"""Warnings of all answers together that are said where the report holds them all [-]."""
 
 
 def _show_headline(answer: Answer[Any]) -> None:

@@ -21,6 +21,21 @@ _HEADER = (
     "sources,process,model,fixed [cost units],factor [cost units µm^n],min [µm],max [µm],change [cost units],"
     "inspection [cost units],note"
 )
+_SHOP = """# Invented prices, for trying: replace them by what your shop quotes.
+process,tolerance,unit,cost
+pin turned,40,µm,4
+pin turned,20,µm,5.5
+pin turned,10,µm,9
+pin turned,6,µm,13.5
+pin ground,10,µm,11
+pin ground,6,µm,12.5
+pin ground,3,µm,18
+pin ground,2,µm,25
+"""
+_CYCLE = (("start", 1.2, 10, 10), ("constant", 0.6, 20, 30), ("stop", -0.8, 10, 10), ("hold", 0.3, 1, 50))
+"""Load cases of a joint: name, torque over the rated one that resists [-], speed [rpm], share of the time [%]."""
+_CYCLE_HEADS = ("case", "torque [N·m]", "speed [rpm]", "share [%]")
+_PARTS = 60
 
 
 def _processes(new: NewReducer) -> dict[str, str]:
@@ -39,23 +54,6 @@ def _processes(new: NewReducer) -> dict[str, str]:
         ]
     library = (DATA / "generic.processes.csv").read_text(encoding="utf-8")
     return {"processes.csv": library, "process_costs.csv": "\n".join(rows) + "\n"}
-
-
-_SHOP = """# Invented prices, for trying: replace them by what your shop quotes.
-process,tolerance,unit,cost
-pin turned,40,µm,4
-pin turned,20,µm,5.5
-pin turned,10,µm,9
-pin turned,6,µm,13.5
-pin ground,10,µm,11
-pin ground,6,µm,12.5
-pin ground,3,µm,18
-pin ground,2,µm,25
-"""
-_CYCLE = (("start", 1.2, 10, 10), ("constant", 0.6, 20, 30), ("stop", -0.8, 10, 10), ("hold", 0.3, 1, 50))
-"""Load cases of a joint: name, torque over the rated one that resists [-], speed [rpm], share of the time [%]."""
-_CYCLE_HEADS = ("case", "torque [N·m]", "speed [rpm]", "share [%]")
-_PARTS = 60
 
 
 def _pins(new: NewReducer) -> dict[str, str]:

@@ -18,6 +18,7 @@ from tolalloc.cli.samples import samples
 from tolalloc.drawings.distributions import Distribution
 from tolalloc.drawings.drawing import load_drawing
 from tolalloc.drawings.fields import COLUMNS, headers_in
+from tolalloc.drawings.ladder import tolerance_factor
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_rows, table_text
 from tolalloc.drawings.zones import Feature
@@ -28,7 +29,6 @@ from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.sources import ErrorSource
 from tolalloc.reducers.families.family import NewRows
 from tolalloc.reducers.families.known import FAMILIES, SOURCES, family_of
-from tolalloc.reducers.families.rv import RV
 from tolalloc.reducers.reducer.design import Modification, Reducer
 from tolalloc.reducers.reducer.files import (
     CentreGearRecord,
@@ -50,6 +50,66 @@ KINDS: dict[str, Callable[[], type[BaseModel]]] = {
     **{kind: record for wing in wings() for kind, record in wing.schemas.items()},
 }
 """Kind of TOML file → the record that reads it."""
+_FOLDER = Path(__file__).parents[1] / "reducers" / "reducer" / "presets"
+_NUMBERED = re.compile(r"(disc|crank|bore|journal|planet|mesh)\d+")
+_CHOICES = {
+    "feature": [str(feature.value) for feature in Feature],
+    "distribution": [str(own.value) for own in Distribution],
+    "unit": ["µm", "mm"],
+    "locked": ["yes", "no"],
+    "sorted": ["yes", "no"],
+    "grade": [f"IT{grade}" for grade in range(1, 12)],
+}
+"""Column → what may stand there; of a grade, which is carried through, anything else too."""
+_SPARE = 200
+"""Rows below the table that have the same choices [-]."""
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,59}")
+_USUAL = 60.0
+"""Limit of the peak-to-peak where no catalogue value is stated [arcsec]."""
+_STUDY = '''"""{name}: which error drives it, and which zones are cheapest."""
+
+import tolalloc as ta
+
+study = ta.Study(
+    # Smallest and largest nominal clearance [µm] that the tooth modification may leave on the flank, at tip and root.
+    ta.reducer("reducer.toml", flank_clearance=(1.0, 12.0), radial_clearance=(5.0, 30.0)),
+    ta.drawing("zones.xlsx"),
+    limits={{
+        ta.PEAK_TO_PEAK: ta.Limit(upper={limit:g}, show=ta.AtYield(target=0.9973)),
+        ta.LOST_MOTION: ta.Limit(upper={lost_motion}),
+    }},
+    questions=[ta.Ranking(), ta.Allocation()],
+    name="{name}",
+    seed=1,
+)
+
+if __name__ == "__main__":
+    ta.run_script()
+'''
+_READ_ME = """# {name}
+
+Made by `tolalloc new`. In this folder, one after the other:
+
+```sh
+tolalloc check study.py
+tolalloc open study.py
+tolalloc run study.py --quick
+```
+
+`check` says what the study reads, and how many random units are preloaded. `open` shows what each zone does, live.
+`run` writes `runs/{name}/report.html`: what drives the error, and the cheapest zones. Leave `--quick` out before you
+set a drawing.
+
+| file | is |
+|---|---|
+| `reducer.toml` | the reducer; `assumptions` lists what nobody measured |
+| `zones.xlsx` | the tolerance table, a row per source; the study reads this one |
+| `zones.csv` | the same as text |
+| `study.py` | limits and questions |
+| `schemas` | what may stand in the TOML files, for editors that offer it |
+{samples}{commands}
+Every zone, range and cost is assumed: write your own. A row with zone 0 is neglected.
+"""
 
 
 def schema(kind: str) -> dict[str, Any]:
@@ -77,9 +137,6 @@ def schema(kind: str) -> dict[str, Any]:
             spacing["description"] = "the face width, unless given"
     title = f"{kind} file of tolalloc"
     return {**found, "$schema": "https://json-schema.org/draft/2020-12/schema", "title": title}
-
-
-_FOLDER = Path(__file__).parents[1] / "reducers" / "reducer" / "presets"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,9 +230,6 @@ def preset_of(family: str, like: str) -> str:
     return like or names[family or "rv"][0]
 
 
-_NUMBERED = re.compile(r"(disc|crank|bore|journal|planet|mesh)\d+")
-
-
 def sources_of(reducer: Reducer, complete: bool = False) -> tuple[Source, ...]:
     """Return all sources of a reducer with assumed zones.
 
@@ -220,22 +274,9 @@ def modification_of(reducer: Reducer) -> Modification:
 
 
 def _scale_of(reducer: Reducer) -> float:
-    """Return how much wider zones are than those of the family's drawing [-]."""
-    own = 2 * reducer.cycloid_stage.pin_circle_radius / MILLIMETRE
-    return size_factor(own, family_of(reducer).new.diameter)
-
-
-def size_factor(diameter: float, known: float = RV.new.diameter) -> float:
-    """Return how much wider zones are on a pin circle of a diameter [mm] than on a known one, that of the RV-20E [-].
-
-    >>> size_factor(104.0), round(size_factor(155.0), 3)
-    (1.0, 1.159)
-    """
-
-    def unit(size: float) -> float:
-        return float(0.45 * size ** (1 / 3) + 0.001 * size)
-
-    return unit(diameter) / unit(known)
+    """Return how much wider zones are than those of the family's drawing: as ISO 286's of the pin circles are [-]."""
+    known = family_of(reducer).new.diameter * MILLIMETRE
+    return tolerance_factor(2 * reducer.cycloid_stage.pin_circle_radius) / tolerance_factor(known)
 
 
 def _scaled(source: Source, kind: ErrorSource, reducer: Reducer, scale: float) -> Source:
@@ -275,19 +316,6 @@ def _rounded(length: float) -> float:
     return round(length / MICROMETRE, 1) * MICROMETRE
 
 
-_CHOICES = {
-    "feature": [str(feature.value) for feature in Feature],
-    "distribution": [str(own.value) for own in Distribution],
-    "unit": ["µm", "mm"],
-    "locked": ["yes", "no"],
-    "sorted": ["yes", "no"],
-    "grade": [f"IT{grade}" for grade in range(1, 12)],
-}
-"""Column → what may stand there; of a grade, which is carried through, anything else too."""
-_SPARE = 200
-"""Rows below the table that have the same choices [-]."""
-
-
 def table_workbook(sources: Sequence[Source]) -> bytes:
     """Return the workbook of a tolerance table."""
     from tolalloc.reports.excel import Book, letter
@@ -312,55 +340,6 @@ def table_workbook(sources: Sequence[Source]) -> bytes:
             sheet.inner.data_validation(f"{letter(at)}2:{letter(at)}{len(cells) + _SPARE}", allowed)
     sheet.inner.freeze_panes(1, 1)
     return book.content()
-
-
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,59}")
-_USUAL = 60.0
-"""Limit of the peak-to-peak where no catalogue value is stated [arcsec]."""
-_STUDY = '''"""{name}: which error drives it, and which zones are cheapest."""
-
-import tolalloc as ta
-
-study = ta.Study(
-    # Smallest and largest nominal clearance [µm] that the tooth modification may leave on the flank, at tip and root.
-    ta.reducer("reducer.toml", flank_clearance=(1.0, 12.0), radial_clearance=(5.0, 30.0)),
-    ta.drawing("zones.xlsx"),
-    limits={{
-        ta.PEAK_TO_PEAK: ta.Limit(upper={limit:g}, show=ta.AtYield(target=0.9973)),
-        ta.LOST_MOTION: ta.Limit(upper={lost_motion}),
-    }},
-    questions=[ta.Ranking(), ta.Allocation()],
-    name="{name}",
-    seed=1,
-)
-
-if __name__ == "__main__":
-    ta.run_script()
-'''
-_READ_ME = """# {name}
-
-Made by `tolalloc new`. In this folder, one after the other:
-
-```sh
-tolalloc check study.py
-tolalloc open study.py
-tolalloc run study.py --quick
-```
-
-`check` says what the study reads, and how many random units are preloaded. `open` shows what each zone does, live.
-`run` writes `runs/{name}/report.html`: what drives the error, and the cheapest zones. Leave `--quick` out before you
-set a drawing.
-
-| file | is |
-|---|---|
-| `reducer.toml` | the reducer; `assumptions` lists what nobody measured |
-| `zones.xlsx` | the tolerance table, a row per source; the study reads this one |
-| `zones.csv` | the same as text |
-| `study.py` | limits and questions |
-| `schemas` | what may stand in the TOML files, for editors that offer it |
-{samples}{commands}
-Every zone, range and cost is assumed: write your own. A row with zone 0 is neglected.
-"""
 
 
 def _write_schemas(folder: Path, reducer: str) -> None:

@@ -21,7 +21,7 @@ from jaxtyping import Complex, Float
 from tolalloc.drawings.sources import Source, known_as, meant
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.reading.named_fields import NamedFields, Rule, is_number, number
+from tolalloc.reading.named_fields import NamedFields, Rule, is_number, number, whole
 from tolalloc.reading.units import MICROMETRE
 
 _MOST = 64
@@ -30,14 +30,17 @@ MOST_CHOICES = 16
 """Most combinations of classes and sizes that one question compares [-]."""
 
 
-def _is_count(value: object) -> bool:
-    return type(value) is int and 1 <= value <= _MOST
+_COUNT = whole("", 1, _MOST)
+COST = number("a cost of 0 or above", least=0.0)
+TEXT = Rule("the name of a source in quotation marks", lambda given: isinstance(given, str) and bool(given))
+Names = str | tuple[str, ...]
+"""One source of a tolerance table, or several that are chosen for each on their own."""
 
 
 def _are_counts(given: object) -> bool:
     if isinstance(given, Sequence) and not isinstance(given, str):
-        return 0 < len(given) == len(set(given)) and all(map(_is_count, given))
-    return _is_count(given)
+        return 0 < len(given) == len(set(given)) and all(map(_COUNT.keeps, given))
+    return _COUNT.keeps(given)
 
 
 COUNTS = Rule(f"a whole number from 1 to {_MOST}, or several different ones to choose from", _are_counts)
@@ -45,26 +48,17 @@ _SIZES = Rule(
     f"an odd whole number from 1 to {_MOST}, or several different ones to choose from",
     lambda given: _are_counts(given) and all(own % 2 for own in (given if isinstance(given, Sequence) else (given,))),
 )
-COST = number("a cost of 0 or above", least=0.0)
-
-
-def _is_text(given: object) -> bool:
-    return isinstance(given, str) and bool(given)
 
 
 def _are_texts(given: object) -> bool:
-    return _is_text(given) or (isinstance(given, tuple) and bool(given) and all(map(_is_text, given)))
+    return TEXT.keeps(given) or (isinstance(given, tuple) and bool(given) and all(map(TEXT.keeps, given)))
 
 
-TEXT = Rule("the name of a source in quotation marks", _is_text)
 _TEXTS = Rule("the name or pattern of sources in quotation marks, or several names in brackets", _are_texts)
 _AGAINST = Rule(
     "source names with their weights, such as {'housing.groove.radius': -1.0}",
     lambda given: isinstance(given, Mapping) and all(_are_texts(own) and is_number(given[own]) for own in given),
 )
-
-Names = str | tuple[str, ...]
-"""One source of a tolerance table, or several that are chosen for each on their own."""
 
 
 @dataclass(frozen=True)
@@ -246,7 +240,9 @@ class _Fitting(Compensator):
             copies = {own.each for own in others} - {1}
             if len(others) not in (1, len(parts)) or (copies and copies != {own.each for own in parts}):
                 allowed = "one source for all parts or one for each of them, with as many like features or one"
-                raise InputError.at(f"{place}, {self.called}", "against", " and ".join(map(_name, others)), allowed)
+                raise InputError.at(
+                    f"{place}, {self.called}", "against", " and ".join(own.name for own in others), allowed
+                )
             against[_together(others)] = weight
         return replace(self, part=_together(parts), against=against)  # type: ignore[type-var]
 
@@ -414,12 +410,8 @@ def _listed(given: Names) -> tuple[str, ...]:
     return (given,) if isinstance(given, str) else given
 
 
-def _name(source: Source) -> str:
-    return source.name
-
-
 def _together(sources: Sequence[Source]) -> Names:
-    return sources[0].name if len(sources) == 1 else tuple(map(_name, sources))
+    return sources[0].name if len(sources) == 1 else tuple(own.name for own in sources)
 
 
 def require_vector(source: Source, place: str, named: str) -> None:
@@ -474,13 +466,13 @@ def in_force(compensators: Sequence[Compensator], sources: Sequence[Source], pla
     for (name, what), times in done.items():
         if times > 1:
             raise InputError(f"{place}: {name} is {what} {times} times; allowed is once.")
-    pairs = sorted_together(found)
+    pairs = [pair for own in found for pair in own.tied]
     for mates in (mates for _, mates in pairs if mates in dict(pairs)):
         raise InputError(
             f"{place}: the mates {mates} are sorted as parts too; name the mates of both, so that one choice follows "
             "from one measurement."
         )
-    sorted_by = Counter(name for own in found for pair in own.tied for name in pair)
+    sorted_by = Counter(name for pair in pairs for name in pair)
     for name in (name for own in found if own.tied and own.arranges for name in own.named if sorted_by[name] > 1):
         raise InputError(f"{place}: {name} is sorted into classes of equal width and once more; allowed is once.")
     return tuple(own for own in found if own.acts)
@@ -509,8 +501,3 @@ def assembly_cost(compensators: Sequence[Compensator], sources: Sequence[Source]
 def choice_label(compensators: Sequence[Compensator]) -> str:
     """Return what is chosen, in words, such as ``4 classes of pin.diameter``; of nothing, ``as they come``."""
     return " and ".join(own.label for own in compensators if own.acts) or "as they come"
-
-
-def sorted_together(compensators: Sequence[Compensator]) -> tuple[tuple[str, str], ...]:
-    """Return the pairs of sources whose numbers depend on each other, parts first and then their mates."""
-    return tuple(pair for own in compensators for pair in own.tied)

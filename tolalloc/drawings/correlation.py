@@ -13,12 +13,16 @@ from jaxtyping import Float
 
 from tolalloc.drawings.distributions import ndtri
 from tolalloc.drawings.sources import Source, known_as, meant
-from tolalloc.drawings.table_file import DATA, plain_number, read_table_file
+from tolalloc.drawings.table_file import DATA, number_at, read_table_file
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.files import shipped_or_path
 
+_ALLOWED = "a number from -1 to 1 with a decimal point"
 _ROUNDING = 1e-10
 """Eigenvalue of a correlation matrix above whose negative it counts as zero [-]."""
+LIST_HEADERS = ("sources", "correlation", "note")
+Row = tuple[str, list[str]]
+"""Where a row stands, for messages, and its cells."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,12 +176,6 @@ class CorrelatedSource:
         return f"jointly normal, σ = {spread}; the same for all units of a reducer"
 
 
-LIST_HEADERS = ("sources", "correlation", "note")
-
-Row = tuple[str, list[str]]
-"""Where a row stands, for messages, and its cells."""
-
-
 def load_correlations(path: Path | str, sources: Sequence[Source]) -> Correlation:
     """Return the correlations between sources from a CSV (UTF-8) or XLSX file, or a shipped one by its name.
 
@@ -224,7 +222,9 @@ def _pairs_of_list(rows: Sequence[Row], sources: Sequence[Source]) -> tuple[Pair
     pairs = []
     for place, cells in rows[1:]:
         row = dict(zip(header, cells, strict=True))
-        correlation = _number(row["correlation"], f"{place} ({row['sources'] or 'no sources'})")
+        correlation = number_at(
+            f"{place} ({row['sources'] or 'no sources'})", "correlation", row["correlation"], _ALLOWED
+        )
         pairs += [
             Pair(one=one, other=other, correlation=correlation, place=place)
             for one, other in combinations(_group(row["sources"], sources, place), 2)
@@ -262,7 +262,7 @@ def _pairs_of_matrix(rows: Sequence[Row], sources: Sequence[Source]) -> tuple[Pa
             f"{', '.join(below)}, across are {', '.join(header)}."
         )
     values = {
-        (one, other): (_number(cell, f"{place} ({one} with {other})"), place)
+        (one, other): (number_at(f"{place} ({one} with {other})", "correlation", cell, _ALLOWED), place)
         for place, (one, *cells) in rows[1:]
         for other, cell in zip(header, cells, strict=True)
     }
@@ -280,11 +280,3 @@ def _pairs_of_matrix(rows: Sequence[Row], sources: Sequence[Source]) -> tuple[Pa
         )
         for one, other in permutations(header, 2)
     )
-
-
-def _number(text: str, place: str) -> float:
-    """Return a cell as a number."""
-    try:
-        return plain_number(text)
-    except ValueError:
-        raise InputError.at(place, "correlation", text, "a number from -1 to 1 with a decimal point") from None

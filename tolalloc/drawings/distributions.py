@@ -26,6 +26,8 @@ _RAREST = 1e-50
 LEVELS = np.linspace(-8.2, 8.2, 4097)
 """Standard normal numbers that cover all probabilities between 0 and the float below 1 [-]."""
 LEVELS.setflags(write=False)
+_MOST_BATCHES = 20
+"""Most batches of a mixture that are believed [-]."""
 
 
 def ndtr(number: Any) -> Any:
@@ -61,16 +63,6 @@ class Distribution(StrEnum):
         """What is known of it."""
         return FORMS[self]
 
-    @property
-    def is_one_sided(self) -> bool:
-        """Whether a size starts at the lower limit of its zone rather than spreading around the middle."""
-        return self.form.is_one_sided
-
-    @property
-    def is_bounded(self) -> bool:
-        """Whether it ends, at Cp = 1 at the limit of the zone."""
-        return self.form.support is not None
-
 
 @dataclass(frozen=True)
 class Shapes:
@@ -96,7 +88,8 @@ class Form:
     shapes: Shapes | None = None  # The shapes that a row states, if any
     # Returns, of these shapes, those that scipy takes
     to_scipy: Callable[[tuple[float, ...]], tuple[float, ...]] = tuple
-    is_one_sided: bool = False  # Whether a size starts at the lower limit of its zone
+    # Whether a size starts at the lower limit of its zone rather than spreading around the middle
+    is_one_sided: bool = False
     # Returns whether its density is symmetric and the logarithm of that concave
     is_symmetric: Callable[[tuple[float, ...]], bool] = lambda _: False
 
@@ -168,15 +161,12 @@ class Marginal(Hashable, Protocol):
     @property
     def reach(self) -> float:
         """Value at the limit of the zone at Cp = 1: what 99.73 % of parts keep, or the end of a bounded one."""
-        ...
 
     def quantile(self, probability: Numbers) -> Numbers:
         """Return the values that are not exceeded with these probabilities in (0, 1) [own unit]."""
-        ...
 
     def probability(self, value: Numbers) -> Numbers:
         """Return the probabilities of not exceeding these values [-]."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -307,10 +297,6 @@ def moments(marginal: Marginal) -> tuple[float, float]:
     values, weights = marginal.quantile(ndtr(LEVELS)), weights / weights.sum()
     mean = float(weights @ values)
     return mean, sqrt(float(weights @ (values - mean) ** 2))
-
-
-_MOST_BATCHES = 20
-"""Most batches of a mixture that are believed [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)

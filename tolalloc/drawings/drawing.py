@@ -16,6 +16,8 @@ from tolalloc.drawings.heads import split_header
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.table_file import (
     DATA,
+    hidden_cells,
+    is_workbook,
     read_table_file,
     require_columns,
     setting_line,
@@ -102,6 +104,15 @@ class Drawing:
         ------
         InputError, UnknownNameError
             The row, field and value that are not allowed.
+
+        Examples
+        --------
+        A hub of 55.29 ± 0.1 mm is one source with one column, in metres:
+
+        >>> zone = {"plus": 0.1, "minus": -0.1, "unit": "mm", "min": 0.02, "max": 0.5, "cost": 3.0}
+        >>> hub = Drawing.of_rows([{"id": "hub", "nominal": 55.29, **zone}])
+        >>> hub.errors.columns, hub.sources[0].zone
+        (('hub',), 0.0002)
         """
         listed = list(rows) if isinstance(rows, Iterable) and not isinstance(rows, str | Mapping) else [rows]
         if not all(isinstance(row, Mapping) and "id" in row for row in listed):
@@ -240,14 +251,8 @@ def load_drawing(
         costs=_placed(costs if isinstance(costs, Mapping) else beside(folder, costs)),
         notes=(*notes, *doubts(sources, path.name)),
         currency=currency,
-        settings=_settings_of(path),
+        settings=stated_settings(path if path.suffix else DATA / f"{path.name}.tolerances.csv"),
     )
-
-
-def _settings_of(table: Path) -> dict[str, float]:
-    """Return the settings that a tolerance table states, a shipped one by its name too."""
-    shipped = DATA / f"{table.name}.tolerances.csv"
-    return stated_settings(table if table.suffix else shipped)
 
 
 def _read_beside(table: Path, sheet: str, columns: Mapping[str, str]) -> tuple[tuple[str, ...], str]:
@@ -266,14 +271,12 @@ def _notes(table: Path, header: int, sheet: str, own: Sequence[str]) -> tuple[st
     """Return what of a tolerance table was left out or only kept, how it was read, and what is hidden in it."""
     titles = f"{table.name}: the header stands in row {header}; what stands above it was left out"
     kept = f"{table.name}: kept as they are, and written again: {', '.join(own)}"
-    left_out = (*((titles,) if header > 1 else ()), *((kept,) if own else ()))
-    if table.suffix.lower() not in (".xlsx", ".xlsm") and (encoding := other_encoding(table)):
-        return (*left_out, f"{table.name}: read as {encoding}, since it is not UTF-8")
-    if table.suffix.lower() not in (".xlsx", ".xlsm"):
-        return left_out
-    from tolalloc.drawings.table_file import hidden_cells
-
-    return (*left_out, *hidden_cells(table, sheet))
+    found = [titles] * (header > 1) + [kept] * bool(own)
+    if is_workbook(table):
+        found += hidden_cells(table, sheet)
+    elif encoding := other_encoding(table):
+        found.append(f"{table.name}: read as {encoding}, since it is not UTF-8")
+    return tuple(found)
 
 
 def beside(folder: Path | None, name: str | Path) -> str | Path:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawings.compensators import Compensator, Standing, sorted_together
+from tolalloc.drawings.compensators import Compensator, Standing
 from tolalloc.drawings.correlation import CorrelatedSource, Correlation
 from tolalloc.drawings.distributions import ABOVE_ZERO, BELOW_ONE, ndtr, ndtri
 from tolalloc.drawings.sources import Source
@@ -101,7 +101,7 @@ class ErrorModel:
     @cached_property
     def blocks(self) -> tuple[tuple[str, ...], ...]:
         """Names of what varies, in sets that are independent of each other."""
-        tied = sorted_together(self.compensators)
+        tied = [pair for own in self.compensators for pair in own.tied]
         return (*self.correlation.blocks(self.sources, tied), *((source.name,) for source in self.joint))
 
     @property
@@ -204,17 +204,11 @@ class ErrorModel:
                 mixed[..., self.columns_of_source[source]] = np.clip(ndtr(own), ABOVE_ZERO, BELOW_ONE)
         return mixed
 
-    def marginal_values(
-        self, uniform: Float[np.ndarray, "sample column"], only: Collection[int] | None = None
-    ) -> Float[np.ndarray, "sample column"]:
-        """Return all deviations per unit of zone for uniform numbers that already have their correlation.
-
-        Those of some sources alone, and zero elsewhere, if their positions are given.
-        """
-        values, varying = np.zeros_like(uniform), self._varying
-        for at in range(len(varying)) if only is None else only:
-            own = self.columns_of_source[at]
-            values[:, own] = varying[at].standard_values(uniform[:, own])
+    def marginal_values(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
+        """Return all deviations per unit of zone for uniform numbers that already have their correlation."""
+        values = np.zeros_like(uniform)
+        for source, columns in zip(self._varying, self.columns_of_source, strict=True):
+            values[:, columns] = source.standard_values(uniform[:, columns])
         return values
 
     def deviations(

@@ -62,7 +62,7 @@ Cell = str | int | float | MeasuredParts | None
 
 
 @dataclass(frozen=True)
-class Column:
+class TableColumn:
     """What a tolerance table knows of a field beside its type, its limits and its default."""
 
     # What stands there, as ``docs/first-study.md`` explains it, and what the header says behind the name
@@ -162,16 +162,16 @@ class ToleranceRow(Record):
         str,
         Field(min_length=1),
         AfterValidator(_no_comment),
-        Column(
+        TableColumn(
             "name of the source, `check` offers the nearest one if it is not known; or your own where `source` says "
             "which one is meant",
             write=lambda source: source.own_id or source.name,
         ),
     ]
-    part: Annotated[str, Column("part that carries it; the id unless given", attribute="part")] = ""
+    part: Annotated[str, TableColumn("part that carries it; the id unless given", attribute="part")] = ""
     feature: Annotated[
         Feature,
-        Column(
+        TableColumn(
             "`size` (± zone), `position` (Ø zone of an axis), `pitch` (total cumulative deviation) or `runout` (full "
             "indicator reading); size unless given",
             attribute="feature",
@@ -179,16 +179,16 @@ class ToleranceRow(Record):
     ] = Feature.SIZE
     nominal: Annotated[
         float,
-        Column(
+        TableColumn(
             "nominal size, for grades, for you and for an own model; in inches where the unit is in",
             "mm",
             write=lambda source: _length_written(source, source.nominal),
         ),
     ] = 0.0
-    plus: Annotated[float, Column("upper limit; the zone is plus − minus", "unit", write=_plus)]
+    plus: Annotated[float, TableColumn("upper limit; the zone is plus − minus", "unit", write=_plus)]
     minus: Annotated[
         float,
-        Column(
+        TableColumn(
             "lower limit; 0 for all but sizes",
             "unit",
             write=lambda source: round(_plus(source) - _written(source, source.zone), _WRITTEN_DECIMALS[source.unit]),
@@ -197,24 +197,24 @@ class ToleranceRow(Record):
     unit: Annotated[
         str,
         AfterValidator(_known_unit),
-        Column("µm, mm, in or % (of the nominal size), for plus, minus, min and max", attribute="unit"),
+        TableColumn("µm, mm, in or % (of the nominal size), for plus, minus, min and max", attribute="unit"),
     ]
     distribution: Annotated[
         Distribution,
-        Column(
+        TableColumn(
             f"{_alternatives(f'`{kind}`' for kind in Distribution)}; normal unless given",
             attribute="distribution",
         ),
     ] = Distribution.NORMAL
-    Cp: Annotated[float, Field(ge=0.1, le=10), Column("capability; 1 unless given", "-", "cp")] = 1.0
+    Cp: Annotated[float, Field(ge=0.1, le=10), TableColumn("capability; 1 unless given", "-", "cp")] = 1.0
     shift: Annotated[
-        float, Field(ge=-1, le=1), Column("mean shift over half the zone, sizes only", "half zone", "shift")
+        float, Field(ge=-1, le=1), TableColumn("mean shift over half the zone, sizes only", "half zone", "shift")
     ] = 0.0
     shape: Annotated[
         str,
         BeforeValidator(shapes_text),
         AfterValidator(_known_shapes),
-        Column(
+        TableColumn(
             "of lognormal and Weibull; of a trapezoid its plateau over its width; of beta both, as `2 5`",
             "-",
             write=lambda source: shapes_cell(source.shapes),
@@ -222,7 +222,7 @@ class ToleranceRow(Record):
     ] = ""
     batches: Annotated[
         str,
-        Column(
+        TableColumn(
             "of a mixture, as weight:shift:spread: `0.7:-0.3:0.8 0.3:0.5:0.6`, shift in half zones",
             "weight:shift:spread",
             write=lambda source: batches_text(source.batches),
@@ -230,7 +230,7 @@ class ToleranceRow(Record):
     ] = ""
     measured: Annotated[
         str,
-        Column(
+        TableColumn(
             "file of at least 20 measured parts beside the table; distribution `empirical`. A CSV (`deviation [µm]` or "
             "`mean [µm],sigma [µm],parts`; of a position `x [µm],y [µm]` or `radius [µm]`), or a Q-DAS file, with one "
             "of its characteristics behind a colon: `parts.dfq:Diameter`",
@@ -240,7 +240,7 @@ class ToleranceRow(Record):
     measured_zone: Annotated[
         float | None,
         Field(ge=SMALLEST_ZONE, le=LARGEST_ZONE),
-        Column(
+        TableColumn(
             "the zone that the measured parts were made to; today's unless given",
             "unit",
             write=lambda source: source.measured.zone / source.unit_length if source.measured else None,
@@ -248,13 +248,13 @@ class ToleranceRow(Record):
     ] = None
     sorted: Annotated[
         bool,
-        Column(
+        TableColumn(
             "yes: parts outside the zone are sorted out before assembly (a truncated distribution)", attribute="sorted"
         ),
     ] = False
     process: Annotated[
         str,
-        Column(
+        TableColumn(
             "how the feature is made today: row of a process capability library (`ta.drawing(processes=)`), which then "
             "gives Cp, shift, distribution, shape and sorting unless the row states them, and of the process cost "
             "table; with Cp stated, the library need not know it",
@@ -263,39 +263,43 @@ class ToleranceRow(Record):
     ] = ""
     group: Annotated[
         str,
-        Column(
+        TableColumn(
             "rows of one group keep the ratios of their zones: both discs of one drawing. Unless given, rows of one "
             "feature on identical parts of a reducer form a group if zone, limits and price are the same; any other "
             "row stands alone",
             attribute="group",
         ),
     ] = ""
-    locked: Annotated[bool, Column("yes: allocation leaves the zone as it is", attribute="locked")] = False
+    locked: Annotated[bool, TableColumn("yes: allocation leaves the zone as it is", attribute="locked")] = False
     min: Annotated[
         float,
         Field(ge=0),
-        Column("smallest zone that may be asked for", "unit", write=lambda source: _written(source, source.minimum)),
+        TableColumn(
+            "smallest zone that may be asked for", "unit", write=lambda source: _written(source, source.minimum)
+        ),
     ]
     max: Annotated[
         float,
         Field(ge=0),
-        Column("largest zone that may be asked for", "unit", write=lambda source: _written(source, source.maximum)),
+        TableColumn(
+            "largest zone that may be asked for", "unit", write=lambda source: _written(source, source.maximum)
+        ),
     ]
     cost: Annotated[
         float,
         Field(ge=0, le=1e9),
-        Column(
+        TableColumn(
             "cost of the feature at its zone; it falls as 1/zone unless a process cost table says otherwise",
             COST_UNITS,
             "cost",
             write=lambda source: round(source.cost, 12),
         ),
     ]
-    grade: Annotated[str, Column("carried through", attribute="grade")] = ""
+    grade: Annotated[str, TableColumn("carried through", attribute="grade")] = ""
     step: Annotated[
         float,
         Field(ge=0, le=LARGEST_ZONE),
-        Column(
+        TableColumn(
             "step of the numbers that the drawing states, to which an allocated zone is rounded down: the zone, or for "
             "a size its deviations; 0.01 µm below 1 µm, 0.1 below 10, 0.5 below 100, then 1 unless given, for a "
             "reducer; an own model's zones stay as found",
@@ -305,7 +309,7 @@ class ToleranceRow(Record):
     ] = 0.0
     spectrum: Annotated[
         str,
-        Column(
+        TableColumn(
             "for pitch and run-out: order:relative amplitude, as `1:9.2 2:4.3 4:1`; `random:1.0/40` adds 40 "
             "independent teeth",
             "order:amplitude",
@@ -315,7 +319,7 @@ class ToleranceRow(Record):
     ] = ""
     systematic: Annotated[
         str,
-        Column(
+        TableColumn(
             "for pitch and run-out: waves that all parts share beside the random ones, as `2:5.0@30`: order of the "
             "spectrum, amplitude in the unit of the row, direction of a crest",
             "order:amplitude@°",
@@ -325,7 +329,7 @@ class ToleranceRow(Record):
     each: Annotated[
         int,
         Field(ge=1, le=1000),
-        Column(
+        TableColumn(
             "like features that each deviate on their own, for `each_pin.…` and `disc{j}.each_tooth.…`: their number",
             "-",
             "each",
@@ -334,7 +338,7 @@ class ToleranceRow(Record):
     over: Annotated[
         float | None,
         Field(ge=0.001, le=1000),
-        Column(
+        TableColumn(
             "for tilt, phase and rotation: the length over which the zone limits the deviation; in inches where the "
             "unit is in",
             "mm",
@@ -343,18 +347,18 @@ class ToleranceRow(Record):
     ] = None
     drawing: Annotated[
         str,
-        Column(
+        TableColumn(
             "number and revision of the drawing that states the zone; shown beside the id in tables of reports",
             attribute="drawing",
         ),
     ] = ""
     label: Annotated[
         str,
-        Column("your own word for it, as the drawing has it; shown beside the id as well", attribute="label"),
+        TableColumn("your own word for it, as the drawing has it; shown beside the id as well", attribute="label"),
     ] = ""
     source: Annotated[
         str,
-        Column(
+        TableColumn(
             "the source that is meant where the id is your own, which is then shown beside it and may stand for it in "
             "process costs, correlations and `whatif`",
             write=lambda source: source.name if source.own_id else "",
@@ -363,7 +367,7 @@ class ToleranceRow(Record):
     places: Annotated[
         int,
         Field(ge=0, le=1000),
-        Column(
+        TableColumn(
             "like places that the row stands for, `6` or `6x`, which may also stand before its name: `source` is then "
             "a pattern such as `crank*.journal*.eccentricity`, or the name without its numbers; zone and cost are "
             "those of each",
@@ -371,7 +375,7 @@ class ToleranceRow(Record):
             write=lambda source: source.places or None,
         ),
     ] = 0
-    note: Annotated[str, Column("carried through", attribute="note")] = ""
+    note: Annotated[str, TableColumn("carried through", attribute="note")] = ""
 
     @property
     def name(self) -> str:
@@ -558,7 +562,7 @@ class ToleranceRow(Record):
 
 
 COLUMNS = {
-    name: next(item for item in field.metadata if isinstance(item, Column))
+    name: next(item for item in field.metadata if isinstance(item, TableColumn))
     for name, field in ToleranceRow.model_fields.items()
 }
 """Field → what a table knows of it."""

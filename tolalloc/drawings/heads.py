@@ -77,10 +77,13 @@ class Heads:
 
     def require_in(self, path: Path, rows: Sequence[Sequence[str]]) -> None:
         """Raise unless a row has a head for each column that is needed, and a column each head that is said so."""
-        at = max(range(len(rows[:MOST_TITLES])), key=lambda at: sum(map(_is_word, rows[at])), default=0)
+        first = rows[:MOST_TITLES]
+        words = [sum(bool(cell) and not _NUMBER.fullmatch(cell) for cell in cells) for cells in first]
+        at = words.index(max(words)) if words else 0
         seen = [cell for cell in (rows[at] if rows else ()) if cell]
         # Of a table that has most of its heads it is said which one is missing.
-        if seen and len(self.named(seen) & {*self.known}) < _SOME and not any(map(self._names_all, rows[:MOST_TITLES])):
+        has_all = any(self.named(cells).issuperset(self.needed) for cells in first)
+        if seen and len(self.named(seen) & {*self.known}) < _SOME and not has_all:
             raise InputError(
                 f"{path}: no row has a head {' and '.join(map(repr, self.needed))}; row {at + 1} has "
                 f"{', '.join(map(repr, seen))}. Say what these are, each with a name of a column or left out, in "
@@ -91,9 +94,6 @@ class Heads:
         for own in self.called:
             if _spelt(_without_unit(own)) not in map(_spelt, there):
                 raise UnknownNameError.among(f"{path}, columns", "head", _without_unit(own), there)
-
-    def _names_all(self, cells: Sequence[str]) -> bool:
-        return self.named(cells).issuperset(self.needed)
 
     def kind(self, head: str) -> str:
         """Return what stands under a head of a table: number, text (of ours), or words that nothing is read from."""
@@ -117,11 +117,6 @@ def _without_unit(head: str) -> str:
     name, _ = split_header(head)
     bracket = _BRACKET.fullmatch(name)
     return bracket[1] if bracket and is_unit(bracket[2]) else name
-
-
-def _is_word(cell: str) -> bool:
-    """Return whether a cell may be a head: text that is no number."""
-    return bool(cell) and not _NUMBER.fullmatch(cell)
 
 
 @cache

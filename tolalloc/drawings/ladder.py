@@ -67,36 +67,6 @@ _COARSE = frozenset(("IT14", "IT15", "IT16", "IT17", "IT18"))
 
 _ROUNDING = 1e-9
 """What a number may lose between units, and a zone on its way through a table [-]."""
-
-
-def _size_step(nominal: float) -> int:
-    """Return the position of the size step of a nominal size [m]; one outside 0 to 500 mm is an InputError.
-
-    >>> SIZE_STEPS[_size_step(0.052)]
-    80
-    """
-    size = nominal / MILLIMETRE
-    if not 0 < size <= SIZE_STEPS[-1] * (1 + _ROUNDING):
-        raise InputError.at("ISO 286-1", "nominal [mm]", size, f"a number above 0 and up to {SIZE_STEPS[-1]}")
-    return bisect_left(SIZE_STEPS, size * (1 - _ROUNDING))
-
-
-def grade_zones(nominal: float) -> dict[str, float]:
-    """Return the zone of every grade of a nominal size in metres, finest first [m]; printed values of ISO 286-1.
-
-    As printed in ISO 286-1:2010; from IT12 on IT(n) = 10·IT(n − 5). For 0 to 500 mm.
-
-    >>> round(grade_zones(0.052)["IT6"] * 1e6), round(grade_zones(0.052)["IT12"] * 1e6)
-    (19, 300)
-    """
-    step = _size_step(nominal)
-    zones = {grade: row[step] * MICROMETRE for grade, row in PRINTED.items()}
-    for number in range(12, 19):
-        zones[f"IT{number}"] = 10 * zones[f"IT{number - 5}"]
-    too_small = nominal <= MILLIMETRE * (1 + _ROUNDING)
-    return {grade: zone for grade, zone in zones.items() if not (too_small and grade in _COARSE)}
-
-
 _SHAFTS = {
     "d": (-20, -30, -40, -50, -65, -80, -100, -120, -145, -170, -190, -210, -230),
     "e": (-14, -20, -25, -32, -40, -50, -60, -72, -85, -100, -110, -125, -135),
@@ -118,6 +88,52 @@ _CORRECTED = {"K": 8, "M": 8, "N": 8, "P": 7}
 _OF_K = range(4, 8)
 _FITS = "d to h, js, k, m, n and p, the same of holes in capitals, or IT, with a grade, such as h5, H7 or IT6"
 """Fits that are known."""
+SERIES = "R′10"
+"""Name of the series."""
+_DECADE = (1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0, 5.0, 6.3, 8.0)
+"""Its values within one decade [-]."""
+ZONES = np.array([*(float(f"{value}e{power}") for power in range(-1, 3) for value in _DECADE), 1000.0]) * MICROMETRE
+"""All zones from 0.1 µm to 1 mm [m]."""
+RADII = ("radius", "groove")
+"""Last part of the name of a size that is a radius. ISO 286 grades diameters and widths; read for the
+number of a radius, a grade would be one of a feature half as large."""
+
+
+def _size_step(nominal: float) -> int:
+    """Return the position of the size step of a nominal size [m]; one outside 0 to 500 mm is an InputError.
+
+    >>> SIZE_STEPS[_size_step(0.052)]
+    80
+    """
+    size = nominal / MILLIMETRE
+    if not 0 < size <= SIZE_STEPS[-1] * (1 + _ROUNDING):
+        raise InputError.at("ISO 286-1", "nominal [mm]", size, f"a number above 0 and up to {SIZE_STEPS[-1]}")
+    return bisect_left(SIZE_STEPS, size * (1 - _ROUNDING))
+
+
+def tolerance_factor(nominal: float) -> float:
+    """Return the standard tolerance factor of ISO 286-1, i = 0.45·D^⅓ + 0.001·D in µm for D in mm [m].
+
+    Zones of IT6 are 10·i and of IT16 1,000·i; a nominal size of 10 mm has i = 0.98 µm.
+    """
+    size = max(nominal / MILLIMETRE, 1.0)
+    return float((0.45 * size ** (1 / 3) + 0.001 * size) * MICROMETRE)
+
+
+def grade_zones(nominal: float) -> dict[str, float]:
+    """Return the zone of every grade of a nominal size in metres, finest first [m]; printed values of ISO 286-1.
+
+    As printed in ISO 286-1:2010; from IT12 on IT(n) = 10·IT(n − 5). For 0 to 500 mm.
+
+    >>> round(grade_zones(0.052)["IT6"] * 1e6), round(grade_zones(0.052)["IT12"] * 1e6)
+    (19, 300)
+    """
+    step = _size_step(nominal)
+    zones = {grade: row[step] * MICROMETRE for grade, row in PRINTED.items()}
+    for number in range(12, 19):
+        zones[f"IT{number}"] = 10 * zones[f"IT{number - 5}"]
+    too_small = nominal <= MILLIMETRE * (1 + _ROUNDING)
+    return {grade: zone for grade, zone in zones.items() if not (too_small and grade in _COARSE)}
 
 
 def is_fit(text: str) -> bool:
@@ -165,20 +181,6 @@ def fit_deviations(fit: str, nominal: float) -> tuple[float, float]:
     elif letter == "N":
         size = 0.0 if step else size
     return 0.0 - size, 0.0 - size - width
-
-
-SERIES = "R′10"
-"""Name of the series."""
-
-_DECADE = (1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0, 5.0, 6.3, 8.0)
-"""Its values within one decade [-]."""
-
-ZONES = np.array([*(float(f"{value}e{power}") for power in range(-1, 3) for value in _DECADE), 1000.0]) * MICROMETRE
-"""All zones from 0.1 µm to 1 mm [m]."""
-
-RADII = ("radius", "groove")
-"""Last part of the name of a size that is a radius. ISO 286 grades diameters and widths; read for the
-number of a radius, a grade would be one of a feature half as large."""
 
 
 @dataclass(frozen=True, kw_only=True)

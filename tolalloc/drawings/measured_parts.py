@@ -40,6 +40,25 @@ _FACTORS = {"µm": 1.0, "um": 1.0, "mm": 1000.0}
 _SUMMARY = ("mean", "sigma", "parts")
 """Columns of a file that has a mean and a standard deviation instead of single parts."""
 _LAYOUTS = {Feature.SIZE: (("deviation",), _SUMMARY), Feature.POSITION: (("x", "y"), ("radius",))}
+_FAR = 10.0
+"""Standard deviations, or halves of a zone, from which on measured parts are doubted [-]."""
+_QUARTILES = 1.349
+"""Distance of the quartiles of a normal distribution [σ]."""
+_FINEST = 1e-3
+"""Spread below which no gauge tells parts apart [half zone]; assumption."""
+_AQDEF = re.compile(r"(.+\.(?:dfq|dfd|dfx))(?::(.*))?", re.IGNORECASE)
+"""Name of a Q-DAS file, and of the characteristic behind it."""
+_KEY = re.compile(r"(K\d{4})(?:/(\d{1,6}))?(?:\s+(.*))?")
+"""Line of such a file that begins with a field: its key, the characteristic that it is about, and its content."""
+_BETWEEN_CHARACTERISTICS, _BETWEEN_FIELDS = "\x0f", "\x14"
+_BEGIN = ("K1001", "K2001")
+"""Fields with which the description of a part, and of a characteristic, begins; behind values it is that of another."""
+_VALID = "0"
+"""Content of K0002 of a value that counts; 129, 255, 256 and 290 mark one that does not."""
+_ATTRIBUTIVE = "1"
+"""Content of K2004 of a characteristic that is counted, not measured."""
+_SAME = 1e-4
+"""Difference of nominal sizes or limits up to which they are the same: a tenth of a micrometre [mm]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,14 +94,6 @@ class MeasuredFit:
         return self.fits[0]
 
 
-_FAR = 10.0
-"""Standard deviations, or halves of a zone, from which on measured parts are doubted [-]."""
-_QUARTILES = 1.349
-"""Distance of the quartiles of a normal distribution [σ]."""
-_FINEST = 1e-3
-"""Spread below which no gauge tells parts apart [half zone]; assumption."""
-
-
 @dataclass(frozen=True)
 class StatedProcess:
     """Mean and standard deviation of measured parts whose single values nobody kept."""
@@ -104,7 +115,7 @@ class MeasuredParts:
 
     The process is assumed to be normal, of a position on each axis, with the mean and the standard deviation of the
     parts, unless the parts refute that with an error of 1 % (Anderson & Darling 1954); then they are smoothed. What so
-    few parts leave open of mean and standard deviation is `tolalloc.capability.monte_carlo.ProcessDoubt`.
+    few parts leave open of mean and standard deviation is `tolalloc.capability.monte_carlo.ProcessUncertainty`.
 
     References
     ----------
@@ -309,7 +320,8 @@ def load_measured_parts(path: Path, made_to: MadeTo, characteristic: str = "") -
     names = tuple(split_header(header)[0] for header in table.headers)
     layouts = _LAYOUTS[made_to.feature]
     if names not in layouts:
-        allowed = " or ".join(" and ".join(_header(name) for name in layout) for layout in layouts)
+        written = {name: name if name == "parts" else f"{name} [µm]" for layout in layouts for name in layout}
+        allowed = " or ".join(" and ".join(written[name] for name in layout) for layout in layouts)
         raise InputError.at(path, f"columns for feature {made_to.feature.value}", ", ".join(table.headers), allowed)
     if names == _SUMMARY:
         return _stated(table, made_to)
@@ -321,23 +333,20 @@ def load_measured_parts(path: Path, made_to: MadeTo, characteristic: str = "") -
     return _measured(path, values, made_to)
 
 
-def _header(name: str) -> str:
-    return name if name == "parts" else f"{name} [µm]"
-
-
 def _measured(path: Path, values: Float[np.ndarray, " part"], made_to: MadeTo, **more: Any) -> MeasuredParts:
     """Return parts with these deviations or radii [µm], which must be enough and differ."""
     if values.size < FEWEST_PARTS:
         raise InputError.at(path, "number of measured parts", values.size, f"{FEWEST_PARTS} or more")
     if np.ptp(values) == 0.0:
         raise InputError.at(path, "every measured part", f"{values[0]:g} µm", "parts that differ from each other")
+    return _made(path, made_to, tuple((values * MICROMETRE).tolist()), **more)
+
+
+def _made(path: Path, made_to: MadeTo, values: tuple[float, ...] = (), **more: Any) -> MeasuredParts:
+    """Return parts of a feature, with these deviations or radii [m]."""
+    are_radii = made_to.feature is Feature.POSITION
     return MeasuredParts(
-        path=path,
-        values=tuple((values * MICROMETRE).tolist()),
-        are_radii=made_to.feature is Feature.POSITION,
-        zone=made_to.zone,
-        middle=made_to.middle,
-        **more,
+        path=path, values=values, are_radii=are_radii, zone=made_to.zone, middle=made_to.middle, **more
     )
 
 
@@ -353,14 +362,7 @@ def _stated(table: TextTable, made_to: MadeTo) -> MeasuredParts:
     if not FEWEST_PARTS <= count <= MOST_PARTS:
         allowed = f"the number of parts behind mean and sigma, {FEWEST_PARTS} to {MOST_PARTS}"
         raise InputError.at(where, "parts", written[2], allowed)
-    return MeasuredParts(
-        path=table.path,
-        values=(),
-        are_radii=False,
-        zone=made_to.zone,
-        middle=made_to.middle,
-        stated=StatedProcess(mean * MICROMETRE, deviation * MICROMETRE, count),
-    )
+    return _made(table.path, made_to, stated=StatedProcess(mean * MICROMETRE, deviation * MICROMETRE, count))
 
 
 def _column(table: TextTable, at: int) -> list[float]:
@@ -371,10 +373,7 @@ def _column(table: TextTable, at: int) -> list[float]:
         raise InputError.at(table.path, f"the unit of column {header!r}", unit, "µm, um or mm in square brackets")
     values, faults = [], Faults()
     for row, cells in zip(table.rows, table.cells, strict=True):
-        try:
-            value = plain_number(cells[at]) * _FACTORS[unit]
-        except ValueError:
-            value = float("nan")
+        value = _number(cells[at]) * _FACTORS[unit]
         if not (isfinite(value) and abs(value) <= LARGEST_DEVIATION):
             with faults.kept():
                 allowed = f"a number from {-LARGEST_DEVIATION:.0f} to {LARGEST_DEVIATION:.0f} µm"
@@ -382,21 +381,6 @@ def _column(table: TextTable, at: int) -> list[float]:
         values.append(value)
     faults.require_none()
     return values
-
-
-_AQDEF = re.compile(r"(.+\.(?:dfq|dfd|dfx))(?::(.*))?", re.IGNORECASE)
-"""Name of a Q-DAS file, and of the characteristic behind it."""
-_KEY = re.compile(r"(K\d{4})(?:/(\d{1,6}))?(?:\s+(.*))?")
-"""Line of such a file that begins with a field: its key, the characteristic that it is about, and its content."""
-_BETWEEN_CHARACTERISTICS, _BETWEEN_FIELDS = "\x0f", "\x14"
-_BEGIN = ("K1001", "K2001")
-"""Fields with which the description of a part, and of a characteristic, begins; behind values it is that of another."""
-_VALID = "0"
-"""Content of K0002 of a value that counts; 129, 255, 256 and 290 mark one that does not."""
-_ATTRIBUTIVE = "1"
-"""Content of K2004 of a characteristic that is counted, not measured."""
-_SAME = 1e-4
-"""Difference of nominal sizes or limits up to which they are the same: a tenth of a micrometre [mm]."""
 
 
 @dataclass(frozen=True)
@@ -534,8 +518,13 @@ def _named(path: Path, name: str, found: dict[int, _Characteristic]) -> _Charact
 
 def _aqdef_number(text: str) -> float:
     """Return a number with a decimal comma or point, not a number where it is none."""
+    return _number(text.strip().replace(",", "."))
+
+
+def _number(text: str) -> float:
+    """Return a number with a decimal point, not a number where it is none."""
     try:
-        return plain_number(text.strip().replace(",", "."))
+        return plain_number(text)
     except ValueError:
         return float("nan")
 

@@ -25,6 +25,29 @@ def require_seed(work: str, seed: int) -> None:
         raise InputError.of_argument(work, "seed", seed, "0 or a positive integer")
 
 
+class SamplingDesign(StrEnum):
+    """How the samples of a study are spread.
+
+    Notes
+    -----
+    Monte Carlo: independent samples, the only ones for which an exact interval of a share (Clopper–Pearson) or of a
+    quantile (order statistics) holds. Latin hypercube: each chunk is a Latin hypercube of its own, independent of the
+    others (replicated Latin hypercubes). No permutation runs over all samples, and the spread of the chunks' means
+    gives an honest standard error of the mean of the whole chunks; a last chunk that is cut is a random part of one.
+    Sobol': consecutive points of one scrambled sequence, so that chunks depend on each other; an honest standard error
+    comes from several nodes of the seed tree, each with a scrambling of its own. A power of two of samples is balanced.
+
+    References
+    ----------
+    McKay, Beckman & Conover 1979, Technometrics 21 (Latin hypercubes); Iman & Conover 1980, Commun. Stat. A9
+    (replications); Owen 1998, J. Complexity 14 (scrambled sequences), as scipy implements them.
+    """
+
+    MONTE_CARLO = "monte carlo"
+    LATIN_HYPERCUBE = "latin hypercube"
+    SOBOL = "sobol"
+
+
 @dataclass(frozen=True)
 class SeedTree:
     """A place in the tree of random numbers: who draws there draws the same, whoever draws elsewhere, and when.
@@ -53,62 +76,30 @@ class SeedTree:
         """Return a positive integer for libraries that take 0 as no seed at all."""
         return int(self.generator().integers(1, 2**31 - 1))
 
-    def uniform_chunk(self, index: int, columns: int) -> Float[np.ndarray, "sample column"]:
-        """Return one whole chunk of uniform numbers in (0, 1) [-]."""
+    def uniform_chunk(
+        self, index: int, columns: int, design: SamplingDesign = SamplingDesign.MONTE_CARLO
+    ) -> Float[np.ndarray, "sample column"]:
+        """Return one whole chunk of uniform numbers in (0, 1), the first one at index 0 [-]."""
+        if design is SamplingDesign.SOBOL:
+            from scipy.stats import qmc
+
+            sequence = qmc.Sobol(columns, bits=_SOBOL_BITS, rng=self.generator())
+            if index:
+                sequence.fast_forward(index * CHUNK)
+            # The middle of the smallest cell: 0 would be an infinite normal deviate.
+            return np.asarray(sequence.random(CHUNK) + 0.5**_SOBOL_BITS / 2)
+        generator = self.generator(index)
+        if design is SamplingDesign.LATIN_HYPERCUBE:
+            stratum = generator.permuted(np.tile(np.arange(CHUNK)[:, np.newaxis], columns), axis=0)
+            uniform = (stratum + generator.random(stratum.shape)) / CHUNK
+        else:
+            uniform = generator.random((CHUNK, columns))
         # Zero would be an infinite normal deviate; the next float above it is not.
-        return np.maximum(self.generator(index).random((CHUNK, columns)), np.finfo(float).tiny)
+        return np.asarray(np.maximum(uniform, np.finfo(float).tiny))
 
-    def uniform_chunks(self, samples: int, columns: int) -> Iterator[Float[np.ndarray, "sample column"]]:
-        """Yield uniform numbers in (0, 1) chunk by chunk."""
+    def uniform_chunks(
+        self, samples: int, columns: int, design: SamplingDesign = SamplingDesign.MONTE_CARLO
+    ) -> Iterator[Float[np.ndarray, "sample column"]]:
+        """Yield uniform numbers in (0, 1) chunk by chunk; the last chunk is cut to the number of samples [-]."""
         for index, start in enumerate(range(0, samples, CHUNK)):
-            yield self.uniform_chunk(index, columns)[: samples - start]
-
-
-class SamplingDesign(StrEnum):
-    """How the samples of a study are spread."""
-
-    MONTE_CARLO = "monte carlo"
-    LATIN_HYPERCUBE = "latin hypercube"
-    SOBOL = "sobol"
-
-
-def uniform_chunks(
-    design: SamplingDesign, seeds: SeedTree, samples: int, columns: int
-) -> Iterator[Float[np.ndarray, "sample column"]]:
-    """Yield uniform numbers in (0, 1) chunk by chunk; the last chunk is cut to the number of samples [-]."""
-    for index, start in enumerate(range(0, samples, CHUNK)):
-        yield uniform_chunk(design, seeds, index, columns)[: samples - start]
-
-
-def uniform_chunk(
-    design: SamplingDesign, seeds: SeedTree, index: int, columns: int
-) -> Float[np.ndarray, "sample column"]:
-    """Return one whole chunk of uniform numbers in (0, 1), the first one at index 0 [-].
-
-    Notes
-    -----
-    Monte Carlo: independent samples, the only ones for which an exact interval of a share (Clopper–Pearson) or of a
-    quantile (order statistics) holds. Latin hypercube: each chunk is a Latin hypercube of its own, independent of the
-    others (replicated Latin hypercubes). No permutation runs over all samples, and the spread of the chunks' means
-    gives an honest standard error of the mean of the whole chunks; a last chunk that is cut is a random part of one.
-    Sobol': consecutive points of one scrambled sequence, so that chunks depend on each other; an honest standard error
-    comes from several nodes of the seed tree, each with a scrambling of its own. A power of two of samples is balanced.
-
-    References
-    ----------
-    McKay, Beckman & Conover 1979, Technometrics 21 (Latin hypercubes); Iman & Conover 1980, Commun. Stat. A9
-    (replications); Owen 1998, J. Complexity 14 (scrambled sequences), as scipy implements them.
-    """
-    if design is SamplingDesign.LATIN_HYPERCUBE:
-        generator = seeds.generator(index)
-        stratum = generator.permuted(np.tile(np.arange(CHUNK)[:, np.newaxis], columns), axis=0)
-        return np.asarray(np.maximum((stratum + generator.random(stratum.shape)) / CHUNK, np.finfo(float).tiny))
-    if design is SamplingDesign.SOBOL:
-        from scipy.stats import qmc
-
-        sequence = qmc.Sobol(columns, bits=_SOBOL_BITS, rng=seeds.generator())
-        if index:
-            sequence.fast_forward(index * CHUNK)
-        # The middle of the smallest cell: 0 would be an infinite normal deviate.
-        return np.asarray(sequence.random(CHUNK) + 0.5**_SOBOL_BITS / 2)
-    return seeds.uniform_chunk(index, columns)
+            yield self.uniform_chunk(index, columns, design)[: samples - start]

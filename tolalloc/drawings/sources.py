@@ -34,6 +34,17 @@ INCHES, PERCENT = "in", "%"
 """Units of a row beside the metric ones; a per cent is one of the nominal size."""
 LENGTHS = {"µm": MICROMETRE, "mm": MILLIMETRE, INCHES: INCH}
 """Unit of a length → its length [m]."""
+STEPS = ((1.0, 0.01), (10.0, 0.1), (100.0, 0.5), (np.inf, 1.0))
+"""Step of a number on a reducer's drawing up to a size, where its table states none: two or three figures [µm]. An
+assumption: a tenth of a micrometre is what a measuring room tells apart on parts of a reducer; finer numbers need finer
+steps."""
+_WHOLE = 1e-6
+"""Part of a step that a number may lack and still count as whole [-]."""
+_ROUNDING = 1e-9
+"""Mean of a deviation over its zone, up to which it is rounding [-]."""
+_POINTS_PER_WAVE = 32
+"""Points of the shortest wave of a spectrum; the range between them is at most 0.5 % too small."""
+_TIMES = re.compile(r"(?:(\d+)[x×] +)?(.*?)(?: +\(?(\d+)[x×]\)?)?", re.DOTALL)
 
 
 def is_angular(source: str) -> bool:
@@ -43,15 +54,6 @@ def is_angular(source: str) -> bool:
     (True, False)
     """
     return source.rpartition(".")[2] in ANGULAR
-
-
-STEPS = ((1.0, 0.01), (10.0, 0.1), (100.0, 0.5), (np.inf, 1.0))
-"""Step of a number on a reducer's drawing up to a size, where its table states none: two or three figures [µm]. An
-assumption: a tenth of a micrometre is what a measuring room tells apart on parts of a reducer; finer numbers need finer
-steps."""
-
-_WHOLE = 1e-6
-"""Part of a step that a number may lack and still count as whole [-]."""
 
 
 def rounded_down(number: float, step: float = 0.0, usual: Sequence[tuple[float, float]] = STEPS) -> float:
@@ -71,13 +73,6 @@ def rounded_down(number: float, step: float = 0.0, usual: Sequence[tuple[float, 
     if not own:
         return number
     return float(np.floor(size / own + _WHOLE) * own * MICROMETRE)
-
-
-_ROUNDING = 1e-9
-"""Mean of a deviation over its zone, up to which it is rounding [-]."""
-
-_POINTS_PER_WAVE = 32
-"""Points of the shortest wave of a spectrum; the range between them is at most 0.5 % too small."""
 
 
 def neglected_columns(patterns: Sequence[str], columns: Sequence[str]) -> frozenset[str]:
@@ -110,9 +105,6 @@ def known_as(sources: Iterable[Source]) -> list[str]:
     known = tuple(sources)
     ids = Counter(own.own_id for own in known if own.own_id)
     return [*(own.name for own in known), *(own_id for own_id, places in ids.items() if places == 1)]
-
-
-_TIMES = re.compile(r"(?:(\d+)[x×] +)?(.*?)(?: +\(?(\d+)[x×]\)?)?", re.DOTALL)
 
 
 def like_places(text: str) -> tuple[int, str]:

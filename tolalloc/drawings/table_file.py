@@ -46,6 +46,19 @@ _MOST_CELLS = 100_000
 
 _BLANKS, _UNSEEN = re.compile(r"[\u00a0\u2007\u2009\u202f]"), re.compile(r"[\u200b-\u200d\u2060\ufeff\u00ad]")
 """Blanks of other widths, and signs that nobody sees."""
+DATA = Path(__file__).parent / "data"
+"""Shipped tables."""
+NumberedRow = tuple[int, tuple[str, ...]]
+"""Row as an editor counts it, from 1, and its cells."""
+_DECIMAL = re.compile(r"[+-]?\d*[.,]\d+([eE][+-]?\d+)?", re.ASCII)
+"""Number with one decimal sign, whichever."""
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
+"""Number that is a thousand times as large where the sign separates thousands."""
+_APOSTROPHE = re.compile(r"^'(?=[=+\-@])")
+"""What `tolalloc.reading.files.no_formula` writes before a text."""
+_ANY = Heads()
+_SETTING = re.compile(r"#\s*setting:\s*(.+?)\s*=\s*(\S+?)\s*[;,\t]*")
+Row = TypeVar("Row", bound=Record)
 
 
 class DateText(str):
@@ -58,6 +71,11 @@ class AmbiguousText(str):
     """Text that is another number where its sign separates thousands: no matter in a note, refused as a number."""
 
     __slots__ = ()
+
+
+def is_workbook(path: Path) -> bool:
+    """Return whether a table is a workbook, by its ending."""
+    return path.suffix.lower() in (".xlsx", ".xlsm")
 
 
 def sheet_texts(path: Path, sheet: str, heads: Heads) -> list[tuple[str, ...]]:
@@ -78,10 +96,10 @@ def sheet_texts(path: Path, sheet: str, heads: Heads) -> list[tuple[str, ...]]:
         _require_small(path, content)
         # Values do not say which cells were formulas, and formulas do not say their values.
         values, formulas = (_loaded(path, content, data_only, sheet) for data_only in (True, False))
-        texts = [_blank_if_comment(row) for row in _texts(path, values, formulas)]
+        # A row whose first text begins with # is a comment, as a line of a CSV file.
+        texts = [() if next(filter(None, row), "").startswith("#") else row for row in _texts(path, values, formulas)]
         heads.require_in(path, texts)
-        _require_single(path, values, first := 1 + heads.row_in(texts))
-        _require_none_struck(path, values, first, texts)
+        _require_plain_cells(path, values, 1 + heads.row_in(texts), texts)
     except InputError:
         raise
     except Exception as error:  # whatever the libraries raise on a damaged file: of zlib, XML, types, indices
@@ -168,21 +186,12 @@ def _texts(path: Path, values: Any, formulas: Any) -> list[tuple[str, ...]]:
     ]
 
 
-def _blank_if_comment(row: tuple[str, ...]) -> tuple[str, ...]:
-    """Return a row without anything where its first text begins with #, as a line of a CSV file."""
-    return () if next((cell for cell in row if cell), "").startswith("#") else row
-
-
-def _require_single(path: Path, values: Any, first: int) -> None:
-    """Raise if cells are merged from the first row of the table on."""
+def _require_plain_cells(path: Path, values: Any, first: int, texts: Sequence[tuple[str, ...]]) -> None:
+    """Raise if cells are merged from the first row of the table on, or struck out in a row that is no comment."""
     for where in values.merged_cells.ranges:
         if where.max_row >= first:
             place = f"{path}, sheet {values.title!r}"
             raise InputError(f"{place}: the cells {where} are merged; allowed is one value in each cell.")
-
-
-def _require_none_struck(path: Path, values: Any, first: int, texts: Sequence[tuple[str, ...]]) -> None:
-    """Raise if a row of the table has cells that are struck out, unless it is a comment."""
     cells = (cell for row in values.iter_rows(min_row=first) if any(texts[row[0].row - 1]) for cell in row)
     if struck := list(dict.fromkeys(cell.row for cell in cells if cell.value is not None and cell.font.strike)):
         said = f"rows {', '.join(map(str, struck))} are" if len(struck) > 1 else f"row {struck[0]} is"
@@ -225,26 +234,6 @@ def _plain(cell: str) -> str:
     return negative if is_number else cell
 
 
-DATA = Path(__file__).parent / "data"
-"""Shipped tables."""
-
-NumberedRow = tuple[int, tuple[str, ...]]
-"""Row as an editor counts it, from 1, and its cells."""
-
-_DECIMAL = re.compile(r"[+-]?\d*[.,]\d+([eE][+-]?\d+)?", re.ASCII)
-"""Number with one decimal sign, whichever."""
-
-_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
-"""Number that is a thousand times as large where the sign separates thousands."""
-
-
-_APOSTROPHE = re.compile(r"^'(?=[=+\-@])")
-"""What `tolalloc.reading.files.no_formula` writes before a text."""
-
-
-_ANY = Heads()
-
-
 def read_table_file(path: Path, heads: Heads = _ANY, sheet: str = "") -> tuple[NumberedRow, ...]:
     """Return the cells of a CSV or XLSX file as text, the header first, blank rows left out.
 
@@ -256,7 +245,7 @@ def read_table_file(path: Path, heads: Heads = _ANY, sheet: str = "") -> tuple[N
     InputError
         The file is missing, no table, or without that sheet; or cells stand under no header.
     """
-    if path.suffix.lower() in (".xlsx", ".xlsm"):
+    if is_workbook(path):
         rows = _under_headers(path, _without_titles(sheet_texts(path, sheet, heads), heads), "each needs one")
         kinds = [heads.kind(name) for name in rows[0][1]] if rows else []
         rows = rows[:1] + [_with_points(path, number, cells, kinds) for number, cells in rows[1:]]
@@ -408,7 +397,7 @@ def _with_decimal_points(
     decimals = {
         cells[at]: number
         for number, cells in rows
-        for at in numbers[: len(cells)]
+        for at in numbers
         if at < len(cells) and _DECIMAL.fullmatch(cells[at])
     }
     grouped = {cell: number for cell, number in decimals.items() if _THOUSANDS.fullmatch(cell)}
@@ -425,9 +414,6 @@ def _with_decimal_points(
     ]
 
 
-_SETTING = re.compile(r"#\s*setting:\s*(.+?)\s*=\s*(\S+?)\s*[;,\t]*")
-
-
 def setting_line(name: str, value: float) -> str:
     """Return the comment by which a table states a setting that belongs to the drawing, as `stated_settings` reads."""
     return f"# setting: {name} = {value!r}"
@@ -442,7 +428,7 @@ def stated_settings(path: Path) -> dict[str, float]:
         A setting that is stated twice, or whose value is no number.
     """
     found: dict[str, float] = {}
-    if path.suffix.lower() in (".xlsx", ".xlsm"):
+    if is_workbook(path):
         return found
     for number, line in enumerate(read_text(path, "a table in CSV").splitlines(), start=1):
         match = _SETTING.fullmatch(line.strip().strip('"'))
@@ -451,10 +437,7 @@ def stated_settings(path: Path) -> dict[str, float]:
         place, (name, text) = f"{path}, row {number}", match.groups()
         if name in found:
             raise InputError(f"{place}: setting {name!r} is stated twice; each has one value.")
-        try:
-            found[name] = plain_number(text)
-        except ValueError:
-            raise InputError.at(place, f"setting {name}", text, "a number with a decimal point") from None
+        found[name] = number_at(place, f"setting {name}", text)
     return found
 
 
@@ -491,9 +474,6 @@ def read_text_table(path: Path) -> TextTable:
     return TextTable(
         path=path, headers=headers, rows=tuple(row for row, _ in others), cells=tuple(cells for _, cells in others)
     )
-
-
-Row = TypeVar("Row", bound=Record)
 
 
 def read_rows(
@@ -614,6 +594,14 @@ def plain_number(text: str) -> float:
     return float(text)
 
 
+def number_at(place: str, field: str, text: str, allowed: str = "a number with a decimal point") -> float:
+    """Return the number that a cell shows, or raise with its place."""
+    try:
+        return plain_number(text)
+    except ValueError:
+        raise InputError.at(place, field, text, allowed) from None
+
+
 def usual_word(text: str) -> str:
     """Return a word as the fields have it.
 
@@ -637,10 +625,7 @@ def _typed(annotation: object, header: str, value: str, place: str) -> object:
             raise InputError.at(place, header, value, "yes or no")
         return answers[value.lower()]
     if annotation is float or float in get_args(annotation):
-        try:
-            return plain_number(value)
-        except ValueError:
-            raise InputError.at(place, header, value, "a number with a decimal point") from None
+        return number_at(place, header, value)
     words: tuple[str, ...] = get_args(annotation) if get_origin(annotation) is Literal else ()
     if isinstance(annotation, type) and issubclass(annotation, StrEnum):
         words = tuple(annotation)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import os
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from io import StringIO
@@ -28,12 +28,12 @@ from tolalloc.drawings.fields import (
     usual_unit,
 )
 from tolalloc.drawings.heads import Heads, split_header
-from tolalloc.drawings.ladder import RADII, fit_deviations, is_fit
+from tolalloc.drawings.ladder import RADII, fit_deviations, is_fit, tolerance_factor
 from tolalloc.drawings.measured_parts import MeasuredParts
 from tolalloc.drawings.sources import INCHES, LENGTHS, PERCENT, Source, by_row, known_as
 from tolalloc.drawings.table_file import (
     DATA,
-    plain_number,
+    number_at,
     read_rows,
     read_table_file,
     require_columns,
@@ -56,6 +56,48 @@ _NO_TEXT, _NO_NAME = r"[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff]", r"[\x00-\x1f\
 """What no cell may hold, since no file with it is read, and what no name may, since it is written on one line."""
 
 CLOSED_FORMS = tuple(kind for kind in Distribution if kind not in (Distribution.MIXTURE, Distribution.EMPIRICAL))
+_FINEST, _COARSEST = 0.2, 640.0
+"""Zone over the standard tolerance factor i of ISO 286-1 outside which it is doubted: IT01 is 0.4 of it and more, and
+IT15 is 640 [-]."""
+_WIDE = 0.12
+"""Zone over the nominal size from which on it is doubted [-]."""
+_SMALLEST_SIZE = 0.1 * MILLIMETRE
+"""Nominal size below which it is doubted, where one is stated [m]."""
+_FINEST_ZONE = 0.1 * MICROMETRE
+"""Zone of a feature without a nominal size below which it is doubted [m]."""
+_WIDEST_ZONE = 2.0 * MILLIMETRE
+"""Zone of a feature without a nominal size above which it is doubted: a metre may be meant as a millimetre [m]."""
+_LARGEST_SIZE = 3150.0 * MILLIMETRE
+"""Largest nominal size of ISO 286-1 [m]."""
+_OFF = 3.0
+"""Distance of the middle of a zone from the nominal size, over the zone, from which on it is doubted: ISO 286 has such
+fits, but hardly in a precision part [-]."""
+_RANGE = 100.0
+"""Factor between a zone and its smallest or largest one from which on their units are doubted [-]."""
+_COST, _FEWEST = 50.0, 3
+"""Factor between a cost and the middle one of a table of so many rows from which on it is doubted [-]."""
+_CAPABILITY = (0.4, 4.0)
+"""Cp outside which a process is doubted [-]."""
+_STEEP = 0.01
+"""Zone over the length that an angle is taken over, from which on the length is doubted [rad]."""
+_FLAT = 5e-6
+"""The same below which the length is doubted, 1″ [rad]; assumption."""
+_SHIPPED = "generic"
+"""Process capability library of a table that names none."""
+SMALLEST_KEPT = 0.01
+"""Smallest share that sorting may leave of all parts [-]."""
+_NEAR = 0.75
+"""Likeness of a head to the name of a column from which on it is a slip rather than a column of the user's own [-]."""
+_FIRST_WORD = re.compile(r"\s*(\w+)\s*[(/,:*]")
+"""First word of a head that goes on in brackets or behind a stroke."""
+_NUMBERS = tuple(
+    name for name, own in COLUMNS.items() if own.unit and name not in ("batches", "spectrum", "systematic")
+)
+"""Columns of numbers, of which a head such as ``Cp (short)`` is one in other words."""
+_BOTH = re.compile(r"(?:±|\+/-|\+-)\s*")
+"""What stands before a number that is both deviations."""
+_MEASURED = 10.0
+"""Largest deviation of a measured part over the largest zone that a model believes [-]."""
 
 
 class ProcessCapability(Record):
@@ -139,34 +181,6 @@ def with_process(cells: Mapping[str, object], capabilities: ProcessCapabilities,
     return {**taken, **cells}
 
 
-_FINEST, _COARSEST = 0.2, 640.0
-"""Zone over the standard tolerance factor i of ISO 286-1 outside which it is doubted: IT01 is 0.4 of it and more, and
-IT15 is 640 [-]."""
-_WIDE = 0.12
-"""Zone over the nominal size from which on it is doubted [-]."""
-_SMALLEST_SIZE = 0.1 * MILLIMETRE
-"""Nominal size below which it is doubted, where one is stated [m]."""
-_FINEST_ZONE = 0.1 * MICROMETRE
-"""Zone of a feature without a nominal size below which it is doubted [m]."""
-_WIDEST_ZONE = 2.0 * MILLIMETRE
-"""Zone of a feature without a nominal size above which it is doubted: a metre may be meant as a millimetre [m]."""
-_LARGEST_SIZE = 3150.0 * MILLIMETRE
-"""Largest nominal size of ISO 286-1 [m]."""
-_OFF = 3.0
-"""Distance of the middle of a zone from the nominal size, over the zone, from which on it is doubted: ISO 286 has such
-fits, but hardly in a precision part [-]."""
-_RANGE = 100.0
-"""Factor between a zone and its smallest or largest one from which on their units are doubted [-]."""
-_COST, _FEWEST = 50.0, 3
-"""Factor between a cost and the middle one of a table of so many rows from which on it is doubted [-]."""
-_CAPABILITY = (0.4, 4.0)
-"""Cp outside which a process is doubted [-]."""
-_STEEP = 0.01
-"""Zone over the length that an angle is taken over, from which on the length is doubted [rad]."""
-_FLAT = 5e-6
-"""The same below which the length is doubted, 1″ [rad]; assumption."""
-
-
 def doubts(sources: Sequence[Source], table: str) -> tuple[str, ...]:
     """Return what is allowed in a table but hardly meant, a sentence a row.
 
@@ -225,7 +239,7 @@ def _of_zone(source: Source) -> list[str]:
     elif not source.nominal and zone > _WIDEST_ZONE:
         found.append(f"the zone of {_length(zone)} is wide, and no nominal size is stated beside it")
     elif source.nominal > 0 and source.feature is Feature.SIZE and not source.over:
-        factor = zone / _tolerance_factor(source.nominal)
+        factor = zone / tolerance_factor(source.nominal)
         if not _FINEST <= factor <= _COARSEST:
             than = "finer than IT01" if factor < _FINEST else "coarser than IT15"
             found.append(f"the zone of {_length(zone)} is {than} at a nominal size of {_length(source.nominal)}")
@@ -250,15 +264,6 @@ def _of_process(source: Source, middle_cost: float) -> list[str]:
     return found
 
 
-def _tolerance_factor(nominal: float) -> float:
-    """Return the standard tolerance factor of ISO 286-1, i = 0.45·D^⅓ + 0.001·D in µm for D in mm [m].
-
-    Zones of IT6 are 10·i and of IT16 1,000·i; a nominal size of 10 mm has i = 0.98 µm.
-    """
-    size = max(nominal / MILLIMETRE, 1.0)
-    return float((0.45 * size ** (1 / 3) + 0.001 * size) * MICROMETRE)
-
-
 def _length(length: float) -> str:
     """Return a length in the unit that a drawing would have."""
     if abs(length) >= MILLIMETRE / 2:
@@ -266,26 +271,10 @@ def _length(length: float) -> str:
     return f"{length / MICROMETRE:.4g} µm"
 
 
-SMALLEST_KEPT = 0.01
-"""Smallest share that sorting may leave of all parts [-]."""
-
-
-_NEAR = 0.75
-"""Likeness of a head to the name of a column from which on it is a slip rather than a column of the user's own [-]."""
-
-
 class HeadsFile(Record):
     """What an office calls the columns of its table, as a TOML file beside it says it."""
 
     columns: Mapping[str, str]  # Head as it is written, without its unit → name of the column that it is
-
-
-_FIRST_WORD = re.compile(r"\s*(\w+)\s*[(/,:*]")
-"""First word of a head that goes on in brackets or behind a stroke."""
-_NUMBERS = tuple(
-    name for name, own in COLUMNS.items() if own.unit and name not in ("batches", "spectrum", "systematic")
-)
-"""Columns of numbers, of which a head such as ``Cp (short)`` is one in other words."""
 
 
 def heads_of(path: Path, columns: Mapping[str, str] = MappingProxyType({})) -> Heads:
@@ -362,7 +351,7 @@ def own_heads(path: Path, names: Sequence[str]) -> tuple[str, ...]:
 
 def load_tolerance_table(
     name: str | Path,
-    capabilities: str | Path = "generic",
+    capabilities: str | Path = _SHIPPED,
     sheet: str = "",
     columns: Mapping[str, str] = MappingProxyType({}),
 ) -> tuple[Source, ...]:
@@ -396,8 +385,10 @@ def load_tolerance_table(
     rows = [(number, dict(zip((*headers, *["unit"] * bool(unit)), cells, strict=True))) for number, cells in others]
     _require_units(path, [(name, unit) for name, unit in stated if name not in own], rows)
     known = [
-        (number, _as_numbers({name: row[name] for name in kept}, f"{path}, row {number} ({row['id'] or 'no id'})"))
-        for number, row in rows
+        (number, _both_ways(_without_units({name: row[name] for name in kept}, place), place))
+        for number, row, place in (
+            (number, row, f"{path}, row {number} ({row['id'] or 'no id'})") for number, row in rows
+        )
     ]
     sources = sources_of_rows(known, capabilities, str(path), path.parent)
     full = dict(zip((split_header(header)[0] for header in first), first, strict=True))
@@ -405,15 +396,6 @@ def load_tolerance_table(
         replace(source, own_cells=tuple((full[name], row[name]) for name in own))
         for source, (_, row) in zip(sources, rows, strict=True)
     )
-
-
-def _as_numbers(row: dict[str, str], place: str) -> dict[str, str]:
-    """Return a row with its two deviations, all numbers without units."""
-    return _both_ways(_without_units(row, place), place)
-
-
-_BOTH = re.compile(r"(?:±|\+/-|\+-)\s*")
-"""What stands before a number that is both deviations."""
 
 
 def _says_both(plus: str) -> bool:
@@ -441,11 +423,9 @@ def _both_ways(row: dict[str, str], place: str) -> dict[str, str]:
         allowed = "plus and minus, since a fit is that of a diameter or width with its nominal size"
         raise InputError.at(place, "plus", plus, allowed)
     unit, inch = usual_unit(row.get("unit", "")), usual_unit(row.get("unit", "")) == INCHES
+    width = number_at(place, "nominal", nominal) * LENGTHS[INCHES if inch else "mm"]
     try:
-        width = plain_number(nominal) * LENGTHS[INCHES if inch else "mm"]
         deviations = fit_deviations(plus, width)
-    except ValueError:
-        raise InputError.at(place, "nominal", nominal, "a number with a decimal point") from None
     except InputError as error:
         raise InputError(f"{place}: {error}") from None
     length = abs(width) / 100.0 if unit == PERCENT else UNITS.get(unit, 1.0) * MICROMETRE
@@ -503,7 +483,7 @@ def _require_units(path: Path, stated: Sequence[tuple[str, str]], rows: Sequence
 
 
 def sources_of_rows(
-    rows: Iterable[tuple[int, Mapping[str, object]]], capabilities: str | Path, place: str, folder: Path
+    rows: Sequence[tuple[int, Mapping[str, object]]], capabilities: str | Path, place: str, folder: Path
 ) -> tuple[Source, ...]:
     """Return the sources of numbered rows, whose cells are text or already of the type of their field.
 
@@ -514,7 +494,9 @@ def sources_of_rows(
     InputError, UnknownNameError
         The row, field and value that are not allowed.
     """
-    processes = load_process_capabilities(capabilities)
+    # The shipped library is read where a row names a process of it.
+    is_asked = capabilities != _SHIPPED or any(row.get("process") for _, row in rows)
+    processes = load_process_capabilities(capabilities) if is_asked else {}
     sources: dict[str, Source] = {}
     faults = Faults()
     for number, row in rows:
@@ -615,10 +597,6 @@ def table_text(
     writer.writerow(map(no_formula, [*heads, *own_heads_of(sources)]))
     writer.writerows(map(no_formula, row) for row in table_rows(sources, folder))
     return text.getvalue()
-
-
-_MEASURED = 10.0
-"""Largest deviation of a measured part over the largest zone that a model believes [-]."""
 
 
 def require_small_zones(sources: Sequence[Source], largest: float, place: str | Path) -> None:

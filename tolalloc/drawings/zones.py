@@ -260,7 +260,7 @@ class ZoneMapping:
     @cached_property
     def extent(self) -> float:
         """Diameter or range that is as large as the zone at Cp = 1 [unit of the base]."""
-        if self.distribution.is_bounded or not self.spectrum:
+        if self.distribution.form.support or not self.spectrum:
             return 2.0 * float(self.amplitudes.sum()) * self.base.reach
         return harmonic_range_quantile(self.spectrum, self.teeth, self.base)
 
@@ -269,7 +269,7 @@ class ZoneMapping:
         """Deviation [half zone], or magnitude [unit of the base], before parts are sorted out."""
         if self.feature is not Feature.SIZE:
             return self.base
-        if self.distribution.is_one_sided:
+        if self.distribution.form.is_one_sided:
             return Placed(self.base, self.shift - 1.0, 2.0 / (self.base.reach * self.cp))
         return Placed(self.base, self.shift, 1.0 / (self.base.reach * self.cp))
 

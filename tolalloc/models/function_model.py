@@ -24,6 +24,19 @@ from tolalloc.models.user_function import UserFunction, by_name
 from tolalloc.reading.named_fields import is_number
 from tolalloc.reading.units import MILLIMETRE
 
+_STEP = 1e-4
+"""Step of a difference to either side, over the zone, for a function without noise [-]."""
+_AT_ONCE = 2**16
+"""Samples that a function is given at once, so that its arguments stay small [-]."""
+_ASKED = 16
+"""Samples that tell whether a function takes whole columns [-]."""
+_REFUTING = 513
+"""Units that may refute stated slopes, every second one in the middle [-]."""
+_ROUNDED = 1e-9
+"""Part of an output by which rounding may move it [-]."""
+_STEP_OF_SIMULATION = 0.02
+"""Step of such a difference for a simulation, whose solver leaves noise, over the zone [-]."""
+
 
 @dataclass(frozen=True)
 class SimulatedUnit:
@@ -76,20 +89,6 @@ def simulated(path: str, parameters: tuple[str, ...], variables: tuple[str, ...]
     if not Path(path).is_file():
         raise InputError(f"{path}: no such Functional Mock-up Unit.")
     return SimulatedUnit(Path(path), parameters, variables, stop_time, fmpy)
-
-
-_STEP = 1e-4
-"""Step of a difference to either side, over the zone, for a function without noise [-]."""
-_AT_ONCE = 2**16
-"""Samples that a function is given at once, so that its arguments stay small [-]."""
-_ASKED = 16
-"""Samples that tell whether a function takes whole columns [-]."""
-_REFUTING = 513
-"""Units that may refute stated slopes, every second one in the middle [-]."""
-_ROUNDED = 1e-9
-"""Part of an output by which rounding may move it [-]."""
-_STEP_OF_SIMULATION = 0.02
-"""The same for a simulation, whose solver leaves noise [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,7 +1,7 @@
 """What a model is: named inputs that vary, named outputs with units, and settings that a designer may choose.
 
 The equivalent model of a reducer, a surrogate of it and a user's own function all look like this to the rooms that
-rank, judge and allocate.
+rank, judge and allocate; any output of one has derivatives, exact ones where the model knows them, else differences.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
+from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.identity import identity
 from tolalloc.models.settings import DrawnAmounts, Setting
 from tolalloc.running.chunks import Mapper
@@ -25,8 +26,13 @@ if TYPE_CHECKING:
 Units = Mapping[str, tuple[Float[np.ndarray, " setting"], Float[np.ndarray, " column"]]]
 """Label → settings [units of their names] and deviations [m, angles rad] of one unit."""
 
+_STEP = 0.02
+"""Step of a difference by a column over its standard deviation [-]."""
+
 Observer = Callable[[UInt8[np.ndarray, " sample"]], None]
 """Told the statuses of each chunk as soon as it is solved: a progress bar, a counter."""
+ARRAY_RATE = 500_000.0
+"""Units a second that a model which takes whole arrays is taken to answer, assumed: no clock is read [1/s]."""
 
 
 def unobserved(status: UInt8[np.ndarray, " sample"]) -> None:
@@ -68,16 +74,13 @@ class Response(Protocol):
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of the inputs, in the order of X."""
-        ...
 
     @property
     def outputs(self) -> tuple[str, ...]:
         """Names of the outputs with their units, in the order of Y."""
-        ...
 
     def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
         """Return the outputs of every sample."""
-        ...
 
 
 @runtime_checkable
@@ -87,12 +90,10 @@ class Derived(Protocol):
     @property
     def evaluation(self) -> Evaluation:
         """Outputs and status of every sample."""
-        ...
 
     @property
     def by_column(self) -> Float[np.ndarray, "sample column"]:
         """Derivatives [output per unit of the column]."""
-        ...
 
 
 @runtime_checkable
@@ -102,11 +103,9 @@ class ResponseWithDerivatives(Protocol):
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of the inputs, in the order of X."""
-        ...
 
     def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> Derived:
         """Return the outputs of every sample and their derivatives."""
-        ...
 
 
 @runtime_checkable
@@ -115,7 +114,6 @@ class KeepsTables(Protocol):
 
     def release(self) -> None:
         """Let go of the tables."""
-        ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,10 +123,6 @@ class SettingDerivatives:
     evaluation: Evaluation  # The output and the status of every sample
     by_column: Float[np.ndarray, "sample column"]  # Derivative by every column [output per unit of the column]
     by_setting: Float[np.ndarray, "sample setting"]  # Derivative by every setting [output per unit of the setting]
-
-
-ARRAY_RATE = 500_000.0
-"""Units a second that a model which takes whole arrays is taken to answer, assumed: no clock is read [1/s]."""
 
 
 class Model(ABC):
@@ -270,6 +264,87 @@ class Model(ABC):
         """Let go of what is made again when it is needed, such as tables; a model may have no such thing."""
 
 
+def derived(model: Model, output: str, deviation: Float[np.ndarray, " column"]) -> ResponseWithDerivatives:
+    """Return an output of a model with its derivatives by the columns, whose standard deviations make the steps."""
+    if output in model.exact:
+        return _Exact(model=model, output=output)
+    return DifferencedResponse(response=model.reading((output,)), output=output, steps=_STEP * deviation)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Exact:
+    """An output with the exact derivatives that its model knows."""
+
+    model: Model
+    output: str
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The model's columns."""
+        return self.model.columns
+
+    def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+        """Return the output of every sample and its derivatives."""
+        return self.model.derivatives(self.output, x)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DifferencedResponse:
+    """One output of a response that knows no derivatives.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        A step that is not above zero, or an output that the response does not have.
+
+    Notes
+    -----
+    A sample with derivatives costs one answer and two for every column. The truncation falls with the square of the
+    step; across a kink a difference is a mean of both sides.
+    """
+
+    response: Response  # What answers
+    output: str  # Name of the output with its unit
+    steps: Float[np.ndarray, " column"]  # Step of every column to either side [unit of the column]
+
+    def __post_init__(self) -> None:
+        if self.output not in self.response.outputs:
+            raise UnknownNameError.among("derivatives", "output", self.output, self.response.outputs)
+        if not (self.steps > 0.0).all():
+            raise InputError.at("derivatives", "steps", float(self.steps.min()), "above 0")
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The response's columns."""
+        return self.response.columns
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The one output."""
+        return (self.output,)
+
+    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+        """Return the output of every sample."""
+        found = self.response(x)
+        at = self.response.outputs.index(self.output)
+        return Evaluation(values=found.values[:, [at]], status=found.status)
+
+    def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+        """Return the output of every sample and its derivatives, NaN by neighbours that failed, all in one call."""
+        columns = len(self.columns)
+        shifts = np.concatenate([np.zeros((1, columns)), np.diag(self.steps), -np.diag(self.steps)])
+        found = self((x[:, np.newaxis] + shifts).reshape(-1, columns))
+        values, status = found.values.reshape(-1, shifts.shape[0]), found.status.reshape(-1, shifts.shape[0])
+        slopes = (values[:, 1 : columns + 1] - values[:, columns + 1 :]) / (2 * self.steps)
+        good = found.good.reshape(status.shape)[:, 1:].reshape(-1, 2, columns).all(axis=1)
+        return SettingDerivatives(
+            # The status is the worst one of the sample and of its neighbours.
+            evaluation=Evaluation(values=values[:, :1], status=status.max(axis=1)),
+            by_column=np.where(good, slopes, np.nan),
+            by_setting=np.empty((x.shape[0], 0)),
+        )
+
+
 def is_fast(model: Model) -> bool:
     """Return whether a million units take seconds, as of a function that takes whole arrays."""
     return model.stated_rate >= ARRAY_RATE
@@ -287,7 +362,6 @@ class HasCopies(Protocol):
         stated
             Source → what the table states of it; copies of which it states different things have lines of their own.
         """
-        ...
 
 
 @runtime_checkable
@@ -297,16 +371,13 @@ class ModelSource(Protocol):
     @property
     def name(self) -> str:
         """What a report calls the model."""
-        ...
 
     @property
     def source_names(self) -> Sequence[str]:
         """Names of all sources that it knows, of which a row for several like places means some."""
-        ...
 
     def leaving_out(self, patterns: Sequence[str]) -> ModelSource:
         """Return the same that takes as exact what a drawing leaves out of the sources that patterns name, too."""
-        ...
 
     def bound(self, errors: ErrorModel, place: str) -> Model:
         """Return the model at the sources of a drawing; nothing is solved.
@@ -316,7 +387,6 @@ class ModelSource(Protocol):
         InputError, UnknownNameError
             A source that the model does not have, or an input that nobody gives.
         """
-        ...
 
     def set_to(self, settings: Mapping[str, float]) -> ModelSource:
         """Return the same at other values of its settings and operating conditions [units of their names].
@@ -326,4 +396,3 @@ class ModelSource(Protocol):
         InputError, UnknownNameError
             A setting that it does not have, or a value outside its bounds.
         """
-        ...

@@ -53,7 +53,6 @@ class UnitBounds(Protocol):
         rows: Int[np.ndarray, " unit"],
     ) -> Least:
         """Return what sign·output of some of the units is at least anywhere in a box of scales [-] and settings."""
-        ...
 
 
 @runtime_checkable
@@ -65,11 +64,9 @@ class BoundedModel(Protocol):
 
     def unbounded(self, output: str) -> str:
         """Return why nothing is certain of an output, empty where `unit_bounds` has its bounds."""
-        ...
 
     def unit_bounds(self, output: str, units: ScaledUnits, designs: Float[np.ndarray, "design variable"]) -> UnitBounds:
         """Return what is certain of an output of random units, sharpest near some designs."""
-        ...
 
 
 def least_by_slopes(

@@ -16,6 +16,20 @@ MOST_COLUMNS, MOST_CELLS = 4000, 2_000_000
 
 _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f]")
 """Characters that no page, workbook or terminal shows."""
+_KINDS = (
+    (b"\xd0\xcf\x11\xe0", "an Excel 97–2003 workbook (XLS)"),
+    (b"PK\x03\x04", "a workbook or an archive under another ending"),
+    (b"%PDF", "a PDF"),
+)
+"""How files begin that are taken for tables, and what they are."""
+_ARCHIVES = {
+    b"opendocument.spreadsheet": "an OpenDocument spreadsheet (ODS)",
+    b"xl/workbook.bin": "a binary workbook (XLSB)",
+    b"Index/Document.iwa": "a Numbers spreadsheet",
+}
+"""What stands in an archive of which kind."""
+_OFFICES = {"UTF-16": "utf-16", "Windows-1252": "cp1252"}
+"""How spreadsheets save a CSV file that is not UTF-8 → codec of Python."""
 
 
 def is_file(path: Path) -> bool:
@@ -50,21 +64,6 @@ def read_bytes(path: Path, what: str) -> bytes:
         raise InputError(f"{path}: no such file.") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be read as {what} ({getattr(error, 'strerror', error)}).") from None
-
-
-_KINDS = (
-    (b"\xd0\xcf\x11\xe0", "an Excel 97–2003 workbook (XLS)"),
-    (b"PK\x03\x04", "a workbook or an archive under another ending"),
-    (b"%PDF", "a PDF"),
-)
-"""How files begin that are taken for tables, and what they are."""
-_OPEN_DOCUMENT, _BINARY, _APPLE = b"opendocument.spreadsheet", b"xl/workbook.bin", b"Index/Document.iwa"
-_ARCHIVES = {
-    _OPEN_DOCUMENT: "an OpenDocument spreadsheet (ODS)",
-    _BINARY: "a binary workbook (XLSB)",
-    _APPLE: "a Numbers spreadsheet",
-}
-"""What stands in an archive of which kind."""
 
 
 def require_table(path: Path, content: bytes, is_workbook: bool) -> None:
@@ -122,10 +121,6 @@ def read_text(path: Path, what: str) -> str:
         sign = f"the control character {found[0]!r}"
         raise InputError(f"{path}: cannot be read as {what} (UTF-8), row {row} holds {sign}; allowed is text.")
     return text
-
-
-_OFFICES = {"UTF-16": "utf-16", "Windows-1252": "cp1252"}
-"""How spreadsheets save a CSV file that is not UTF-8 → codec of Python."""
 
 
 def _encoding(content: bytes) -> str:

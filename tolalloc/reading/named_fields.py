@@ -50,9 +50,7 @@ class Rule:
             raise refusal(place, self.name or name, value, self.allowed)
 
 
-def number(
-    allowed: str, *, above: float = -inf, least: float = -inf, most: float = inf, below: float = inf, name: str = ""
-) -> Rule:
+def number(allowed: str, *, above: float = -inf, least: float = -inf, most: float = inf, below: float = inf) -> Rule:
     """Return the rule of a finite number in a range.
 
     >>> number("a share above 0 up to 0.5", above=0, most=0.5).keeps(0.7)
@@ -62,7 +60,7 @@ def number(
     def keeps(value: Any) -> bool:
         return is_number(value) and isfinite(value) and above < value < below and least <= value <= most
 
-    return Rule(allowed, keeps, name)
+    return Rule(allowed, keeps)
 
 
 def whole(
@@ -81,14 +79,14 @@ def whole(
     return Rule(allowed, keeps, name)
 
 
-def flag() -> Rule:
-    """Return the rule of True or False."""
-    return Rule("True or False", lambda value: isinstance(value, bool))
-
-
 def a(kind: type, allowed: str = "") -> Rule:
     """Return the rule of a value of one kind; what is allowed is said by its name unless given."""
     return Rule(allowed or f"a {kind.__name__}", lambda value: isinstance(value, kind))
+
+
+def flag() -> Rule:
+    """Return the rule of True or False."""
+    return a(bool, "True or False")
 
 
 def each(allowed: str, rule: Rule, *, fewest: int = 0) -> Rule:

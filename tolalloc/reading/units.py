@@ -22,6 +22,15 @@ GIGAPASCAL = 1e9
 COST_UNITS = "cost units"
 """What costs are counted in where no file states a currency."""
 _CURRENCY = re.compile(r"([A-Z]{3}|[€$£¥])(?=[ /·×]|$)")
+WRITTEN_UNITS = ("mm", "µm", "um", "in", "inch", "%", "cm", "m", "nm")
+"""Units that a cell may state behind its number."""
+_NUMBER = r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?"
+WITH_UNIT = re.compile(rf"((?:±\s*|\+/-\s*|\+-\s*)?{_NUMBER})\s*({'|'.join(WRITTEN_UNITS)}|″|\")", re.ASCII)
+"""Number, or one behind ±, with a unit behind it."""
+_LITERAL = re.compile(r'"\s*([^"]*?)\s*"|\\ ?([^\W\d_]+)')
+"""Words in the format of a number."""
+_THOUSANDTH = re.compile(r"[0#?],+(?![0#?])")
+"""Format of a number that shows it in thousands."""
 
 
 def unit_of(name: str) -> str:
@@ -50,13 +59,6 @@ def in_cost_units(unit: str) -> str:
     ('cost units µm^n', 'µm')
     """
     return _CURRENCY.sub(COST_UNITS, unit, count=1)
-
-
-WRITTEN_UNITS = ("mm", "µm", "um", "in", "inch", "%", "cm", "m", "nm")
-"""Units that a cell may state behind its number."""
-_NUMBER = r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?"
-WITH_UNIT = re.compile(rf"((?:±\s*|\+/-\s*|\+-\s*)?{_NUMBER})\s*({'|'.join(WRITTEN_UNITS)}|″|\")", re.ASCII)
-"""Number, or one behind ±, with a unit behind it."""
 
 
 def usual_signs(unit: str) -> str:
@@ -99,12 +101,6 @@ def number_in(cell: str, unit: str) -> str:
     if stated != unit:
         raise ValueError(f"a number in {unit}, as the row says; numbers are not converted")
     return found[1]
-
-
-_LITERAL = re.compile(r'"\s*([^"]*?)\s*"|\\ ?([^\W\d_]+)')
-"""Words in the format of a number."""
-_THOUSANDTH = re.compile(r"[0#?],+(?![0#?])")
-"""Format of a number that shows it in thousands."""
 
 
 def shown_number(value: float, form: str) -> str:

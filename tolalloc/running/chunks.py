@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
 from functools import lru_cache
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from jaxtyping import Float
@@ -66,5 +66,4 @@ def blas_libraries() -> str:
 
 def one_blas_thread() -> AbstractContextManager[Any]:
     """Return a context in which matrix products use one thread."""
-    context: AbstractContextManager[Any] = _libraries().limit(limits=1, user_api="blas")
-    return context
+    return cast("AbstractContextManager[Any]", _libraries().limit(limits=1, user_api="blas"))

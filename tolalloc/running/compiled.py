@@ -93,17 +93,13 @@ def _is_ours(folder: Path) -> bool:
     return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o077
 
 
-_KEPT = _place()
+KEPT = _place()
+"""Folder that compiled functions are kept in; nothing where none can be written."""
 
 
 def is_kept(module: str) -> bool:
     """Return whether functions of this version of a module were compiled on this machine before."""
-    return _KEPT is not None and any(_KEPT.glob(f"*/{module}.*.nbi"))
-
-
-def kept_in() -> Path | None:
-    """Return the folder that compiled functions are kept in; nothing where none can be written."""
-    return _KEPT
+    return KEPT is not None and any(KEPT.glob(f"*/{module}.*.nbi"))
 
 
 def processor() -> dict[str, str]:
@@ -118,10 +114,10 @@ def processor() -> dict[str, str]:
 
 def _compiled(function: Callable[..., Any], **options: bool) -> Any:
     whole = _new(function, {"nogil": True, "error_model": "numpy"} | options)
-    if _KEPT is not None:
-        _keep(whole, _KEPT)
+    if KEPT is not None:
+        _keep(whole, KEPT)
         if hasattr(whole, "part"):
-            _keep(whole.part, _KEPT / "parts")
+            _keep(whole.part, KEPT / "parts")
     return whole
 
 

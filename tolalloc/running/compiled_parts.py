@@ -111,7 +111,7 @@ class _PartCache(_Cache):
     _impl_class = _KeptPart
 
 
-class _Part(CPUDispatcher):  # type: ignore[misc]
+class _PartDispatcher(CPUDispatcher):  # type: ignore[misc]
     """A function as compiled functions call it."""
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
@@ -131,7 +131,7 @@ class Whole(CPUDispatcher):  # type: ignore[misc]
     def __init__(self, function: Callable[..., Any], options: dict[str, Any], before: Callable[[str], None]) -> None:
         super().__init__(function, targetoptions=options | {"nopython": True, "no_cfunc_wrapper": True})
         self.before = before  # is told the module of what is compiled next
-        self.part = _Part(function, options)
+        self.part = _PartDispatcher(function, options)
 
     def enable_caching(self) -> None:
         """Keep what is compiled."""

@@ -14,6 +14,11 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import UInt8
 
+_OF_THE_HEAP = 2**20
+"""Size up to which memory comes from the heap, where what is freed between what is kept stays [bytes]."""
+_MMAP_THRESHOLD = -3
+"""The C library's name of that size."""
+
 
 @runtime_checkable
 class Progress(Protocol):
@@ -21,15 +26,12 @@ class Progress(Protocol):
 
     def begin(self, stage: str, units: int = 0, counted: str = "") -> None:
         """Begin a stage of so many units, 0 where nobody knows, or of other things that are counted."""
-        ...
 
     def advance(self, units: int) -> None:
         """So many more units are solved."""
-        ...
 
     def tell(self, sentence: str) -> None:
         """Say what is known already, before the work is done."""
-        ...
 
 
 class Silent:
@@ -88,12 +90,6 @@ class RunRecord:
     def counts(self) -> dict[str, int]:
         """Outcome → number of units [-]."""
         return {sentence: self.statuses[status] for status, sentence in self.outcomes.items()}
-
-
-_OF_THE_HEAP = 2**20
-"""Size up to which memory comes from the heap, where what is freed between what is kept stays [bytes]."""
-_MMAP_THRESHOLD = -3
-"""The C library's name of that size."""
 
 
 def _give_back() -> None:

@@ -60,14 +60,14 @@ def durations(prepared: Prepared) -> tuple[Duration, ...]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Part:
+class _Workload:
     """Units of one kind."""
 
     units: tuple[int, int]  # At least and at most [-]
     seconds: float  # What one takes [s]
 
 
-def _of_ranking(prepared: Prepared) -> tuple[_Part, ...]:
+def _of_ranking(prepared: Prepared) -> tuple[_Workload, ...]:
     """Return random units, Saltelli blocks and units of the leading output alone, each with what is asked of them."""
     model, errors, effort = prepared.model, prepared.errors, prepared.ranking_effort
     leading = prepared.requirements[0].output
@@ -82,14 +82,14 @@ def _of_ranking(prepared: Prepared) -> tuple[_Part, ...]:
     block, (start, limit) = sources + 2, (effort.sobol.start, effort.sobol.limit)
     most = trials + _TRIALS * effort.surrogate_units + 3 * effort.units
     return (
-        _Part(units=(effort.units, effort.units), seconds=whole),
-        _Part(units=(start * block, start * block), seconds=of_all),
-        _Part(units=(0, (limit - start) * block), seconds=of_limited),
-        _Part(units=(0, limit * (dimensions + 3) + most), seconds=alone),
+        _Workload(units=(effort.units, effort.units), seconds=whole),
+        _Workload(units=(start * block, start * block), seconds=of_all),
+        _Workload(units=(0, (limit - start) * block), seconds=of_limited),
+        _Workload(units=(0, limit * (dimensions + 3) + most), seconds=alone),
     )
 
 
-def _of_allocation(question: Allocation, prepared: Prepared) -> tuple[_Part, ...]:
+def _of_allocation(question: Allocation, prepared: Prepared) -> tuple[_Workload, ...]:
     """Return the units of searches, confirmation, fronts, what-ifs and shares, all with the limited outputs."""
     effort, model, errors = prepared.allocation_effort, prepared.model, prepared.errors
     settings = len(prepared.space.settings)
@@ -111,12 +111,12 @@ def _of_allocation(question: Allocation, prepared: Prepared) -> tuple[_Part, ...
     confirmed = tuple(round(share * effort.confirmation_units) for share in _CONFIRMATIONS)
     least = effort.verification_units + confirmed[0]
     most = steps * around + confirmed[1] + fronts + what_if + shares
-    parts = (_Part(units=(least, most), seconds=_seconds(prepared, outputs)),)
+    parts = (_Workload(units=(least, most), seconds=_seconds(prepared, outputs)),)
     rough = tuple(name for name in outputs if name not in {*model.exact, *model.differentiable})
     if not rough:
         return parts
     differences = steps * 2 * SLOPE_UNITS * (len(prepared.space.groups) + settings)
-    return (*parts, _Part(units=(0, differences), seconds=_seconds(prepared, rough)))
+    return (*parts, _Workload(units=(0, differences), seconds=_seconds(prepared, rough)))
 
 
 def _seconds(prepared: Prepared, outputs: tuple[str, ...], *, uncertain: bool = False) -> float:

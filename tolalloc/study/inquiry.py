@@ -14,10 +14,12 @@ from typing import Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar, ge
 
 from tolalloc.exceptions import InputError
 from tolalloc.reading.named_fields import NamedFields, is_number
-from tolalloc.running.progress import Progress, Silent
+from tolalloc.running.progress import SILENT, Progress
 from tolalloc.study.answer import Answer
 
 Prepared = TypeVar("Prepared")
+DEFAULT_REDUCER = "rv20e"
+"""Preset of every inquiry that writes no file."""
 
 
 @dataclass(frozen=True)
@@ -28,8 +30,6 @@ class Word:
     option: str = ""  # Name of its option where it is not that of the field
 
 
-DEFAULT_REDUCER = "rv20e"
-"""Preset of every inquiry that writes no file."""
 ReducerName = Annotated[
     str | None,
     Word(f"Preset name or TOML file; {DEFAULT_REDUCER} unless given, to be given where a file is written."),
@@ -165,15 +165,9 @@ class Inquiry(NamedFields, ABC, Generic[Prepared]):
     def ask(self, progress: Progress | None = None) -> Answer[Any]:
         """Return the answer, the files that it names written."""
         asked = self.with_reducer()
-        answer = asked.solve(asked.prepare(), progress or Silent())
+        answer = asked.solve(asked.prepare(), progress or SILENT)
         asked.write(answer)
         return answer
-
-
-def field_of(inquiry: type[Inquiry[Any]], argument: str) -> str:
-    """Return the field from which an argument comes, which may carry its unit besides; empty if there is none."""
-    names = [own.name for own in fields(inquiry)]
-    return next((name for name in names if argument == name or argument.startswith(f"{name}_")), "")
 
 
 @cache
@@ -212,7 +206,7 @@ def door(inquiry: type[Inquiry[Any]]) -> Callable[..., Answer[Any]]:
                 inquiry(*given, **named)  # the record refuses it, and says which field stands without its name
             return inquiry(**dict(zip(places, given, strict=False)), **named).ask(progress)
         except InputError as error:
-            field = field_of(inquiry, error.argument) if error.argument else ""
+            field = error.named_among(own.name for own in fields(inquiry))
             raise (error.as_option(f"ta.{inquiry.word}", field) if field else error) from None
 
     hints = get_type_hints(inquiry)

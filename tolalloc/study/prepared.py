@@ -18,7 +18,7 @@ from tolalloc.allocation.space.effort import AllocationEffort
 from tolalloc.allocation.space.joint_yield import JointRequirement
 from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, Guarantee, OwnLimit, Requirement
 from tolalloc.capability.indices import Limits
-from tolalloc.capability.monte_carlo import KeptLimits, ProcessDoubt
+from tolalloc.capability.monte_carlo import KeptLimits, ProcessUncertainty
 from tolalloc.drawings.compensators import Compensator, all_choices, choice_label, in_force
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
@@ -284,7 +284,7 @@ class Prepared:
         limits = {own.output: own.limits for own in self.requirements}
         response = self.model.reading(tuple(limits))
         x = self.random_units(units)
-        return KeptLimits.of(response(x), response.outputs, limits, ProcessDoubt.about(self.errors, x))
+        return KeptLimits.of(response(x), response.outputs, limits, ProcessUncertainty.about(self.errors, x))
 
     @property
     def header(self) -> Header:

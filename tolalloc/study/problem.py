@@ -24,10 +24,15 @@ if TYPE_CHECKING:
 COMMON: Literal["common"] = "common"
 """What is asked of all limits at once is what each of them asks for, where that is one yield."""
 _TITLE_BLOCK = ("drawing number", "revision", "author", "material")
-_TITLES = ", ".join(_TITLE_BLOCK)
 _LONGEST_TEXT = 60
 _NAME = re.compile(r"[\w-][\w. -]{0,99}")
 _SIDE = or_none(number("a finite number; an open side is None"))
+_NUMBERS = ("one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
+_ORDER = re.compile(rf"order of the first ({'|'.join(_NUMBERS)}|[1-9]\d?)")
+_UNTIL = Rule(
+    "'order of the first three', any number from one to ten in words or up to 99 in digits, or None",
+    lambda given: given is None or (isinstance(given, str) and bool(_ORDER.fullmatch(given))),
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,14 +82,6 @@ class Limit(NamedFields):
     def limits(self) -> Limits:
         """The limits alone."""
         return Limits(upper=self.upper, lower=self.lower)
-
-
-_NUMBERS = ("one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
-_ORDER = re.compile(rf"order of the first ({'|'.join(_NUMBERS)}|[1-9]\d?)")
-_UNTIL = Rule(
-    "'order of the first three', any number from one to ten in words or up to 99 in digits, or None",
-    lambda given: given is None or (isinstance(given, str) and bool(_ORDER.fullmatch(given))),
-)
 
 
 def _places(until: str) -> int:
@@ -171,18 +168,6 @@ def effort_of(name: str, place: str) -> Effort:
     return QUICK if name == "quick" else Effort()
 
 
-def _is_source(model: object) -> bool:
-    return model is None or (hasattr(model, "bound") and not isinstance(model, type))
-
-
-def _is_drawing(given: object) -> bool:
-    return given is None or hasattr(given, "errors")
-
-
-def _are_compensators(given: object) -> bool:
-    return isinstance(given, Sequence) and all(isinstance(own, Compensator) for own in given)
-
-
 def _is_title_block(given: object) -> bool:
     return isinstance(given, Mapping) and all(
         label in _TITLE_BLOCK and isinstance(text, str) and len(text) <= _LONGEST_TEXT for label, text in given.items()
@@ -196,8 +181,16 @@ class Problem(NamedFields):
     called: ClassVar[str] = "study"
     by_position: ClassVar[int] = 2
 
-    model: Annotated["ModelSource | None", Rule("ta.reducer(...), ta.model(...) or another model", _is_source)] = None
-    drawing: Annotated["Drawing | None", Rule("ta.drawing(...)", _is_drawing)] = None
+    model: Annotated[
+        "ModelSource | None",
+        Rule(
+            "ta.reducer(...), ta.model(...) or another model",
+            lambda given: given is None or (hasattr(given, "bound") and not isinstance(given, type)),
+        ),
+    ] = None
+    drawing: Annotated[
+        "Drawing | None", Rule("ta.drawing(...)", lambda given: given is None or hasattr(given, "errors"))
+    ] = None
     limits: Annotated[
         Mapping[str, Limit | None],
         mapped("a dictionary of outputs and their ta.Limit(...)", Rule("", lambda _: True)),
@@ -224,7 +217,7 @@ class Problem(NamedFields):
     ] = ()
     compensators: Annotated[
         "Sequence[Compensator]",
-        Rule("several of ta.Sorting(...), ta.Shim(...) and ta.Indexing(...)", _are_compensators),
+        each("several of ta.Sorting(...), ta.Shim(...) and ta.Indexing(...)", a(Compensator)),
     ] = ()
 
     def __post_init__(self) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, cast
 
 from tolalloc.exceptions import InputError, SolveError, TolallocError
-from tolalloc.reading.named_fields import Rule
+from tolalloc.reading.named_fields import a, each
 from tolalloc.reports.document import Document, joined
 from tolalloc.reports.folder import RUNS, claimed, numbered
 from tolalloc.reports.portrait import portrait_of
@@ -29,10 +29,6 @@ if TYPE_CHECKING:
 _READ_BY_ALL = frozenset({"name", "questions", "effort", "title_block"})
 _JUDGED = 1024
 """Random units that say how the drawing stands as it is [-]."""
-
-
-def _are_questions(given: object) -> bool:
-    return isinstance(given, Sequence) and bool(given) and all(isinstance(one, Question) for one in given)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,7 +104,7 @@ class Study(Problem):
     called: ClassVar[str] = "study"
 
     questions: Annotated[
-        Sequence[Question], Rule("ta.Ranking(...), ta.Allocation(...) and other questions", _are_questions)
+        Sequence[Question], each("ta.Ranking(...), ta.Allocation(...) and other questions", a(Question), fewest=1)
     ] = (Ranking(), Allocation())
 
     def __post_init__(self) -> None:

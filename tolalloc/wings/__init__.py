@@ -23,6 +23,6 @@ def wings() -> tuple[Wing, ...]:
 @cache
 def all_inquiries() -> tuple[type[Inquiry[Any]], ...]:
     """Return the questions that need no study, the trunk's and then those of the wings."""
-    from tolalloc.study.inquiries import inquiries
+    from tolalloc.study.inquiries import INQUIRIES
 
-    return (*inquiries(), *(own for wing in wings() for own in wing.questions))
+    return (*INQUIRIES, *(own for wing in wings() for own in wing.questions))

@@ -27,6 +27,26 @@ from tolalloc.study.questions import questions_of
 from tolalloc.study.study import Study
 
 KINDS = ("ranking", "allocation")
+_TOLD = ("kind", "stage", "units", "expected", "counted", "told", "solved", "most", "answer", "error")
+"""What the page is told of a question in the background."""
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,59}")
+_SCRIPT = '''"""{before} at other zones, saved from the live page."""
+
+from importlib import import_module
+
+import tolalloc as ta
+
+study = import_module("{module}").study.changed(
+    "{table}",
+    settings={settings!r},
+    name="{name}",
+)
+
+if __name__ == "__main__":
+    ta.run_script()
+'''
+_TABS = 64
+"""Tabs whose latest request is known [-]."""
 
 
 class _StoppedError(Exception):
@@ -89,11 +109,8 @@ class Job:
     @property
     def state(self) -> dict[str, Any]:
         """How far it has come, and its answer once there is one."""
-        seconds = round(time.monotonic() - self.began, 1)
-        told = {"kind": self.kind, "stage": self.stage, "units": self.units, "seconds": seconds}
-        told |= {"expected": self.expected, "counted": self.counted, "told": self.told}
-        told |= {"solved": self.solved, "most": self.most}
-        return {**told, "answer": self.answer, "error": self.error}
+        told = {name: getattr(self, name) for name in _TOLD}
+        return told | {"seconds": round(time.monotonic() - self.began, 1)}
 
     def _look(self) -> None:
         if self._stop.is_set():
@@ -101,7 +118,9 @@ class Job:
 
     def _run(self) -> None:
         try:
-            self.most = _most_units(self.kind, self.study)
+            asked = questions_of((self.kind,), tuple(self.study.questions), self.study.place)
+            quick = replace(self.study.with_effort("quick"), questions=asked)
+            self.most = max((own.units[1] for own in durations(Prepared(study=quick))), default=0)
             answer = self.study.ask(self.kind, "quick", self)
             said = {"sentences": list(answer.sentences), "warnings": list(answer.warnings)}
             self.answer = said | _found(answer, self.settings)
@@ -112,13 +131,6 @@ class Job:
         except Exception:
             self.error = "The program failed; the terminal says where."
             raise
-
-
-def _most_units(kind: str, study: Study) -> int:
-    """Return about how many units a question solves at most, at the quick effort [-]."""
-    asked = questions_of((kind,), tuple(study.questions), study.place)
-    quick = replace(study.with_effort("quick"), questions=asked)
-    return max((own.units[1] for own in durations(Prepared(study=quick))), default=0)
 
 
 def _found(answer: Any, settings: tuple[str, ...]) -> dict[str, Any]:
@@ -138,24 +150,6 @@ def _found(answer: Any, settings: tuple[str, ...]) -> dict[str, Any]:
         exact = result.fronts.exact
         found["front"] = {"x": numbers(exact.limits), "y": numbers(exact.cost)}
     return {**drawn, **found}
-
-
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,59}")
-_SCRIPT = '''"""{before} at other zones, saved from the live page."""
-
-from importlib import import_module
-
-import tolalloc as ta
-
-study = import_module("{module}").study.changed(
-    "{table}",
-    settings={settings!r},
-    name="{name}",
-)
-
-if __name__ == "__main__":
-    ta.run_script()
-'''
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -199,7 +193,9 @@ class Saving:
         values = self._settings(design)
         text = _SCRIPT.format(before=before, module=self.script.stem, table=table.name, settings=values, name=name)
         write_new(script, text)
-        return {"table": table.name, "script": script.name, "command": f"tolalloc run {_quoted(script)}"}
+        # As it may be pasted into a command line, from whatever folder.
+        quoted = f'"{script}"' if os.name == "nt" else shlex.quote(str(script))
+        return {"table": table.name, "script": script.name, "command": f"tolalloc run {quoted}"}
 
     def _require_readable(self, table: Path, design: LiveDesign) -> None:
         """Take a table back that no study would read, such as one with a zone that the model does not believe."""
@@ -224,15 +220,6 @@ def _with_range(source: Source) -> Source:
     return replace(source, minimum=smallest, maximum=largest)
 
 
-def _quoted(path: Path) -> str:
-    """Return a path as it may be pasted into a command line, from whatever folder."""
-    return f'"{path}"' if os.name == "nt" else shlex.quote(str(path))
-
-
-_TABS = 64
-"""Tabs whose latest request is known [-]."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Desk:
     """Where the requests of all tabs arrive; a newer one of a tab calls off its older ones."""
@@ -249,13 +236,13 @@ class Desk:
             "study": lambda _: self.session.described,
             "design": self._design,
             "units": self._units,
-            "examined": self._examined,
+            "examined": lambda sent: {"sentences": self.session.examined(self._read(sent))},
             "scaled": self._scaled,
             "scene": self._scene,
             "sweep": self._sweep,
-            "save": self._save,
+            "save": lambda sent: self._saving.save(self._read(sent), sent.get("name", "")),
             "ask": self._ask,
-            "state": self._state,
+            "state": lambda sent: job.state if (job := self._jobs.get(self._tab(sent))) else {},
             "stop": self._stop,
         }
 
@@ -289,9 +276,6 @@ class Desk:
         wanted = self._newest(sent)
         return self.session.units(self._read(sent), sent.get("units", 256), wanted) or {"called off": True}
 
-    def _examined(self, sent: dict[str, Any]) -> dict[str, Any]:
-        return {"sentences": self.session.examined(self._read(sent))}
-
     def _scaled(self, sent: dict[str, Any]) -> dict[str, Any]:
         wanted = self._newest(sent)
         found = self.session.scaled(self._read(sent), wanted)
@@ -304,12 +288,13 @@ class Desk:
     def _sweep(self, sent: dict[str, Any]) -> dict[str, Any]:
         return LiveUnits(session=self.session).swept(self._read(sent), sent.get("unit", 0), str(sent.get("source")))
 
-    def _save(self, sent: dict[str, Any]) -> dict[str, Any]:
-        return Saving(session=self.session, script=self.script).save(self._read(sent), sent.get("name", ""))
+    @property
+    def _saving(self) -> Saving:
+        return Saving(session=self.session, script=self.script)
 
     def _ask(self, sent: dict[str, Any]) -> dict[str, Any]:
         held = names_in(sent, "locked", [own.name for own in self.session.prepared.errors.active])
-        study = Saving(session=self.session, script=self.script).study(self._read(sent), locked=held)
+        study = self._saving.study(self._read(sent), locked=held)
         names = tuple(own.name for own in self.session.prepared.model.settings)
         tab = self._tab(sent)
         with self._lock:
@@ -318,13 +303,8 @@ class Desk:
             self._jobs[tab] = Job.asked(str(sent.get("question")), study, names)
         return self._jobs[tab].state
 
-    def _state(self, sent: dict[str, Any]) -> dict[str, Any]:
-        job = self._jobs.get(self._tab(sent))
-        return job.state if job else {}
-
     def _stop(self, sent: dict[str, Any]) -> dict[str, Any]:
-        job = self._jobs.get(self._tab(sent))
-        if job:
+        if job := self._jobs.get(self._tab(sent)):
             job.stop()
         return {}
 

@@ -26,6 +26,23 @@ from tolalloc.reports.page import asset
 
 _KEPT = ".tolalloc-live"
 _TOKEN = re.compile(r"[A-Za-z0-9_-]{32}")
+LARGEST = 64 * 1024
+"""Largest request [bytes]."""
+MOST_AT_ONCE = 32
+"""Requests that are answered at the same time [-]."""
+MOST_CONNECTIONS = 64
+"""Connections that are open at the same time; a browser keeps six for a tab [-]."""
+PATIENCE = 10.0
+"""Time that a connection may take to say a whole request, and to take its answer [s]."""
+_KINDS = {"js": "text/javascript", "css": "text/css", "html": "text/html"}
+_OWN, _SHARED = (
+    (
+        *("live.html", "live.css", "live.js", "zones.js", "designs.js", "picture.js", "requests.js", "verdict.js"),
+        *("cost.js", "cursor.js", "ghosts.js", "question.js"),
+    ),
+    ("page.css", "chart.js", "mechanism.css", "mechanism.js"),
+)
+_POLICY = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,25 +76,6 @@ class Address:
             return
 
 
-LARGEST = 64 * 1024
-"""Largest request [bytes]."""
-MOST_AT_ONCE = 32
-"""Requests that are answered at the same time [-]."""
-MOST_CONNECTIONS = 64
-"""Connections that are open at the same time; a browser keeps six for a tab [-]."""
-PATIENCE = 10.0
-"""Time that a connection may take to say a whole request, and to take its answer [s]."""
-_KINDS = {"js": "text/javascript", "css": "text/css", "html": "text/html"}
-_OWN, _SHARED = (
-    (
-        *("live.html", "live.css", "live.js", "zones.js", "designs.js", "picture.js", "requests.js", "verdict.js"),
-        *("cost.js", "cursor.js", "ghosts.js", "question.js"),
-    ),
-    ("page.css", "chart.js", "mechanism.css", "mechanism.js"),
-)
-_POLICY = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'"
-
-
 @dataclass(frozen=True, kw_only=True)
 class LiveServer:
     """The server of one desk."""
@@ -97,10 +95,9 @@ class LiveServer:
         """
         handler = type("Handler", (_Handler,), {"live": self, "free": BoundedSemaphore(MOST_AT_ONCE)})
         try:
-            server = _BoundedServer(("127.0.0.1", self.port), handler)
+            return _BoundedServer(("127.0.0.1", self.port), handler)
         except (OSError, OverflowError) as error:
             raise InputError.of_argument("live page", "port", self.port, f"a free port ({error})") from None
-        return server
 
     @property
     def address(self) -> str:

@@ -35,6 +35,20 @@ _DECIMALS = 4
 """Decimals of a zone; a table writes one more, so that half a zone is written whole too [-]."""
 _SMALLEST = 10.0**-_DECIMALS
 """Smallest zone with these decimals [µm]."""
+FIRST = 256
+"""Units that are judged at once [-]."""
+_FACTORS = (0.4, 0.55, 0.75, 1.0, 1.3, 1.7, 2.2)
+"""What all zones of a drawing are multiplied by to show what its limits cost [-]."""
+_LOOK = 128
+"""Units that are solved between two looks whether somebody still wants them [-]."""
+MOST = 6144
+"""Most units of one design [-]."""
+_STEPS = 400
+"""Steps of the slider of a setting [-]."""
+_MOST_CACHED = 24
+"""Designs whose solved units are cached [-]."""
+_SWEPT = 9
+"""Values of an error between the ends of its zone [-]."""
 
 
 @dataclass(frozen=True)
@@ -170,20 +184,6 @@ def _quantile(values: Float[np.ndarray, " known"], share: float) -> dict[str, An
     return {"share": share, "value": found.estimate, "interval": numbers([found.low, found.high])}
 
 
-FIRST = 256
-"""Units that are judged at once [-]."""
-_FACTORS = (0.4, 0.55, 0.75, 1.0, 1.3, 1.7, 2.2)
-"""What all zones of a drawing are multiplied by to show what its limits cost [-]."""
-_LOOK = 128
-"""Units that are solved between two looks whether somebody still wants them [-]."""
-MOST = 6144
-"""Most units of one design [-]."""
-_STEPS = 400
-"""Steps of the slider of a setting [-]."""
-_MOST_CACHED = 24
-"""Designs whose solved units are cached [-]."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Session:
     """A study that is open.
@@ -204,15 +204,10 @@ class Session:
         seeds = SeedTree(self.prepared.study.seed).child("difference")
         return errors.standard_values(np.concatenate([*seeds.uniform_chunks(MOST, len(errors.columns))]))
 
-    @property
-    def requirements(self) -> tuple[Requirement, ...]:
-        """What the study limits, the leading output first."""
-        return self.prepared.requirements
-
     @cached_property
     def outputs(self) -> tuple[str, ...]:
         """Names of the limited outputs."""
-        return tuple(dict.fromkeys(own.output for own in self.requirements))
+        return tuple(dict.fromkeys(own.output for own in self.prepared.requirements))
 
     def model(self, design: LiveDesign) -> Model:
         """Return the model at the settings and under the conditions of a design.
@@ -287,16 +282,12 @@ class Session:
             evaluation = response(self.deviations(design, slice(len(values), min(len(values) + _LOOK, count))))
             good = np.where(evaluation.good[:, np.newaxis], evaluation.values, np.nan)
             values = np.concatenate([values, good])
-        self._remember(design, values)
-        return values if len(values) >= count else None
-
-    def _remember(self, design: LiveDesign, values: Float[np.ndarray, "unit output"]) -> None:
-        """Remember the units of a design, and forget those of the oldest ones."""
-        with self._lock:
+        with self._lock:  # the units of the oldest designs are forgotten
             known = self._known.pop(design, values)
             self._known[design] = max(values, known, key=len)
             while len(self._known) > _MOST_CACHED:
                 self._known.pop(next(iter(self._known)))
+        return values if len(values) >= count else None
 
     def scaled(self, design: LiveDesign, wanted: Callable[[], bool]) -> list[dict[str, Any]] | None:
         """Return cost and limited quantiles of the drawing with all zones scaled alike, at the settings of a design.
@@ -358,7 +349,7 @@ class Session:
                     for own in model.operating_conditions
                 ),
             ],
-            "limits": [own.sentence for own in self.requirements],
+            "limits": [own.sentence for own in self.prepared.requirements],
             "currency": self.prepared.currency or COST_UNITS,
         }
 
@@ -392,10 +383,6 @@ def _described(source: Source, processes: tuple[Process, ...]) -> dict[str, Any]
     }
 
 
-_SWEPT = 9
-"""Values of an error between the ends of its zone [-]."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class LiveUnits:
     """The random units of a session, one at a time; unit 0 has exact parts, the others count from 1."""
@@ -427,7 +414,7 @@ class LiveUnits:
         """Return the pictures of a unit, with the limit of the curve's height around the middle of the curve."""
         portrait = portrait_of(self.session.model(design))
         figures = portrait.pictured({label: (np.array(design.settings), x)})
-        limits = {own.output: own.limits.upper for own in self.session.requirements}
+        limits = {own.output: own.limits.upper for own in self.session.prepared.requirements}
         limit, values = limits.get(portrait.curve_height), [item for own in figures[:1] for item in own.series[-1].y]
         if limit is None or not np.isfinite(values).any():
             return figures

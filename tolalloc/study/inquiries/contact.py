@@ -26,7 +26,7 @@ MOST_PHASES = 3600
 
 
 @dataclass(frozen=True, kw_only=True)
-class Contact(Inquiry["tuple[Reducer, float]"]):
+class ToothContact(Inquiry["tuple[Reducer, float]"]):
     """Clearance, backlash, pins in contact, forces and pressure of exact parts."""
 
     word: ClassVar[str] = "contact"
