@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -16,13 +16,17 @@ if TYPE_CHECKING:
 
 Row = TypeVar("Row")
 
+_SAME = 1e-6
+"""Relative difference of two numbers below which a cell has one of them [-]."""
 
-@dataclass(frozen=True, kw_only=True)
+
+@dataclass(frozen=True)
 class Column(Generic[Row]):
     """One column of a table."""
 
     header: str  # Header with its unit; ``{cost}`` in it stands for what costs are counted in
     value: Callable[[Row], Any]  # What stands in a row's cell
+    _: KW_ONLY
     # Name in a summary, where a program reads it; the header unless given, None where no program needs it
     key: str | None = ""
     # Place among the columns that a terminal shows, those of one place in their order; 0 if it does not show it [-]
@@ -75,7 +79,7 @@ class Table(Generic[Row]):
         ]
 
 
-def of_positions(name: str, columns: Mapping[str, Any], rows: Iterable[int]) -> Table[int]:
+def of_positions(name: str, columns: Mapping[str, Any], rows: Iterable[int] | None = None) -> Table[int]:
     """Return a table whose rows are positions in arrays.
 
     Parameters
@@ -85,7 +89,7 @@ def of_positions(name: str, columns: Mapping[str, Any], rows: Iterable[int]) -> 
     columns
         Header → what stands at every position, or what says it of one.
     rows
-        The positions in the order of the table.
+        The positions in the order of the table; all that the first column has unless given.
 
     Examples
     --------
@@ -95,6 +99,7 @@ def of_positions(name: str, columns: Mapping[str, Any], rows: Iterable[int]) -> 
     made = [
         Column[int](header=header, value=own if callable(own) else own.__getitem__) for header, own in columns.items()
     ]
+    rows = range(len(next(iter(columns.values())))) if rows is None else rows
     return Table(name=name, columns=made, rows=list(rows))
 
 
@@ -114,10 +119,6 @@ def plain(value: Any) -> Any:
     return None if isinstance(value, float) and not isfinite(value) else value
 
 
-_SAME = 1e-6
-"""Relative difference of two numbers below which a cell has one of them [-]."""
-
-
 def span(low: float, high: float) -> float | str:
     """Return a cell from one number to another, or the number where they are one.
 
@@ -134,4 +135,4 @@ def own_words(members: Callable[[Row], Sequence[Source]]) -> tuple[Column[Row], 
         return lambda row: ", ".join(dict.fromkeys(filter(None, (getattr(own, field) for own in members(row)))))
 
     headers = {"own_id": "own id", "drawing": "drawing", "label": "label"}
-    return tuple(Column(header=header, value=said(field), nothing="") for field, header in headers.items())
+    return tuple(Column(header, said(field), nothing="") for field, header in headers.items())

@@ -163,7 +163,8 @@ class _Placed:
 
     def __init__(self, sheet: DrawingSheet) -> None:
         self.names = max((min(len(name), _NAMES) for name, _ in sheet.frames), default=0) * _BROAD * _TEXT + 3.0
-        self.width = self.names + max((_frame_width(frame) for _, frame in sheet.frames), default=0.0) + _GAP
+        last = (boxes(frame)[-1] for _, frame in sheet.frames)
+        self.width = self.names + max(((left + width) * _SCALE for left, width, _ in last), default=0.0) + _GAP
         self.heights = [max(len(wrap(name, _NAMES)) * _TEXT * _LINE, _TALL) + 3.0 for name, _ in sheet.frames]
         beside = sum(table.height + _GAP for table in sheet.tables) + sum(map(_note_height, sheet.notes))
         beside += _sketches_height(sheet.sketches) + _block_height(sheet) + _GAP
@@ -183,11 +184,6 @@ class _Placed:
             found.append((_MARGIN + column * self.width, -_MARGIN - top))
             top += height
         return found, column + 1
-
-
-def _frame_width(frame: FeatureFrame) -> float:
-    left, width, _ = boxes(frame)[-1]
-    return (left + width) * _SCALE
 
 
 def _frames(space: Modelspace, sheet: DrawingSheet, placed: _Placed) -> None:
@@ -259,8 +255,8 @@ def _sketch(pen: _Pen, own: SignSketch, x: float, y: float) -> None:
     pen.arrow((x, y + own.arrow[0]), (x, y + own.arrow[1]))
     pen.arrow((x + 21.0, y + 1.0), (x + 21.0, y - 12.0))
     pen.text("to the axis", (x + 22.5, y - 8.0), _SMALL)
-    pen.text("of the disc", (x + 22.5, y - 11.0), _SMALL)
-    pen.text("disc", (x - 22.0, y - 3.0), _TEXT)
+    pen.text(f"of the {own.part}", (x + 22.5, y - 11.0), _SMALL)
+    pen.text(own.part, (x - 22.0, y - 3.0), _TEXT)
     pen.text("wheel", (x - 4.0, y + new_height + 3.0), _SMALL)
 
 

@@ -40,6 +40,25 @@ class Series:
     low: Sequence[float] = ()
     high: Sequence[float] = ()
 
+    @classmethod
+    def line(
+        cls, label: str, x: Iterable[float], y: Iterable[float], low: Iterable[float] = (), high: Iterable[float] = ()
+    ) -> Series:
+        """Return a line, with a band around it where edges are given."""
+        return cls(label=label, kind="line", x=list(x), y=list(y), low=list(low), high=list(high))
+
+    @classmethod
+    def points(cls, label: str, x: Iterable[float], y: Iterable[float]) -> Series:
+        """Return single points."""
+        return cls(label=label, kind="points", x=list(x), y=list(y))
+
+    @classmethod
+    def bars(
+        cls, label: str, x: Iterable[str], y: Iterable[float], low: Iterable[float] = (), high: Iterable[float] = ()
+    ) -> Series:
+        """Return horizontal bars, a category each, with intervals where their ends are given."""
+        return cls(label=label, kind="bars", x=list(x), y=list(y), low=list(low), high=list(high))
+
 
 @dataclass(frozen=True, kw_only=True)
 class Figure:

@@ -25,6 +25,13 @@ _GROOVE, _HOUSING, _STEEL, _DISC, _GEAR, _PAPER = "#c8cbce", "#dadcde", "#b2b6ba
 _LONGEST = 0.3
 """Length of the arrow of the largest force over the radius of the pin circle [-]."""
 
+_FRAMES_PER_SECOND = 12
+
+_EDGES = (("#1c2733", 3), ("#5b6876", 3), ("#b00020", 2))
+"""Colours of lines, and into how many steps each goes over into a face."""
+
+_FACES = ("#ffffff", "#dadcde", "#b2b6ba", "#bed2e2", "#bbd9c7", "#c8cbce", "#d5d7d9")
+
 
 def mixed(colour: str, other: str, share: float) -> tuple[float, ...]:
     """Return red, green and blue of a colour with a share of another one [-]."""
@@ -35,7 +42,7 @@ def _points(values: Complex[np.ndarray, " point"]) -> Float[np.ndarray, "point 2
     return np.stack([values.real, values.imag], axis=-1)
 
 
-class _Pen:
+class _View:
     """Draws into one view, turned as a whole; places by their share."""
 
     def __init__(self, axes: Axes, shares: Mapping[str, float], turned: float):
@@ -73,7 +80,7 @@ class _Pen:
         self.polygon(triangle * np.exp(1j * (pose.at("carrier")[0] + further)), _INK, _INK, 0.5)
 
 
-def _draw_pins(pen: _Pen, pose: Pose) -> None:
+def _draw_pins(pen: _View, pose: Pose) -> None:
     """Draw the housing with the pins in their grooves; the disc comes between the two."""
     outline = pose.outline
     pen.circle(0j, outline["housing_radius"], "housing.pins", _HOUSING)
@@ -93,7 +100,7 @@ def _draw_pins(pen: _Pen, pose: Pose) -> None:
     pen.circle(0j, outline["pin_circle_radius"], "", _PAPER, edgecolor="none")
 
 
-def _draw_disc(pen: _Pen, pose: Pose, disc: int, largest: float) -> None:
+def _draw_disc(pen: _View, pose: Pose, disc: int, largest: float) -> None:
     """Draw a disc with its cranks against the pins."""
     outline, number = pose.outline, disc + 1
     _draw_pins(pen, pose)
@@ -118,10 +125,9 @@ def _draw_disc(pen: _Pen, pose: Pose, disc: int, largest: float) -> None:
         pen.circle(axis, 0.45 * outline["journal_radius"], f"crank{crank + 1}", _STEEL)
         pen.lines(np.array([[axis, journal]]), _INK, 1.4)
     _draw_forces(pen, pose, disc, largest)
-    pen.output(pose)
 
 
-def _draw_holes(pen: _Pen, pose: Pose, disc: int) -> None:
+def _draw_holes(pen: _View, pose: Pose, disc: int) -> None:
     """Draw the holes of a disc with the output pins in them, and the eccentric shaft in its bore."""
     outline, number = pose.outline, disc + 1
     for pin in range(outline["output_pin_count"]):
@@ -135,20 +141,18 @@ def _draw_holes(pen: _Pen, pose: Pose, disc: int) -> None:
     pen.lines(np.array([[shaft, eccentric]]), _INK, 1.4)
 
 
-def _draw_output(pen: _Pen, pose: Pose) -> None:
+def _draw_output(pen: _View, pose: Pose) -> None:
     """Draw the carrier with the output pins, and the input shaft."""
     outline = pose.outline
-    pen.circle(0j, outline["housing_radius"], "", _PAPER, fill=False, alpha=0.5)
     pen.circle(pose.shift("carrier"), outline["carrier_radius"], "carrier", _HOUSING)
     for pin in range(outline["output_pin_count"]):
         pen.circle(pose.carrier_bore(pin), outline["carrier_bore_radius"], "output.pins", _STEEL)
     shaft, turned = pose.shift("sun"), np.exp(1j * float(pose.at("sun")[0]))
     pen.circle(shaft, outline["shaft_radius"], "shaft", _STEEL)
     pen.lines(np.array([[shaft + share * outline["shaft_radius"] * turned for share in (0.3, 0.9)]]), _INK, 1.4)
-    pen.output(pose)
 
 
-def _draw_forces(pen: _Pen, pose: Pose, disc: int, largest: float) -> None:
+def _draw_forces(pen: _View, pose: Pose, disc: int, largest: float) -> None:
     """Draw the forces of the pins on a disc as arrows."""
     point, normal = pose.contact(disc)
     length = _LONGEST * pose.outline["pin_circle_radius"] * pose.state("force")[disc] / largest
@@ -161,10 +165,9 @@ def _draw_forces(pen: _Pen, pose: Pose, disc: int, largest: float) -> None:
     pen.axes.add_collection(PolyCollection(corners, facecolor=_FORCE, edgecolor="none", transform=pen.transform))
 
 
-def _draw_first_stage(pen: _Pen, pose: Pose) -> None:
+def _draw_first_stage(pen: _View, pose: Pose) -> None:
     """Draw carrier, planets and sun."""
     outline = pose.outline
-    pen.circle(0j, outline["housing_radius"], "", _PAPER, fill=False, alpha=0.5)
     pen.circle(pose.shift("carrier"), outline["carrier_radius"], "carrier", _HOUSING)
 
     def draw_gear(name: str, teeth: int, centre: complex, angle: float) -> None:
@@ -187,14 +190,12 @@ def _draw_first_stage(pen: _Pen, pose: Pose) -> None:
         if pen.shares.get(f"mesh{crank + 1}", 0.0) > 0:
             at = complex(outline["module"] * outline["sun_teeth"] / 2 * np.exp(1j * direction))
             pen.ring(at, 1.1 * outline["module"], f"mesh{crank + 1}")
-    pen.output(pose)
 
 
-def _draw_centre_gear(pen: _Pen, pose: Pose) -> None:
+def _draw_centre_gear(pen: _View, pose: Pose) -> None:
     """Draw the centre gear on its hollow shaft and the input pinion beside it."""
     outline, centre, module = pose.outline, pose.shift("sun"), pose.outline["centre_module"]
     beside = complex(module * (outline["centre_teeth"] + outline["pinion_teeth"]) / 2)
-    pen.circle(0j, outline["housing_radius"], "", _PAPER, fill=False, alpha=0.5)
     for name, axis, bore in (("centre", centre, outline["hollow_radius"]), ("pinion", beside, 2 * module)):
         teeth, angle = outline[f"{name}_teeth"], float(pose.at(name)[0])
         at = axis + pose.offset(name, angle - pose.record["start"][name][0])
@@ -205,16 +206,9 @@ def _draw_centre_gear(pen: _Pen, pose: Pose) -> None:
         pen.lines(np.array([[at + share * mark for share in (0.7, 0.9)]]), _INK, 1.4)
     if pen.shares.get("centre.mesh", 0.0) > 0:
         pen.ring(complex(module * outline["centre_teeth"] / 2), 1.1 * module, "centre.mesh")
-    pen.output(pose)
 
 
-def longest_arrow(record: Mapping[str, Any]) -> float:
-    """Return the force to which the longest arrow belongs, the largest of the turn either way round [N]."""
-    largest = max(float(values_of(record[direction]["force"]).max()) for direction in ("forward", "backward"))
-    return max(largest, 1e-12)
-
-
-def _views(outline: Mapping[str, Any]) -> list[tuple[Callable[[_Pen, Pose], None], str]]:
+def _views(outline: Mapping[str, Any]) -> list[tuple[Callable[[_View, Pose], None], str]]:
     """Return what is drawn beside the discs, and what is said above it."""
     if "output_pin_count" in outline:
         return [(_draw_output, "output and input shaft")]
@@ -250,7 +244,7 @@ def draw_still(
         Force of the longest arrow, the largest of the turn unless given [N].
     """
     pose, shown = Pose(record, carrier_angle), (*discs,) or (*range(record["outline"]["disc_count"]),)
-    largest = largest or longest_arrow(record)
+    largest = largest or max(1e-12, *(float(values_of(record[way]["force"]).max()) for way in ("forward", "backward")))
     others = _views(record["outline"])
     canvas = Canvas(figsize=(3.6 * (len(shown) + len(others)), 4.2), layout="constrained")
     views = np.atleast_1d(canvas.subplots(1, len(shown) + len(others)))
@@ -259,20 +253,19 @@ def draw_still(
         axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
         axes.axis("off")
     for disc, axes in zip(shown, views, strict=False):
-        _draw_disc(_Pen(axes, shares, turned), pose, disc, largest)
+        view = _View(axes, shares, turned)
+        _draw_disc(view, pose, disc, largest)
+        view.output(pose)
         axes.set_title(f"disc {disc + 1} on the pins", fontsize=10, color=_INK)
     for axes, (draw, what) in zip(views[len(shown) :], others, strict=True):
-        draw(_Pen(axes, shares, turned), pose)
+        view = _View(axes, shares, turned)
+        view.circle(0j, record["outline"]["housing_radius"], "", _PAPER, fill=False, alpha=0.5)
+        draw(view, pose)
+        view.output(pose)
         axes.set_title(what, fontsize=10, color=_INK)
     stated = f"errors and gaps {record['magnification']:g} times larger, longest arrow {largest:,.0f} N"
     canvas.suptitle(f"{title}: {stated}" if title else stated, fontsize=10, color=_INK)
     return canvas
-
-
-_FRAMES_PER_SECOND = 12
-_EDGES = (("#1c2733", 3), ("#5b6876", 3), ("#b00020", 2))
-"""Colours of lines, and into how many steps each goes over into a face."""
-_FACES = ("#ffffff", "#dadcde", "#b2b6ba", "#bed2e2", "#bbd9c7", "#c8cbce", "#d5d7d9")
 
 
 def animate(record: Mapping[str, Any], shares: Mapping[str, float], path: Path, frames: int, title: str) -> None:

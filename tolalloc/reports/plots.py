@@ -26,12 +26,7 @@ def _draw_bars(axes: Any, figure: Figure, number: int) -> None:
     item, count = figure.series[number], sum(item.kind == "bars" for item in figure.series)
     height = 0.8 / count
     places = [row + height * (number - (count - 1) / 2) for row in range(len(item.x))]
-    error = None
-    if item.low:
-        error = [
-            [y - low for y, low in zip(item.y, item.low, strict=True)],
-            [high - y for y, high in zip(item.y, item.high, strict=True)],
-        ]
+    error = [np.subtract(item.y, item.low), np.subtract(item.high, item.y)] if item.low else None
     colour = COLOURS[number % len(COLOURS)]
     axes.barh(places, item.y, height, xerr=error, label=item.label, color=colour, ecolor="#444444", capsize=2)
     axes.set_yticks(range(len(item.x)), [str(name) for name in item.x])

@@ -1,5 +1,7 @@
 """What is said and shown of a model beside its numbers: words, pictures and a unit that moves, all of them optional."""
 
+# ruff: noqa: ARG002 (a model may need what any model is handed)
+
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
@@ -39,6 +41,7 @@ class Examination:
 class SignSketch:
     """Two positions of a grinding wheel in a groove of the part below it, whose axis lies further down."""
 
+    part: str  # Name of the part
     caption: str  # What the amount is, and what its two signs do
     nominal: tuple[float, float]  # Height of the wheel's middle and its radius without the amount [mm of the picture]
     changed: tuple[float, float]  # The same with the amount negative [mm of the picture]
@@ -118,7 +121,7 @@ class Portrait(Generic[Own]):
         """Which sources show at which orders, a clause that begins a sentence; nothing unless a model knows."""
         return ""
 
-    def kind_of(self, source: Source) -> ErrorSource | None:  # noqa: ARG002
+    def kind_of(self, source: Source) -> ErrorSource | None:
         """Return what the model declares of a source, which a drawing writes by it; nothing unless a model does."""
         return None
 
@@ -138,7 +141,7 @@ class Portrait(Generic[Own]):
         """Return what the settings mean on the drawing, units in the names."""
         return {setting.name: float(value) for setting, value in zip(self.model.settings, values, strict=True)}
 
-    def effects(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, str]:  # noqa: ARG002
+    def effects(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, str]:
         """Return what an amount of these settings does to the part, or a setting means; nothing unless a model says."""
         return {}
 
@@ -147,44 +150,34 @@ class Portrait(Generic[Own]):
         """Which way negative amounts are ground, as small pictures; none unless a model has any."""
         return ()
 
-    def cautions(self, values: Float[np.ndarray, " setting"]) -> tuple[str, ...]:  # noqa: ARG002
+    def cautions(self, values: Float[np.ndarray, " setting"]) -> tuple[str, ...]:
         """Return what a reader must know of these settings."""
         return ()
 
-    def examination(self, figures: Mapping[str, float]) -> Examination:  # noqa: ARG002
+    def examination(self, figures: Mapping[str, float]) -> Examination:
         """Return what a check says of the model and of what `Model.examined` counted of some random units."""
         return Examination()
 
-    def illustrated(
-        self,
-        units: Units,  # noqa: ARG002
-    ) -> tuple[Section, ...]:
+    def illustrated(self, units: Units) -> tuple[Section, ...]:
         """Return pictures of single units, label → settings and columns; nothing unless a model has any."""
         return ()
 
-    def pictured(
-        self,
-        units: Units,  # noqa: ARG002
-    ) -> tuple[Figure, ...]:
+    def pictured(self, units: Units) -> tuple[Figure, ...]:
         """Return what can be drawn of single units at once, such as a curve; nothing unless a model has any."""
         return ()
 
     def scene(
         self,
-        settings: Float[np.ndarray, " setting"],  # noqa: ARG002
-        x: Float[np.ndarray, " column"],  # noqa: ARG002
-        unit: str,  # noqa: ARG002
-        sources: tuple[str, ...],  # noqa: ARG002
+        settings: Float[np.ndarray, " setting"],
+        x: Float[np.ndarray, " column"],
+        unit: str,
+        sources: tuple[str, ...],
     ) -> dict[str, Any] | None:
         """Return a unit as a moving picture needs it, with a place for each source; none unless a model has one."""
         return None
 
     def moving(
-        self,
-        errors: ErrorModel,  # noqa: ARG002
-        x: Float[np.ndarray, " column"],  # noqa: ARG002
-        shares: Mapping[str, float],  # noqa: ARG002
-        unit: str,  # noqa: ARG002
+        self, errors: ErrorModel, x: Float[np.ndarray, " column"], shares: Mapping[str, float], unit: str
     ) -> tuple[Section, ...]:
         """Return a picture of one unit's columns whose places show the sources' shares; nothing unless there is one."""
         return ()
@@ -225,6 +218,6 @@ class FunctionPortrait(Portrait[BoundFunction], of=BoundFunction):
         bare = ", ".join(self.model.without_nominal)
         return (f"no nominal size on the drawing, taken as deviations from 0: {bare}",) if bare else ()
 
-    def examination(self, figures: Mapping[str, float]) -> Examination:  # noqa: ARG002
+    def examination(self, figures: Mapping[str, float]) -> Examination:
         """Return which inputs have no nominal size: a size that was forgotten moves every output."""
         return Examination(tuple(f"{said[0].upper()}{said[1:]}." for said in self.assumptions))

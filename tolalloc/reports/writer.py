@@ -35,6 +35,30 @@ _POINT = re.compile(r"\.(?=[A-Za-z])")
 _SMALLER = {"several": 8, "many": 12}
 """Class of a table that is set smaller on paper → columns beyond which it is [-]."""
 
+_NUMBER = ' class="number"'
+
+_NEARLY_ALL = 90.0
+"""Share from which two decimals are written, as in a sentence and on a terminal [%]."""
+
+_BELOW_ALL = 99.99
+"""Largest share that is written of what is less than all [%]."""
+
+_LARGE = (24, 15)
+"""Rows and columns beyond which a table is folded [-]."""
+
+_SENTENCES = 5
+"""Sentences of the first answer on a first page that shows more than sentences [-]."""
+
+_MOVING = "moving"
+
+_LISTED = 6
+"""Sections beyond which a page begins with a list of them [-]."""
+
+_LIBRARIES = (
+    *("numpy", "scipy", "numba", "cvxpy", "clarabel", "highspy"),
+    *("pymoo", "SALib", "pandas", "scikit-learn"),
+)
+
 
 def html_table(frame: pd.DataFrame) -> Markup:
     """Return a frame as an HTML table."""
@@ -51,14 +75,6 @@ def html_table(frame: pd.DataFrame) -> Markup:
     smaller = [name for name, columns in _SMALLER.items() if frame.shape[1] > columns][-1:]
     kind = " ".join(["data", *smaller])
     return Markup(f'<table class="{kind}"><thead><tr>{head}</tr></thead>\n<tbody>\n{rows}\n</tbody></table>')
-
-
-_NUMBER = ' class="number"'
-_NEARLY_ALL = 90.0
-"""Share from which two decimals are written, as in a sentence and on a terminal [%]."""
-
-_BELOW_ALL = 99.99
-"""Largest share that is written of what is less than all [%]."""
 
 
 def _is_number(value: object) -> bool:
@@ -104,19 +120,6 @@ def _(value: float, unit: str) -> str:
 @_cell.register
 def _(value: Integral, unit: str) -> str:  # noqa: ARG001
     return f"<td{_NUMBER}>{signed(str(value))}</td>" if not isinstance(value, bool) else f"<td>{value}</td>"
-
-
-_LARGE = (24, 15)
-"""Rows and columns beyond which a table is folded [-]."""
-_SENTENCES = 5
-"""Sentences of the first answer on a first page that shows more than sentences [-]."""
-_MOVING = "moving"
-_LISTED = 6
-"""Sections beyond which a page begins with a list of them [-]."""
-_LIBRARIES = (
-    *("numpy", "scipy", "numba", "cvxpy", "clarabel", "highspy"),
-    *("pymoo", "SALib", "pandas", "scikit-learn"),
-)
 
 
 def _is_large(frame: pd.DataFrame) -> bool:

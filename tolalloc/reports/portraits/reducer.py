@@ -68,6 +68,17 @@ FACTOR = 1.5
 USUAL_TWIST = 3.6
 """Rated torque over torsional rigidity of RV reducers in catalogues, 2.9 to 4.0 over all sizes [arcmin]."""
 
+_WITHOUT = "without radial clearance"
+
+_MEANS = "A preloaded reducer turns, but it runs warm, wears early and has no lost motion until it has worn."
+"""What pins that press without torque do to a reducer."""
+
+_CARRIED = (
+    "fewest pins in contact on a disc at rated torque [-]",
+    "largest pin force at rated torque [N]",
+    "peak pressure at rated torque [MPa]",
+)
+
 
 class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
     """What is said and shown of a reducer at the sources of a drawing."""
@@ -199,6 +210,7 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
 
 _SIGN_SKETCHES = (
     SignSketch(
+        part="disc",
         caption="Δr_rp negative (drawn): the wheel, of radius r_rp + Δr_rp, is smaller than the pin and leaves "
         "material on the teeth. Positive: it is larger and removes material.",
         nominal=(0.0, 9.0),
@@ -206,6 +218,7 @@ _SIGN_SKETCHES = (
         arrow=(-9.0, -7.0),
     ),
     SignSketch(
+        part="disc",
         caption="Δr_p negative (drawn): the wheel runs on the circle R_p + Δr_p, smaller than the pin circle, and "
         "removes material from the teeth. Positive: on a larger circle it leaves material.",
         nominal=(0.0, 9.0),
@@ -320,11 +333,6 @@ def _examination(portrait: ReducerPortrait, figures: Mapping[str, float]) -> Exa
     return Examination(sentences, f"of its units {' and '.join(reasons)}: {_advice(model)}", fault, counted)
 
 
-_WITHOUT = "without radial clearance"
-_MEANS = "A preloaded reducer turns, but it runs warm, wears early and has no lost motion until it has worn."
-"""What pins that press without torque do to a reducer."""
-
-
 def _no_load(model: ReducerModel, figures: Mapping[str, float]) -> str:
     """Return what the pins' friction takes without load, at the output and at the motor, beside the catalogue."""
     half, most = (figures[f"no-load torque of the pins, {which} [N·m]"] for which in ("median", "99.73 %"))
@@ -427,12 +435,7 @@ def _curve_figure(curves: Mapping[str, Equilibria], torque: float) -> Figure:
         x_label="carrier angle [°]",
         y_label="transmission error, output side [arcsec]",
         series=tuple(
-            Series(
-                label=label,
-                kind="line",
-                x=list(curve.carrier_angle / DEGREE),
-                y=list(curve.transmission_error[0] / ARCSECOND),
-            )
+            Series.line(label, curve.carrier_angle / DEGREE, curve.transmission_error[0] / ARCSECOND)
             for label, curve in curves.items()
         ),
     )
@@ -459,7 +462,7 @@ def _crank_turn(label: str, curve: Equilibria, disc_teeth: int) -> Series:
     low, mean, high = zip(
         *((float(own.min()), float(own.mean()), float(own.max())) for own in parts if own.size), strict=True
     )
-    return Series(label=label, kind="line", x=[360.0 / _PHASES * at for at in known], y=mean, low=low, high=high)
+    return Series.line(label, [360.0 / _PHASES * at for at in known], mean, low, high)
 
 
 def _order_table(model: ReducerModel, curves: Mapping[str, Equilibria]) -> pd.DataFrame:
@@ -510,13 +513,6 @@ def _contact_table(model: ReducerModel, units: Units) -> pd.DataFrame:
     shown = {label: f"{label.removeprefix('median unit ')} [unit of the amount]" for label in columns}
     frame = pd.DataFrame(columns).rename(columns=shown)
     return frame.rename_axis("amount").reset_index()
-
-
-_CARRIED = (
-    "fewest pins in contact on a disc at rated torque [-]",
-    "largest pin force at rated torque [N]",
-    "peak pressure at rated torque [MPa]",
-)
 
 
 def _carried(reducer: Reducer) -> dict[str, float]:

@@ -28,7 +28,7 @@ from tolalloc.reports.tellers.allocation_drawing import (
     write_drawing,
     zones_figure,
 )
-from tolalloc.reports.tellers.ranking_tables import sobol_table
+from tolalloc.reports.tellers.ranking_tables import sobol_table, work_table
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import short
 
@@ -120,7 +120,7 @@ class AllocationTeller(Teller[AllocationResult]):
                 tables=(
                     ("tried designs", tables.tried_table(result).frame(unit)),
                     ("tolerances", tolerances_frame(result, unit)),
-                    ("work", tables.work_frame(self.header)),
+                    ("work", work_table(self.header).drop(columns="units per second [1/s]")),
                 ),
                 folded=True,
             ),

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any
+from collections.abc import Iterator, Sequence
+from itertools import pairwise, product
+from math import nan
+from typing import TYPE_CHECKING, Any
 
 from tolalloc.allocation.result import AllocationResult, AssemblyChoice
 from tolalloc.drawings.compensators import Compensator, Indexing, Shim
@@ -16,28 +16,22 @@ from tolalloc.reports.columns import Column, Table
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.portrait import portrait_of
+from tolalloc.reports.tellers.check import interval_gaps
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import number
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _say = Sentences("allocation")
 
 
-_NONE = float("nan")
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Bin:
-    """One class or sector of a sorted source, or one size; what it does not have is not a number."""
-
-    source: str
-    what: str
-    number: int
-    low: float = _NONE  # Where it begins, as a deviation from the nominal size; nothing where it is open [µm]
-    high: float = _NONE
-    begin: float = _NONE  # Of a sector, where it begins, counted from the x axis [°]
-    end: float = _NONE
-    middle: float = _NONE  # Of a size, how far it is from the nominal one [µm]
-    turned: float = _NONE  # Of an angular position, how far the part is turned [°]
+_BINS = (
+    *("source", "what", "number [-]", "from [µm]", "to [µm]", "from [°]", "to [°]"),
+    *("off nominal [µm]", "turned by [°]"),
+)
+"""Columns of classes, sectors, sizes and positions: where one begins and ends, as a deviation from the nominal size or
+counted from the x axis; how far a size is from the nominal one; how far a part is turned."""
 
 
 def assembly_cost_sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
@@ -68,9 +62,7 @@ def assembly_sentences(result: AllocationResult) -> tuple[str, ...]:
         _say(
             "assembly_random",
             simulated=portrait_of(result.model).simulated,
-            share=before.estimate,
-            low=100 * before.low,
-            high=before.high,
+            **interval_gaps(before),
             after=after.estimate,
         )
     ]
@@ -91,9 +83,9 @@ def assembly_section(result: AllocationResult, cost_unit: str) -> tuple[Section,
     if result.assembled is None:
         return ()
     compared = choices_table(result)
-    tables = [(compared.name, compared.frame(cost_unit))]
-    if bins := bins_table(result):
-        tables.append((bins.name, bins.frame(cost_unit)))
+    tables, bins = [(compared.name, compared.frame(cost_unit))], bins_table(result)
+    if bins is not None:
+        tables.append(("classes and sizes", bins))
     return (
         Section(
             heading=_say("heading_assembly"),
@@ -115,44 +107,25 @@ def _methods(result: AllocationResult) -> tuple[str, ...]:
 def choices_table(result: AllocationResult) -> Table[AssemblyChoice]:
     """Return what every way to choose parts costs."""
     columns: list[Column[AssemblyChoice]] = [
-        Column(header="parts at assembly", value=lambda row: row.label),
-        Column(header="met", value=lambda row: "yes" if row.met else "no"),
-        Column(header="cost of zones [{cost}]", value=lambda row: row.zones_cost),
-        Column(header="cost of assembly [{cost}]", value=lambda row: row.assembly_cost),
-        Column(header="cost in all [{cost}]", value=lambda row: row.cost),
-        Column(
-            header="lower bound of zones [{cost}]",
-            value=lambda row: float("nan") if row.bound is None else row.bound,
-        ),
-        Column(header="all limits at once [%]", value=lambda row: 100 * row.joint.estimate),
-        Column(header="left over [%]", value=lambda row: 100 * row.left_over),
+        Column("parts at assembly", lambda row: row.label),
+        Column("met", lambda row: "yes" if row.met else "no"),
+        Column("cost of zones [{cost}]", lambda row: row.zones_cost),
+        Column("cost of assembly [{cost}]", lambda row: row.assembly_cost),
+        Column("cost in all [{cost}]", lambda row: row.cost),
+        Column("lower bound of zones [{cost}]", lambda row: float("nan") if row.bound is None else row.bound),
+        Column("all limits at once [%]", lambda row: 100 * row.joint.estimate),
+        Column("left over [%]", lambda row: 100 * row.left_over),
     ]
     choices = result.assembled.choices if result.assembled else ()
     return Table(name="parts at assembly", columns=columns, rows=list(choices))
 
 
-def bins_table(result: AllocationResult) -> Table[_Bin] | None:
+def bins_table(result: AllocationResult) -> pd.DataFrame | None:
     """Return where classes begin and end, and the sizes; nothing where parts are taken as they come."""
-    rows = [own for acting in _acting(result) for own in _bins(result, acting)]
-    if not rows:
-        return None
-    columns: list[Column[_Bin]] = [
-        Column(header="source", value=lambda row: row.source),
-        Column(header="what", value=lambda row: row.what),
-        Column(header="number [-]", value=lambda row: row.number),
-    ]
-    kinds = {row.what for row in rows}
-    if "class" in kinds:
-        columns.append(Column(header="from [µm]", value=lambda row: row.low, nothing="open"))
-        columns.append(Column(header="to [µm]", value=lambda row: row.high, nothing="open"))
-    if "sector" in kinds:
-        columns.append(Column(header="from [°]", value=lambda row: row.begin, nothing=""))
-        columns.append(Column(header="to [°]", value=lambda row: row.end, nothing=""))
-    if "size" in kinds:
-        columns.append(Column(header="off nominal [µm]", value=lambda row: row.middle, nothing=""))
-    if "position" in kinds:
-        columns.append(Column(header="turned by [°]", value=lambda row: row.turned, nothing=""))
-    return Table(name="classes and sizes", columns=columns, rows=rows)
+    import pandas as pd
+
+    frame = pd.DataFrame([own for acting in _acting(result) for own in _bins(result, acting)])
+    return None if frame.empty else frame[[name for name in _BINS if name in frame]]
 
 
 def choices_figure(result: AllocationResult, cost_unit: str) -> tuple[Figure, ...]:
@@ -167,8 +140,8 @@ def choices_figure(result: AllocationResult, cost_unit: str) -> tuple[Figure, ..
             title=_say("figure_assembly"),
             x_label=f"cost [{cost_unit}]",
             series=(
-                Series(label="zones and assembly", kind="bars", x=names, y=[own.cost for own in choices]),
-                Series(label="zones alone", kind="bars", x=names, y=[own.zones_cost for own in choices]),
+                Series.bars("zones and assembly", names, [own.cost for own in choices]),
+                Series.bars("zones alone", names, [own.zones_cost for own in choices]),
             ),
         ),
     )
@@ -197,30 +170,26 @@ def _source(result: AllocationResult, name: str) -> Source:
     return next(own for own in result.drawn_sources if own.name == name)
 
 
-def _bins(result: AllocationResult, acting: Compensator) -> list[_Bin]:
-    """Return the classes and sectors of both sources of a sorting, or the sizes of a shim."""
+def _bins(result: AllocationResult, acting: Compensator) -> Iterator[dict[str, object]]:
+    """Yield the classes and sectors of both sources of a sorting, or the sizes of a shim; no end where one is open."""
     if isinstance(acting, Shim):
-        return [
-            _Bin(source=part, what="size", number=at + 1, middle=acting.step * steps)
-            for part in acting.chosen
-            for at, steps in enumerate(range(-acting.reach, acting.reach + 1))
-        ]
+        for part, at in product(acting.chosen, range(2 * acting.reach + 1)):
+            yield _bin(part, "size", at + 1) | {"off nominal [µm]": acting.step * (at - acting.reach)}
     if isinstance(acting, Indexing):
-        return [
-            _Bin(source=part, what="position", number=at + 1, turned=360.0 * at / acting.count)
-            for part in acting.chosen
-            for at in range(acting.count)
-        ]
-    found = list[_Bin]()
+        for part, at in product(acting.chosen, range(acting.count)):
+            yield _bin(part, "position", at + 1) | {"turned by [°]": 360.0 * at / acting.count}
     if not isinstance(acting, Sorting):
-        return found
+        return
     for name in acting.named:
-        limits = acting.limits(_source(result, name)) / MICROMETRE
-        lengths = pairwise([_NONE, *limits.tolist(), _NONE] if limits.size else [])
-        found += [_Bin(source=name, what="class", number=at, low=a, high=b) for at, (a, b) in enumerate(lengths, 1)]
-        angles = pairwise(acting.sectors(name).tolist())
-        found += [_Bin(source=name, what="sector", number=at, begin=a, end=b) for at, (a, b) in enumerate(angles, 1)]
-    return found
+        limits = (acting.limits(_source(result, name)) / MICROMETRE).tolist()
+        for at, (low, high) in enumerate(pairwise([nan, *limits, nan] if limits else []), 1):
+            yield _bin(name, "class", at) | {"from [µm]": low, "to [µm]": high}
+        for at, (begin, end) in enumerate(pairwise(acting.sectors(name).tolist()), 1):
+            yield _bin(name, "sector", at) | {"from [°]": begin, "to [°]": end}
+
+
+def _bin(source: str, what: str, number: int) -> dict[str, object]:
+    return {"source": source, "what": what, "number [-]": number}
 
 
 def _note(result: AllocationResult, acting: Compensator) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -64,30 +64,30 @@ def sources_table(result: AllocationResult) -> Table[_Row]:
         return [known.get(own.name, otherwise) for own, _ in row[1]]
 
     columns: list[Column[_Row]] = [
-        Column(header="source", value=lambda row: row[0].name),
+        Column("source", lambda row: row[0].name),
         *own_words(lambda row: row[:1]),
-        Column(header="places [-]", value=lambda row: str(len(row[1])), nothing="1"),
-        Column(header="callout", value=lambda row: row[0].feature.value),
-        Column(header=f"zone before [{zone}]", value=lambda row: zone_in(row[1][0][0], zone)),
-        Column(header=f"zone [{zone}]", value=lambda row: zone_in(row[0], zone)),
-        Column(header="change [%]", value=lambda row: _change(row[1][0])),
-        Column(header="grade", value=lambda row: row[0].grade),
-        Column(header=made_before.header, value=lambda row: made_before.value(row[1][0])),
-        Column(header=made.header, value=lambda row: made.value(row[1][0])),
-        Column(header="share of variance [%]", value=lambda row: sum(each(shares, row))),
+        Column("places [-]", lambda row: str(len(row[1])), nothing="1"),
+        Column("callout", lambda row: row[0].feature.value),
+        Column(f"zone before [{zone}]", lambda row: zone_in(row[1][0][0], zone)),
+        Column(f"zone [{zone}]", lambda row: zone_in(row[0], zone)),
+        Column("change [%]", lambda row: _change(row[1][0])),
+        Column("grade", lambda row: row[0].grade),
+        Column("process before", lambda row: made_before[row[1][0][0].name]),
+        Column("process", lambda row: made[row[1][0][0].name]),
+        Column("share of variance [%]", lambda row: sum(each(shares, row))),
     ]
     if by_deviation:
         header = f"Sens [{unit}/{length}]"
-        columns.append(Column(header=header, value=lambda row: _span(each(by_deviation, row))))
+        columns.append(Column(header, lambda row: _span(each(by_deviation, row))))
     if by_zone:
         header = f"kept value per zone [{unit}/{length}]"
-        columns.append(Column(header=header, value=lambda row: sum(each(by_zone, row))))
-    columns.append(Column(header="cost before [{cost}]", value=lambda row: sum(old.cost for old, _ in row[1])))
-    columns.append(Column(header="cost [{cost}]", value=lambda row: sum(new.cost for _, new in row[1])))
+        columns.append(Column(header, lambda row: sum(each(by_zone, row))))
+    columns.append(Column("cost before [{cost}]", lambda row: sum(old.cost for old, _ in row[1])))
+    columns.append(Column("cost [{cost}]", lambda row: sum(new.cost for _, new in row[1])))
     if any(changes.values()):
         header = "of it for a new process [{cost}]"
-        columns.append(Column(header=header, value=lambda row: sum(each(changes, row, 0.0))))
-    columns.append(Column(header="locked", value=lambda row: "yes" if row[0].locked else "no"))
+        columns.append(Column(header, lambda row: sum(each(changes, row, 0.0))))
+    columns.append(Column("locked", lambda row: "yes" if row[0].locked else "no"))
     before, drawn = {own.name: own for own in result.space.errors.sources}, by_row(result.drawn_sources)
     rows = [(row, [(before[own.name], own) for own in members]) for row, members in drawn if row.zone != 0.0]
     return Table(name="drawing", columns=columns, rows=rows)
@@ -103,28 +103,20 @@ def dimensions_table(result: AllocationResult) -> Table[_Dimension]:
     parts, zone = _parts(result), zone_unit(result.space.errors.sources)
     (before, after), portrait = _processes(result), portrait_of(result.model)
     columns: list[Column[_Dimension]] = [
-        Column(header="dimension", value=lambda row: row[0], terminal=1),
+        Column("dimension", lambda row: row[0], terminal=1),
         *own_words(_after),
-        Column(header="places [-]", value=lambda row: len(row[1])),
-        Column(
-            header=f"write [{writing_unit(result.drawn_sources)}]",
-            value=lambda row: portrait.frames(_after(row)),
-            terminal=2,
-        ),
-        Column(header=f"zone before [{zone}]", value=lambda row: _zones((old for old, _ in row[1]), zone)),
-        Column(header=f"zone [{zone}]", value=lambda row: _zones((new for _, new in row[1]), zone)),
-        Column(header="change [%]", value=lambda row: _change(row[1][0])),
-        Column(header="grade", value=lambda row: row[1][0][1].grade, nothing="", terminal=5),
-        Column(header="process before", value=lambda row: before.value(row[1][0]), nothing="as today"),
-        Column(header="process", value=lambda row: after.value(row[1][0]), nothing="as today", terminal=6),
-        Column(
-            header="index as drawn [%]",
-            value=lambda row: parts.get(row[1][0][0].dimension, np.nan),
-            terminal=3,
-        ),
-        Column(header="cost before [{cost}]", value=lambda row: np.sum([old.cost for old, _ in row[1]])),
-        Column(header="cost [{cost}]", value=lambda row: np.sum([new.cost for _, new in row[1]]), terminal=4),
-        Column(header="locked", value=lambda row: "yes" if row[1][0][0].locked else "no", nothing="no"),
+        Column("places [-]", lambda row: len(row[1])),
+        Column(f"write [{writing_unit(result.drawn_sources)}]", lambda row: portrait.frames(_after(row)), terminal=2),
+        Column(f"zone before [{zone}]", lambda row: _zones((old for old, _ in row[1]), zone)),
+        Column(f"zone [{zone}]", lambda row: _zones((new for _, new in row[1]), zone)),
+        Column("change [%]", lambda row: _change(row[1][0])),
+        Column("grade", lambda row: row[1][0][1].grade, nothing="", terminal=5),
+        Column("process before", lambda row: before[row[1][0][0].name], nothing="as today"),
+        Column("process", lambda row: after[row[1][0][0].name], nothing="as today", terminal=6),
+        Column("index as drawn [%]", lambda row: parts.get(row[1][0][0].dimension, np.nan), terminal=3),
+        Column("cost before [{cost}]", lambda row: np.sum([old.cost for old, _ in row[1]])),
+        Column("cost [{cost}]", lambda row: np.sum([new.cost for _, new in row[1]]), terminal=4),
+        Column("locked", lambda row: "yes" if row[1][0][0].locked else "no", nothing="no"),
     ]
     known = {own.name: own for own in result.space.errors.sources}
     rows = [(result.line_name(own), [(known[member.name], member) for member in own[1]]) for own in result.lines]
@@ -141,19 +133,11 @@ def _change(row: _Source) -> float:
     return round((row[1].zone / row[0].zone - 1) * 100, 2) + 0.0
 
 
-def _processes(result: AllocationResult) -> tuple[Column[_Source], Column[_Source]]:
-    """Return the columns of the process of a source, before and now."""
-    made, today = (
-        space.made_by(design.design)
-        for space, design in ((result.drawn, result.chosen), (result.space, result.free.baseline))
-    )
-    return (
-        Column(
-            header="process before",
-            value=lambda row: today[row[0].name].name if row[0].name in made else row[0].process,
-        ),
-        Column(header="process", value=lambda row: made[row[0].name].name if row[0].name in made else row[0].process),
-    )
+def _processes(result: AllocationResult) -> Iterator[dict[str, str]]:
+    """Yield source → the process that makes it, before and now."""
+    stated = {own.name: own.process for own in result.space.errors.sources}
+    for space, design in ((result.space, result.free.baseline), (result.drawn, result.chosen)):
+        yield stated | {name: made.name for name, made in space.made_by(design.design).items()}
 
 
 def _zones(members: Iterable[Source], unit: str) -> float | str:
@@ -234,8 +218,8 @@ def effects_figure(result: AllocationResult) -> tuple[Figure, ...]:
         title=_say("figure_effects"),
         x_label=f"change of {share}{short(result.leading)} [{unit_of(result.leading)}]",
         series=(
-            Series(label=f"by {_STEP * 100:.0f} %", kind="bars", x=names, y=list(largest.values())),
-            Series(label="by 1 µm", kind="bars", x=names, y=[each[name] for name in names]),
+            Series.bars(f"by {_STEP * 100:.0f} %", names, largest.values()),
+            Series.bars("by 1 µm", names, [each[name] for name in names]),
         ),
         vertical=((0.0, ""),),
     )
@@ -270,8 +254,8 @@ def zones_figure(rows: Sequence[_Row]) -> Figure:
         title=_say("figure_zones"),
         x_label=f"zone [{unit}]",
         series=(
-            Series(label="before", kind="bars", x=names, y=before),
-            Series(label="after", kind="bars", x=names, y=after),
+            Series.bars("before", names, before),
+            Series.bars("after", names, after),
         ),
     )
 

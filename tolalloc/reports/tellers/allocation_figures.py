@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-from jaxtyping import Float
 
 from tolalloc.allocation.front.pareto_front import Fronts
 from tolalloc.allocation.front.what_if import SettingTrade
@@ -55,21 +54,13 @@ def front_figure(result: AllocationResult, fronts: Fronts, cost_unit: str) -> Fi
         x_label=f"{short(leading)} kept{by} [{unit_of(leading)}]",
         y_label=f"cost [{cost_unit}]",
         series=(
-            Series(
-                label=f"cheapest by the local models (±{error})", kind="line", x=list(exact.limits), y=list(exact.cost)
-            ),
-            Series(label="NSGA-II, by its surrogate", kind="line", x=list(searched.quantile), y=list(searched.cost)),
-            Series(
-                label="NSGA-II, solved with the full model",
-                kind="points",
-                x=list(searched.on_kernel[checked]),
-                y=list(searched.cost[checked]),
-            ),
-            Series(
-                label=_say("figure_front_designs", names=", ".join(compared)),
-                kind="points",
-                x=[design.quantile_bound for design in compared.values()],
-                y=[design.cost for design in compared.values()],
+            Series.line(f"cheapest by the local models (±{error})", exact.limits, exact.cost),
+            Series.line("NSGA-II, by its surrogate", searched.quantile, searched.cost),
+            Series.points("NSGA-II, solved with the full model", searched.on_kernel[checked], searched.cost[checked]),
+            Series.points(
+                _say("figure_front_designs", names=", ".join(compared)),
+                [design.quantile_bound for design in compared.values()],
+                [design.cost for design in compared.values()],
             ),
         ),
         vertical=((limit, ""),),  # a label would stand among the legend's
@@ -107,8 +98,10 @@ def _trade_figure(result: AllocationResult, trade: SettingTrade, cost_unit: str)
             f"{quantity(name)} {values[place]:.3g} {unit_of(name)}"
             for name, values, place in zip(trade.names, trade.values, at, strict=False)
         ]
-        if np.isfinite(trade.cost[at]).any():
-            lines.append(_where_known(", ".join(chosen) or "cheapest zones", along, trade.cost[at]))
+        known = np.isfinite(trade.cost[at])
+        if known.any():
+            drawn = Series.line if known.sum() > 1 else Series.points
+            lines.append(drawn(", ".join(chosen) or "cheapest zones", along[known], trade.cost[at][known]))
     now = result.space.settings[-1].value
     return Figure(
         name="modification_trade",
@@ -120,21 +113,14 @@ def _trade_figure(result: AllocationResult, trade: SettingTrade, cost_unit: str)
     )
 
 
-def _where_known(label: str, x: Float[np.ndarray, " step"], y: Float[np.ndarray, " step"]) -> Series:
-    """Return a line through what is known, a point where that is one value."""
-    known = np.isfinite(y)
-    return Series(label=label, kind="line" if known.sum() > 1 else "points", x=list(x[known]), y=list(y[known]))
-
-
 def robustness_figure(frame: pd.DataFrame) -> Figure:
     """Return how far every free zone moves when an assumption is wrong, from the table that says so."""
     _, best, low, high, *_ = frame.columns
-    bars = Series(
-        label="free zone; between its smallest and largest under all changed assumptions",
-        kind="bars",
-        x=list(frame["group"]),
-        y=list(frame[best]),
-        low=list(np.minimum(frame[low], frame[best])),
-        high=list(np.maximum(frame[high], frame[best])),
+    bars = Series.bars(
+        "free zone; between its smallest and largest under all changed assumptions",
+        frame["group"],
+        frame[best],
+        np.minimum(frame[low], frame[best]),
+        np.maximum(frame[high], frame[best]),
     )
     return Figure(name="robustness", title=_say("figure_robustness"), x_label=f"zone [{unit_of(best)}]", series=(bars,))

@@ -23,7 +23,7 @@ from tolalloc.reports.feature_frame import callout_assumptions
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import Examination, portrait_of
 from tolalloc.reports.tellers.allocation_assembly import assembly_cost_sentences
-from tolalloc.reports.tellers.check import MORE_PARTS, few_parts
+from tolalloc.reports.tellers.check import MORE_PARTS, few_parts, interval_gaps
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import QUICK_RUN, enumerated, number, quantity, short, with_unit
 from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
@@ -41,6 +41,9 @@ _SAME_COST = 5e-4
 """Relative difference of costs below which they are printed alike [-]."""
 
 _say = Sentences("allocation")
+
+_LEAST_PRICE = 0.005
+"""Factor of a cost that is said as 0 [-]."""
 
 
 def free_label(result: AllocationResult) -> str:
@@ -118,12 +121,9 @@ def _verdict(result: AllocationResult) -> str:
     return _say(
         key,
         verdict=_verdict_word(result, check.requirement.guarantee, achieved),
-        share=achieved.estimate,
-        units=achieved.units,
         simulated=portrait_of(result.model).simulated,
         required=_required(result, check.requirement.guarantee, achieved),
-        low=100 * achieved.low,
-        high=achieved.high,
+        **interval_gaps(achieved),
         **said,
     )
 
@@ -172,10 +172,7 @@ def today_values(result: AllocationResult) -> tuple[str, ...]:
     said = _say(
         "today_values",
         simulated=portrait_of(result.model).simulated,
-        share=kept.estimate,
-        low=100 * kept.low,
-        high=kept.high,
-        units=kept.units,
+        **interval_gaps(kept),
         limits=_say("today_all" if several else "today_one"),
         own=_say("own_limit", names=" and ".join(names)) if names else "",
     )
@@ -186,7 +183,7 @@ def _few_parts(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     """Return what few measured parts do to the interval and to the zones, and what 100 parts would bring."""
     chosen, check = result.chosen, result.chosen.checks[0]
     interval = few_parts(chosen.joint if chosen.jointly else chosen.achieved)
-    asked, doubt = check.requirement, chosen.doubts.get(check.requirement.output)
+    asked, doubt = check.requirement, chosen.uncertainties.get(check.requirement.output)
     if doubt is None or not isinstance(asked.guarantee, AtYield):
         return interval
     ways = {"margin": doubt, "less": doubt.with_parts(MORE_PARTS)}
@@ -438,10 +435,6 @@ def _good_unit(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     key = "good_only" if found.priced.size == 1 else ends.get(found.best, "good_inside")
     said, price = _say(key, target=found.best * 100), np.nanmin(found.prices)
     return (_say("good", yield_=said, price=price, cost_unit=cost_unit, output=short(result.leading)),)
-
-
-_LEAST_PRICE = 0.005
-"""Factor of a cost that is said as 0 [-]."""
 
 
 def _settled(result: AllocationResult) -> tuple[str, ...]:

@@ -20,7 +20,6 @@ from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.drawings.sources import length_unit
 from tolalloc.reading.units import unit_of
 from tolalloc.reports.columns import Column, Table
-from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.tellers.allocation_sentences import designs, searches
 from tolalloc.reports.wording import quantity, short
@@ -29,6 +28,9 @@ _Limited = tuple[int, OneSidedConstraint, Check]
 """The place of a limited side among all of them, the side, and the requirement that limits it."""
 _Named = tuple[str, VerifiedDesign]
 """What a design is called, and the design."""
+
+_BINDS = 1e-3
+"""Worth of a limit over the cost, from which it is said to bind [-]."""
 
 
 def requirements_table(result: AllocationResult) -> Table[_Limited]:
@@ -40,27 +42,21 @@ def requirements_table(result: AllocationResult) -> Table[_Limited]:
 
     def kept(label: str, design: VerifiedDesign) -> Column[_Limited]:
         header = f"kept: {label} [{unit}]"
-        return Column(header=header, value=lambda row: design.limited_sides[row[0]][1].value)
+        return Column(header, lambda row: design.limited_sides[row[0]][1].value)
 
     unit = " or ".join(dict.fromkeys(unit_of(own.output) for own in result.requirements))
     columns: list[Column[_Limited]] = [
-        Column(header="requirement", value=lambda row: row[2].requirement.output),
-        Column(header="limit", value=_limit),
-        Column(header="shown for", value=lambda row: row[2].requirement.guarantee.words),
-        Column(
-            header=f"quantile of the units [{unit}]",
-            value=lambda row: unit_quantile(result.chosen, row[2], row[1]),
-        ),
-        Column(
-            header="units within [%]",
-            value=lambda row: 100 * result.chosen.yield_of(row[2].requirement, row[1].sign).estimate,
-        ),
+        Column("requirement", lambda row: row[2].requirement.output),
+        Column("limit", _limit),
+        Column("shown for", lambda row: row[2].requirement.guarantee.words),
+        Column(f"quantile of the units [{unit}]", lambda row: unit_quantile(result.chosen, row[2], row[1])),
+        Column("units within [%]", lambda row: 100 * result.chosen.yield_of(row[2].requirement, row[1].sign).estimate),
         *(kept(label, design) for label, design in designs(result).items()),
-        Column(header=f"slack [{unit}]", value=lambda row: -row[1].excess),
-        Column(header=f"standard error of it [{unit}]", value=lambda row: row[1].standard_error),
-        Column(header="marginal price of the limit [{cost}]", value=lambda row: price(row)[0]),
-        Column(header="for each", value=lambda row: price(row)[1]),
-        Column(header="OK", value=lambda row: "yes" if row[1].excess <= 0 else "no"),
+        Column(f"slack [{unit}]", lambda row: -row[1].excess),
+        Column(f"standard error of it [{unit}]", lambda row: row[1].standard_error),
+        Column("marginal price of the limit [{cost}]", lambda row: price(row)[0]),
+        Column("for each", lambda row: price(row)[1]),
+        Column("OK", lambda row: "yes" if row[1].excess <= 0 else "no"),
     ]
     rows = [(number, side, check) for number, (check, side) in enumerate(result.chosen.limited_sides)]
     return Table(name="requirements", columns=columns, rows=rows)
@@ -70,10 +66,6 @@ def _limit(row: _Limited) -> str:
     """Return a limit in words."""
     _, side, check = row
     return f"{'at most' if side.sign > 0 else 'at least'} {side.limit:g} {unit_of(check.requirement.output)}"
-
-
-_BINDS = 1e-3
-"""Worth of a limit over the cost, from which it is said to bind [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,14 +122,14 @@ def today_table(result: AllocationResult, cost_unit: str) -> Table[_Compared]:
         )
     rows += [_Compared(name=own.name, before=own.before, after=own.value) for own in result.amounts]
     columns: list[Column[_Compared]] = [
-        Column(header="drawing", value=lambda row: row.name, terminal=1),
-        Column(header="shown for", value=lambda row: row.shown, nothing=""),
-        Column(header="limit", value=lambda row: row.limit, nothing="", terminal=2),
-        Column(header="as it is", value=lambda row: row.before, terminal=3),
-        Column(header="as drawn", value=lambda row: row.after, terminal=4),
-        Column(header="yield [%]", value=lambda row: row.kept_before, terminal=5),
-        Column(header="yield as drawn [%]", value=lambda row: row.kept_after, terminal=6),
-        Column(header="binds", value=lambda row: row.binds, nothing=""),
+        Column("drawing", lambda row: row.name, terminal=1),
+        Column("shown for", lambda row: row.shown, nothing=""),
+        Column("limit", lambda row: row.limit, nothing="", terminal=2),
+        Column("as it is", lambda row: row.before, terminal=3),
+        Column("as drawn", lambda row: row.after, terminal=4),
+        Column("yield [%]", lambda row: row.kept_before, terminal=5),
+        Column("yield as drawn [%]", lambda row: row.kept_after, terminal=6),
+        Column("binds", lambda row: row.binds, nothing=""),
     ]
     return Table(name="today and as drawn", columns=columns, rows=rows)
 
@@ -151,23 +143,23 @@ def designs_table(result: AllocationResult) -> Table[_Named]:
         return loss.smaller_is_better(float(values.mean()), float(values.std(ddof=1))) if loss else float("nan")
 
     def setting(at: int, name: str) -> Column[_Named]:
-        return Column(header=name, value=lambda row: row[1].settings.tolist()[at])
+        return Column(name, lambda row: row[1].settings.tolist()[at])
 
     def amount(at: int, name: str) -> Column[_Named]:
-        return Column(header=name, value=lambda row: (drawn.by_setting @ row[1].settings).tolist()[at])
+        return Column(name, lambda row: (drawn.by_setting @ row[1].settings).tolist()[at])
 
     columns: list[Column[_Named]] = [
-        Column(header="design", value=lambda row: row[0]),
-        Column(header="cost [{cost}]", value=lambda row: row[1].cost),
-        Column(header=f"yield, {short(result.leading)} [%]", value=lambda row: row[1].achieved.estimate * 100),
-        Column(header="low 95 % [%]", value=lambda row: row[1].achieved.low * 100),
-        Column(header="high 95 % [%]", value=lambda row: row[1].achieved.high * 100),
-        Column(header="yield, all limits [%]", value=lambda row: row[1].joint.estimate * 100),
+        Column("design", lambda row: row[0]),
+        Column("cost [{cost}]", lambda row: row[1].cost),
+        Column(f"yield, {short(result.leading)} [%]", lambda row: row[1].achieved.estimate * 100),
+        Column("low 95 % [%]", lambda row: row[1].achieved.low * 100),
+        Column("high 95 % [%]", lambda row: row[1].achieved.high * 100),
+        Column("yield, all limits [%]", lambda row: row[1].joint.estimate * 100),
         *(setting(at, name) for at, name in enumerate(result.space.shared.names)),
         *(amount(at, name) for at, name in enumerate(drawn.names)),
-        *((Column(header="mean quality loss [{cost}]", value=lost),) if loss else ()),
-        Column(header="units [-]", value=lambda row: row[1].achieved.units),
-        Column(header="OK", value=lambda row: "yes" if row[1].met else "no"),
+        *((Column("mean quality loss [{cost}]", lost),) if loss else ()),
+        Column("units [-]", lambda row: row[1].achieved.units),
+        Column("OK", lambda row: "yes" if row[1].met else "no"),
     ]
     return Table(name="designs", columns=columns, rows=list(designs(result).items()))
 
@@ -179,27 +171,17 @@ def tried_table(result: AllocationResult) -> Table[_Named]:
         tried[GRADES] = result.graded.tried
     kept = f"{short(result.leading)} kept [{unit_of(result.leading)}]"
     columns: list[Column[_Named]] = [
-        Column(header="search", value=lambda row: row[0]),
-        Column(header="design", value=lambda row: row[1].name),
-        Column(header="cost [{cost}]", value=lambda row: row[1].cost),
-        Column(header=kept, value=lambda row: row[1].quantile_bound),
-        Column(header="yield [%]", value=lambda row: row[1].achieved.estimate * 100),
-        Column(header="nearest limit", value=lambda row: row[1].blocking.requirement.output),
-        Column(
-            header="judged on", value=lambda row: "independent sample" if row[1].independent else "units of its search"
-        ),
-        Column(header="met", value=lambda row: "yes" if row[1].met else "no"),
+        Column("search", lambda row: row[0]),
+        Column("design", lambda row: row[1].name),
+        Column("cost [{cost}]", lambda row: row[1].cost),
+        Column(kept, lambda row: row[1].quantile_bound),
+        Column("yield [%]", lambda row: row[1].achieved.estimate * 100),
+        Column("nearest limit", lambda row: row[1].blocking.requirement.output),
+        Column("judged on", lambda row: "independent sample" if row[1].independent else "units of its search"),
+        Column("met", lambda row: "yes" if row[1].met else "no"),
     ]
     rows = [(search, design) for search, designs in tried.items() for design in designs]
     return Table(name="tried designs", columns=columns, rows=rows)
-
-
-def work_frame(header: Header) -> pd.DataFrame:
-    """Return what each stage took."""
-    stages = header.stages.items()
-    return pd.DataFrame(
-        [{"stage": name, "units [-]": own["units"], "seconds [s]": own["seconds"]} for name, own in stages]
-    )
 
 
 def certificate_frame(result: AllocationResult, cost_unit: str) -> pd.DataFrame:

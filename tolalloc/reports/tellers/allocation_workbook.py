@@ -13,7 +13,14 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from tolalloc.allocation.cost.model import Combined, Exponential, Reciprocal, ReciprocalPower, SumOfCosts, Weighted
+from tolalloc.allocation.cost.model import (
+    Exponential,
+    PowerExponential,
+    Reciprocal,
+    ReciprocalPower,
+    SumOfCosts,
+    Weighted,
+)
 from tolalloc.allocation.cost.points import Spline, Tabulated
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.drawings.sources import LENGTHS, STEPS, Source, length_unit, rounded_down
@@ -168,22 +175,28 @@ def _others(result: AllocationResult) -> list[tuple[str, tuple[Source, ...]]]:
     return [line for line in result.lines if result.line_name(line) not in changed]
 
 
+def _line_row(
+    result: AllocationResult, line: tuple[str, tuple[Source, ...]], zone: Formula | float, stated: Formula | float
+) -> dict[str, object]:
+    """Return the row of a line below the groups: its zone, and what the drawing states of it."""
+    own, (unit, _) = line[1][0], length_unit(result.space.errors.sources)
+    return {
+        "group": result.line_name(line),
+        f"zone to change [{unit}]": zone,
+        "characteristic": _characteristic(result, own),
+        _write_head(result): stated,
+        "datum": " ".join(_frame(result, own).datums),
+    }
+
+
 def _other_lines(result: AllocationResult) -> list[pd.DataFrame]:
     """Return one row for every line whose zones are locked, for the drawing to be whole; nothing without any."""
-    rows, head, (unit, length) = [], _write_head(result), length_unit(result.space.errors.sources)
+    rows, (_, length) = [], length_unit(result.space.errors.sources)
     for line in _others(result):
         own = line[1][0]
         half = own.zone / 2 if _frame(result, own).is_deviation else own.zone
-        rows.append(
-            {
-                "group": result.line_name(line),
-                f"zone to change [{unit}]": own.zone / length,
-                "inside": _say("workbook_locked"),
-                "characteristic": _characteristic(result, own),
-                head: rounded_down(half, FINEST[own.length_name][0]) / LENGTHS[own.length_name],
-                "datum": " ".join(_frame(result, own).datums),
-            }
-        )
+        stated = rounded_down(half, FINEST[own.length_name][0]) / LENGTHS[own.length_name]
+        rows.append({**_line_row(result, line, own.zone / length, stated), "inside": _say("workbook_locked")})
     return [pd.DataFrame(rows)] if rows else []
 
 
@@ -193,20 +206,12 @@ def _further_lines(result: AllocationResult) -> list[pd.DataFrame]:
     Nothing without any.
     """
     first = {name: _FIRST + at for at, name in enumerate(result.drawn.groups)}
-    rows, head, (unit, length) = [], _write_head(result), length_unit(result.space.errors.sources)
-    for row, line in enumerate(_further(result), start=_FIRST + len(first)):
-        name, members = line
-        own, zone = _frame(result, members[0]), members[0].zone / length
-        ratio = number(members[0].zone / _first_member(result, name).zone)
-        rows.append(
-            {
-                "group": result.line_name(line),
-                f"zone to change [{unit}]": Formula(f"=B{first[name]}*{ratio}", zone),
-                "characteristic": _characteristic(result, members[0]),
-                head: _written(result, members[0], row, zone, length),
-                "datum": " ".join(own.datums),
-            }
-        )
+    rows, (_, length) = [], length_unit(result.space.errors.sources)
+    for row, (name, members) in enumerate(_further(result), start=_FIRST + len(first)):
+        own, zone = members[0], members[0].zone / length
+        ratio = number(own.zone / _first_member(result, name).zone)
+        followed, stated = Formula(f"=B{first[name]}*{ratio}", zone), _written(result, own, row, zone, length)
+        rows.append(_line_row(result, (name, members), followed, stated))
     return [pd.DataFrame(rows)] if rows else []
 
 
@@ -389,7 +394,7 @@ def _(model: Exponential, zone: str) -> str:
 
 
 @cost_formula.register
-def _(model: Combined, zone: str) -> str:
+def _(model: PowerExponential, zone: str) -> str:
     falling = f"EXP(-{zone}/{number(model.scale)})/{zone}^{number(model.exponent)}"
     return f"({number(model.fixed)}+{number(model.factor)}*{falling})"
 

@@ -24,6 +24,9 @@ from tolalloc.reports.wording import short, with_unit
 
 _say = Sentences("check")
 
+MORE_PARTS = 100
+"""Measured parts of every source whose worth is said where there are fewer [-]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class CheckedTime:
@@ -181,16 +184,14 @@ def today_sentence(kept: KeptLimits) -> str:
     """Return how many random units of the drawing as it is keep its limits."""
     joint = kept.joint
     each = ", ".join(_say("each", output=short(name), share=own.estimate) for name, own in kept.each.items())
-    said = {"units": joint.units, "share": joint.estimate, "low": 100 * joint.low, "high": joint.high}
-    if len(kept.each) == 1:
-        today = _say("today_one", output=short(next(iter(kept.each))), **said)
-    else:
-        today = _say("today", each=each, **said)
+    one = {"output": short(next(iter(kept.each)))} if len(kept.each) == 1 else {}
+    today = _say("today_one" if one else "today", each=each, **one, **interval_gaps(joint))
     return " ".join((today, *few_parts(joint)))
 
 
-MORE_PARTS = 100
-"""Measured parts of every source whose worth is said where there are fewer [-]."""
+def interval_gaps(found: Yield) -> dict[str, float]:
+    """Return a share of units and the ends of its interval as sentences print them, ``{low:.2f}–{high:.2%}``."""
+    return {"share": found.estimate, "low": 100 * found.low, "high": found.high, "units": found.units}
 
 
 def few_parts(found: Yield) -> tuple[str, ...]:
@@ -200,12 +201,12 @@ def few_parts(found: Yield) -> tuple[str, ...]:
     """
     if found.widening is None:
         return ()
-    parts = found.widening.doubt.parts
-    gaps = {"parts": min(parts), "sources": len(parts), "low": 100 * found.low, "high": found.high}
+    parts = found.widening.uncertainty.parts
+    gaps = {"parts": min(parts), "sources": len(parts), **interval_gaps(found)}
     said = [_say("few_parts_one" if len(parts) == 1 else "few_parts", **gaps)]
     if min(parts) < MORE_PARTS:
         more = found.widening.with_parts(MORE_PARTS)
-        said.append(_say("more_parts", more=MORE_PARTS, low=100 * more.low, high=more.high))
+        said.append(_say("more_parts", more=MORE_PARTS, **interval_gaps(more)))
     return (" ".join(said),)
 
 

@@ -186,7 +186,7 @@ class ComparisonTeller(Teller[Comparison]):
         for label, run in zip(self._names, self.result.runs, strict=True):
             own = run.ranking.set_index("source")[[TOTAL, LOW, HIGH]].astype(float).reindex(names).fillna(0.0)
             total, low, high = (list(own[column]) for column in (TOTAL, LOW, HIGH))
-            series.append(Series(label=label, kind="bars", x=names, y=total, low=low, high=high))
+            series.append(Series.bars(label, names, total, low, high))
         return Figure(name="rankings", title=_say("figure"), x_label="total index ST [-]", series=tuple(series))
 
 

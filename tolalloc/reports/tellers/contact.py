@@ -304,9 +304,7 @@ def _profile_figure(profile: ToothProfile) -> Figure:
         title=_say("profile_figure", factor=factor),
         x_label="across the tooth [mm]",
         y_label="from the disc's centre [mm]",
-        series=tuple(
-            Series(label=label, kind="line", x=upright(points)[0], y=upright(points)[1]) for label, points in drawn
-        ),
+        series=tuple(Series.line(label, upright(points)[0], upright(points)[1]) for label, points in drawn),
         equal=True,
     )
 
@@ -316,7 +314,7 @@ def clearance_figure(found: Assessment) -> Figure:
     lever = normals(found.reducer.cycloid_stage.shortening, FLANK).lever
     angle = list(FLANK / DEGREE)
     low, high = found.single.zone.mean(axis=0) / DEGREE
-    formula = [Series(label="Li Lixing's formula", kind="line", x=angle, y=list(found.clearance.formula / MICROMETRE))]
+    formula = [Series.line("Li Lixing's formula", angle, found.clearance.formula / MICROMETRE)]
     if found.clearance.formula_error < 0.01 * MICROMETRE:  # the same line as the clearance
         formula = []
     return Figure(
@@ -325,15 +323,10 @@ def clearance_figure(found: Assessment) -> Figure:
         x_label=_FROM_CRANK,
         y_label="clearance, deflection [µm]",
         series=(
-            Series(label="clearance", kind="line", x=angle, y=list(found.clearance.after / MICROMETRE)),
+            Series.line("clearance", angle, found.clearance.after / MICROMETRE),
             *formula,
             *(
-                Series(
-                    label=f"deflection, {name}",
-                    kind="line",
-                    x=angle,
-                    y=list(lever * contact.deflection.mean() / MICROMETRE),
-                )
+                Series.line(f"deflection, {name}", angle, lever * contact.deflection.mean() / MICROMETRE)
                 for name, contact in zip(_METHODS, (found.linear, found.single), strict=True)
             ),
         ),
@@ -350,7 +343,7 @@ def _force_figure(found: Assessment) -> Figure:
         x_label=_FROM_CRANK,
         y_label="force [N]",
         series=tuple(
-            Series(label=name, kind="points", x=list(angle[order] / DEGREE), y=list(contact.force[0, 0, order]))
+            Series.points(name, angle[order] / DEGREE, contact.force[0, 0, order])
             for name, contact in zip(_METHODS, (found.linear, found.single), strict=True)
         ),
     )
@@ -365,7 +358,7 @@ def _phase_figure(found: Assessment) -> Figure:
         x_label="angle from the crank direction to the next pin [°]",
         y_label="pins in contact [-]",
         series=tuple(
-            Series(label=name, kind="points", x=phase, y=[int(count) for count in contact.pins_in_contact[:, 0]])
+            Series.points(name, phase, [int(count) for count in contact.pins_in_contact[:, 0]])
             for name, contact in zip(_METHODS, (found.linear, found.single), strict=True)
         ),
     )

@@ -25,19 +25,15 @@ _DRAWN = 80
 _say = Sentences("costs")
 
 _FITS: tuple[Column[tuple[ShopFit, CostFit]], ...] = (
-    Column(header="process", value=lambda row: row[0].process, terminal=True),
-    Column(header="form, t in µm [{cost}]", value=lambda row: formula(row[1].model), terminal=True),
-    Column(header="rms error [%]", value=lambda row: row[1].rms * 100, terminal=True),
-    Column(header="largest error [%]", value=lambda row: row[1].largest_error * 100),
-    Column(header="error at points left out [%]", value=lambda row: row[1].leave_one_out * 100, terminal=True),
-    Column(header="valid from [µm]", value=lambda row: row[1].smallest),
-    Column(header="valid to [µm]", value=lambda row: row[1].largest),
-    Column(header="points [-]", value=lambda row: len(row[0].points.zones)),
-    Column(
-        header="taken",
-        value=lambda row: "yes" if type(row[1].model) is type(row[0].best.model) else "no",
-        terminal=True,
-    ),
+    Column("process", lambda row: row[0].process, terminal=True),
+    Column("form, t in µm [{cost}]", lambda row: formula(row[1].model), terminal=True),
+    Column("rms error [%]", lambda row: row[1].rms * 100, terminal=True),
+    Column("largest error [%]", lambda row: row[1].largest_error * 100),
+    Column("error at points left out [%]", lambda row: row[1].leave_one_out * 100, terminal=True),
+    Column("valid from [µm]", lambda row: row[1].smallest),
+    Column("valid to [µm]", lambda row: row[1].largest),
+    Column("points [-]", lambda row: len(row[0].points.zones)),
+    Column("taken", lambda row: "yes" if type(row[1].model) is type(row[0].best.model) else "no", terminal=True),
 )
 
 
@@ -119,9 +115,9 @@ def _curves(own: ShopFit) -> Iterable[Series]:
     """Return the points of a process and its taken curve."""
     best = own.best
     zones = np.geomspace(best.smallest, best.largest, _DRAWN)
-    yield Series(label=own.process, kind="points", x=list(own.points.zones), y=list(own.points.costs))
+    yield Series.points(own.process, own.points.zones, own.points.costs)
     label = f"{own.process}: {formula(best.model)}"
-    yield Series(label=label, kind="line", x=list(zones), y=list(best.model.value(zones)))
+    yield Series.line(label, zones, best.model.value(zones))
 
 
 TELLER = CostsTeller

@@ -26,25 +26,25 @@ _Changed = tuple[str, str, tuple[float, float], Change]
 """What changes, its unit, before and after, and the change with its interval."""
 
 _CHANGES: tuple[Column[_Changed], ...] = (
-    Column(header="what", value=lambda row: row[0]),
-    Column(header="unit", value=lambda row: row[1]),
-    Column(header="before [unit]", value=lambda row: row[2][0]),
-    Column(header="after [unit]", value=lambda row: row[2][1]),
-    Column(header="change [unit]", value=lambda row: row[3].estimate),
-    Column(header="low 95 % [unit]", value=lambda row: row[3].low),
-    Column(header="high 95 % [unit]", value=lambda row: row[3].high),
+    Column("what", lambda row: row[0]),
+    Column("unit", lambda row: row[1]),
+    Column("before [unit]", lambda row: row[2][0]),
+    Column("after [unit]", lambda row: row[2][1]),
+    Column("change [unit]", lambda row: row[3].estimate),
+    Column("low 95 % [unit]", lambda row: row[3].low),
+    Column("high 95 % [unit]", lambda row: row[3].high),
 )
 
 
 def _zone_columns(unit: str) -> tuple[Column[_Row], ...]:
     """Return the columns of the sources whose zones change, in a unit."""
     return (
-        Column(header="source", value=lambda row: row[0].name),
+        Column("source", lambda row: row[0].name),
         *own_words(lambda row: row[:1]),
-        Column(header=f"zone before [{unit}]", value=lambda row: zone_in(row[1][0], unit)),
-        Column(header=f"zone after [{unit}]", value=lambda row: zone_in(row[2][0], unit)),
-        Column(header="cost before [{cost}]", value=lambda row: sum(own.cost for own in row[1])),
-        Column(header="cost after [{cost}]", value=lambda row: sum(own.cost for own in row[2])),
+        Column(f"zone before [{unit}]", lambda row: zone_in(row[1][0], unit)),
+        Column(f"zone after [{unit}]", lambda row: zone_in(row[2][0], unit)),
+        Column("cost before [{cost}]", lambda row: sum(own.cost for own in row[1])),
+        Column("cost after [{cost}]", lambda row: sum(own.cost for own in row[2])),
     )
 
 

@@ -25,26 +25,26 @@ def _called(kind: str) -> str:
 
 
 _BEARINGS: tuple[Column[BearingLife], ...] = (
-    Column(header="bearing", value=lambda own: _called(own.kind), terminal=True),
-    Column(header="number [-]", value=lambda own: own.count),
-    Column(header="load rating C [N]", value=lambda own: round(own.load_rating), terminal=True),
-    Column(header="equivalent load [N]", value=lambda own: round(own.load), terminal=True),
-    Column(header="turns per turn of the output [-]", value=lambda own: own.turns),
-    Column(header="life L10 [h]", value=lambda own: round(own.life), terminal=True),
+    Column("bearing", lambda own: _called(own.kind), terminal=True),
+    Column("number [-]", lambda own: own.count),
+    Column("load rating C [N]", lambda own: round(own.load_rating), terminal=True),
+    Column("equivalent load [N]", lambda own: round(own.load), terminal=True),
+    Column("turns per turn of the output [-]", lambda own: own.turns),
+    Column("life L10 [h]", lambda own: round(own.life), terminal=True),
 )
 _CASES: tuple[Column[CaseLoads], ...] = (
-    Column(header="load case", value=lambda own: own.case.name, terminal=True),
-    Column(header="torque [N·m]", value=lambda own: own.case.torque, terminal=True),
-    Column(header="speed [rpm]", value=lambda own: own.case.speed, terminal=True),
-    Column(header="share of the time [%]", value=lambda own: 100.0 * own.share),
-    Column(header="external moment [N·m]", value=lambda own: own.case.moment or "", nothing=""),
-    Column(header="discs above the ring [K]", value=lambda own: own.disc_temperature),
-    Column(header="largest pin force [N]", value=lambda own: own.pin_force),
-    Column(header="largest line load [N/mm]", value=lambda own: own.line_load),
-    Column(header="peak pressure [MPa]", value=lambda own: own.pressure, terminal=True),
-    Column(header="friction torque at the output [N·m]", value=lambda own: own.friction_torque),
-    Column(header="overall efficiency [%]", value=lambda own: 100.0 * own.efficiency, terminal=True),
-    Column(header="lost power [W]", value=lambda own: own.loss, terminal=True),
+    Column("load case", lambda own: own.case.name, terminal=True),
+    Column("torque [N·m]", lambda own: own.case.torque, terminal=True),
+    Column("speed [rpm]", lambda own: own.case.speed, terminal=True),
+    Column("share of the time [%]", lambda own: 100.0 * own.share),
+    Column("external moment [N·m]", lambda own: own.case.moment or "", nothing=""),
+    Column("discs above the ring [K]", lambda own: own.disc_temperature),
+    Column("largest pin force [N]", lambda own: own.pin_force),
+    Column("largest line load [N/mm]", lambda own: own.line_load),
+    Column("peak pressure [MPa]", lambda own: own.pressure, terminal=True),
+    Column("friction torque at the output [N·m]", lambda own: own.friction_torque),
+    Column("overall efficiency [%]", lambda own: 100.0 * own.efficiency, terminal=True),
+    Column("lost power [W]", lambda own: own.loss, terminal=True),
 )
 
 
@@ -173,7 +173,7 @@ class DutyTeller(Teller[DutyResult]):
             title=_say("damage_figure"),
             x_label="share of the life [%]",
             series=tuple(
-                Series(label=_called(own.kind), kind="bars", x=cases, y=[100.0 * share for share in own.shares])
+                Series.bars(_called(own.kind), cases, [100.0 * share for share in own.shares])
                 for own in self.result.bearings
             ),
         )
@@ -182,7 +182,7 @@ class DutyTeller(Teller[DutyResult]):
     def _heat(self) -> Figure:
         """Part of the mean lost power that comes from each load case."""
         cases = [own.case.name for own in self.result.loads]
-        heat = Series(label="lost power", kind="bars", x=cases, y=[own.share * own.loss for own in self.result.loads])
+        heat = Series.bars("lost power", cases, [own.share * own.loss for own in self.result.loads])
         return Figure(name="heat", title=_say("heat_figure"), x_label="part of the mean lost power [W]", series=(heat,))
 
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from tolalloc.reading.units import ARCMINUTE, MICROMETRE
 from tolalloc.reducers.modification import ModificationResult
-from tolalloc.reports.columns import Column, Table
 from tolalloc.reports.document import Section
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.tellers.contact import ContactTeller
@@ -26,11 +25,6 @@ _UNPRINTED = {
     "li2018": ("li2018_reading", "li2018_interval"),
 }
 """Method → sentences on what its source does not print."""
-_DELIVERED: tuple[Column[tuple[str, str, float]], ...] = (
-    Column(header="quantity", value=lambda row: row[0]),
-    Column(header="asked", value=lambda row: row[1]),
-    Column(header="delivered, exact distances", value=lambda row: row[2]),
-)
 
 
 class ModificationTeller(Teller[ModificationResult]):
@@ -106,6 +100,8 @@ class ModificationTeller(Teller[ModificationResult]):
     @property
     def delivered(self) -> pd.DataFrame:
         """What was asked for beside what the exact distances show."""
+        import pandas as pd
+
         found, request = self.result.contact.assessment.exact_clearance, self.result.request
         lowest, asked = float(found.after.min()), self.result.problem.radial_clearance / MICROMETRE
         lowest = lowest if abs(lowest) > _NONE else 0.0
@@ -117,7 +113,7 @@ class ModificationTeller(Teller[ModificationResult]):
                 (radial, f"{asked:g}", self.result.delivered_radial / MICROMETRE),
             ]
         rows = [*first, ("smallest clearance after the first contact [µm]", "0", lowest / MICROMETRE)]
-        return Table(name="delivered", columns=_DELIVERED, rows=rows).frame()
+        return pd.DataFrame(rows, columns=["quantity", "asked", "delivered, exact distances"])
 
     @cached_property
     def sections(self) -> tuple[Section, ...]:

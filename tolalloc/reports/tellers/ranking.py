@@ -1,4 +1,4 @@
-"""What drives a model's outputs, and how sure that is."""
+"""What is said of a ranking: what drives a model's outputs, and how sure that is."""
 
 from __future__ import annotations
 
@@ -9,22 +9,21 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from tolalloc.drawings.seeds import SamplingDesign
-from tolalloc.drawings.sources import zone_in, zone_unit
 from tolalloc.drawings.tolerance_table import table_frame
 from tolalloc.reading.units import unit_of
 from tolalloc.reports.document import Section
-from tolalloc.reports.figure import Figure, HeatMap, Series
 from tolalloc.reports.finished_run import told_yields
 from tolalloc.reports.portrait import Portrait, portrait_of
 from tolalloc.reports.teller import Teller
+from tolalloc.reports.tellers import ranking_figures as figures
 from tolalloc.reports.tellers import ranking_tables as tables
-from tolalloc.reports.tellers.check import few_parts
+from tolalloc.reports.tellers.check import few_parts, interval_gaps
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import QUICK_RUN, alike, enumerated, number, quantity, sign_of
 from tolalloc.sensitivity.ranking import Convergence, Neighbours
 from tolalloc.sensitivity.result import RankingResult
 from tolalloc.sensitivity.saltelli import FEWEST_SHOWING
-from tolalloc.sensitivity.sobol import SobolIndices
+from tolalloc.sensitivity.sobol import SourceIndices
 from tolalloc.sensitivity.surrogate.validation import Choice
 
 if TYPE_CHECKING:
@@ -48,12 +47,6 @@ _NAMED = 3
 """Sources that the answer names [-]."""
 _AS_STRONG = 0.9
 """Share of the largest change per micrometre from which a source is as strong as any [-]."""
-_SHOWN = 20
-"""Rows of a picture; the table has all [-]."""
-_DRIVERS = 10
-"""Drivers of a picture [-]."""
-_LINE = 14
-"""Letters of a line in the head of a heat map [-]."""
 _say = Sentences("ranking")
 
 
@@ -122,11 +115,6 @@ class RankingTeller(Teller[RankingResult]):
         return sign_of(self._unit)
 
     @property
-    def _wave_unit(self) -> str:
-        """Unit of the waves of the model's spectra."""
-        return unit_of(next(iter(self.result.model.spectra.values()))[0])
-
-    @property
     def _limits(self) -> str:
         """What a sentence calls the limits of the leading output."""
         limits = self.result.limits[self.result.leading]
@@ -191,7 +179,7 @@ class RankingTeller(Teller[RankingResult]):
                 "order",
                 order=found.orders[at],
                 deviation=found.deviation[at],
-                sign=sign_of(self._wave_unit),
+                sign=sign_of(tables.wave_unit(self.result)),
                 due=_say(due),
                 names=" and ".join(
                     _say("order_name", source=found.sources[source], share=min(share[source], 1.0))
@@ -262,8 +250,7 @@ class RankingTeller(Teller[RankingResult]):
         """Yield the share of units that keep all limits at once, where there are several."""
         if len(self.result.limits) == 1:
             return
-        joint, simulated = self.result.joint, self._portrait.simulated
-        yield _say("all_limits", share=joint.estimate, low=100 * joint.low, high=joint.high, simulated=simulated)
+        yield _say("all_limits", simulated=self._portrait.simulated, **interval_gaps(self.result.joint))
 
     def _opening(self) -> str:
         """Return which zone has the least and the most room."""
@@ -343,7 +330,7 @@ class RankingTeller(Teller[RankingResult]):
         yield Section(
             heading=_say("drivers_heading", output=self._output),
             paragraphs=(_say("drivers", carried=_carried(result.sobol.narrowed(0))),),
-            figures=(self._ranking_figure(),),
+            figures=(figures.ranking_figure(result),),
             tables=(
                 ("ranking", tables.ranking_table(result)),
                 *(((pairs.name, pairs.frame()),) if pairs.rows else ()),
@@ -370,7 +357,7 @@ class RankingTeller(Teller[RankingResult]):
         yield Section(
             heading=_say("overall_heading"),
             paragraphs=(_say("overall", outputs=names, blocks=blocks, others=others),),
-            figures=(self._requirements_figure(),),
+            figures=(figures.requirements_figure(result),),
             tables=(("all requirements", tables.overall_table(result)),),
             folded=True,
         )
@@ -379,8 +366,8 @@ class RankingTeller(Teller[RankingResult]):
             yield Section(
                 heading=_say("orders_heading"),
                 paragraphs=(f"{note}{_say('orders', blocks=others)}",),
-                figures=(self._orders_figure(),),
-                tables=(("orders", tables.orders_table(result, self._wave_unit)),),
+                figures=(figures.orders_figure(result),),
+                tables=(("orders", tables.orders_table(result)),),
                 folded=True,
             )
         total = result.indices.total
@@ -393,7 +380,7 @@ class RankingTeller(Teller[RankingResult]):
         return (
             Section(
                 heading=_say("yield_heading"),
-                figures=(self._sample_figure(),),
+                figures=(figures.sample_figure(result),),
                 tables=(
                     ("requirements", self._requirements),
                     ("beyond the limit", tables.beyond_table(result)),
@@ -402,12 +389,12 @@ class RankingTeller(Teller[RankingResult]):
             ),
             Section(
                 heading=_say("rejects_heading"),
-                figures=(self._reject_figure(),),
+                figures=(figures.reject_figure(result),),
                 tables=(("rejects", tables.reject_table(result.reject)),),
             ),
             Section(
                 heading=_say("alone_heading"),
-                figures=tuple(self._inverse_figures()),
+                figures=tuple(figures.inverse_figures(result)),
                 tables=(("alone", tables.inverse_table(result)),),
             ),
         )
@@ -485,135 +472,6 @@ class RankingTeller(Teller[RankingResult]):
             f"effect at 2 sigma, rms [{unit}]": error.effect,
         }
 
-    def _ranking_figure(self) -> Figure:
-        """Return total and first-order indices of the leading output with their intervals."""
-        indices = self.result.dimensions or self.result.indices
-        rows = indices.order[:_DRIVERS]
-        bars = (
-            ("total-effect index", indices.total, indices.total_interval),
-            ("first-order index", indices.first, indices.first_interval),
-        )
-        return Figure(
-            name="ranking",
-            title=_say("ranking_figure", output=self._output),
-            x_label=_say("ranking_axis"),
-            series=(
-                *(
-                    Series(
-                        label=_say("with_interval", name=name),
-                        kind="bars",
-                        x=[indices.sources[at] for at in rows],
-                        y=np.clip(values[rows], 0.0, 1.0).tolist(),
-                        low=interval[0, rows].tolist(),
-                        high=interval[1, rows].tolist(),
-                    )
-                    for name, values, interval in bars
-                ),
-                self._per_micrometre_bars([indices.sources[at] for at in rows]),
-            ),
-        )
-
-    def _per_micrometre_bars(self, names: list[str]) -> Series:
-        """Return the change per micrometre of sources as shares of the largest one."""
-        changes = tables.per_micrometre(self.result)
-        largest = max(changes.values(), default=0.0) or 1.0
-        lengths = [changes.get(own, 0.0) / largest for own in names]
-        return Series(label=_say("per_micrometre_bars"), kind="bars", x=names, y=lengths)
-
-    def _requirements_figure(self) -> HeatMap:
-        """Return the total index of every source for every requirement."""
-        sobol = self.result.sobol
-        outputs = [name for name in self.result.outputs if name not in sobol.constant]
-        rows = sobol.overall.order[:_SHOWN]
-        return HeatMap(
-            name="requirements",
-            title=_say("requirements_figure"),
-            columns=[_broken(quantity(name)) for name in outputs],
-            rows=[sobol.sources[at] for at in rows],
-            label="total-effect index [-]",
-            values=[[float(sobol.indices.total[sobol.position(name), at]) for name in outputs] for at in rows],
-        )
-
-    def _orders_figure(self) -> HeatMap:
-        """Return the share of every source in the wave of every order."""
-        found, sign = self.result.orders, sign_of(self._wave_unit)
-        assert found is not None
-        first = np.nan_to_num(found.first)
-        rows = tables.largest_first(first.max(axis=0))[:_SHOWN]
-        return HeatMap(
-            name="orders",
-            title=_say("orders_figure"),
-            columns=[
-                f"{order}\n{number(own, '.2g')}{sign}" for order, own in zip(found.orders, found.deviation, strict=True)
-            ],
-            rows=[found.sources[at] for at in rows],
-            x_label=_say("orders_axis"),
-            label="share of the wave's variance [-]",
-            values=[[max(float(value), 0.0) for value in first[:, at]] for at in rows],
-        )
-
-    def _sample_figure(self) -> Figure:
-        """Return the leading output of the random units."""
-        limits, name = self.result.limits[self.result.leading], self._output
-        ends = [limit for limit in (limits.lower, limits.upper) if limit is not None]
-        return Figure(
-            name=name.replace("-", "_").replace(" ", "_"),
-            title=_say("sample_figure", output=f"{name[0].upper()}{name[1:]}"),
-            x_label=self.result.leading,
-            y_label="share of the units [%]",
-            series=(Series(label="random units", kind="histogram", x=list(self.result.sample.values)),),
-            vertical=tuple((limit, _say("limit_line", limit=limit, sign=self._sign)) for limit in ends),
-        )
-
-    def _reject_figure(self) -> Figure:
-        """Return how much larger the deviations of the units outside are, summed over the columns of each source."""
-        found = self.result.reject
-        rows = tables.largest_first(found.excess)[: _SHOWN // 2]
-        low, high = found.excess_interval
-        return Figure(
-            name="rejects",
-            title=_say("rejects_figure"),
-            x_label=_say("rejects_axis"),
-            series=(
-                Series(
-                    label=_say("with_interval", name="excess"),
-                    kind="bars",
-                    x=[found.sources[at] for at in rows],
-                    y=list(found.excess[rows]),
-                    low=list(low[rows]),
-                    high=list(high[rows]),
-                ),
-            ),
-            vertical=((0.0, "no part"),),
-        )
-
-    def _inverse_figures(self) -> Iterator[Figure]:
-        """Yield the zones now and what they may be alone; nothing if no zone has such a value."""
-        found = self.result.inverse
-        rows = [at for at in tables.tightest_first(found) if np.isfinite(found.zone[at])][:_SHOWN]
-        if not rows:
-            return
-        active = self.result.errors.active
-        unit = zone_unit(active)
-        now = np.array([zone_in(source, unit) for source in active])[rows]
-        names = [found.sources[at] for at in rows]
-        yield Figure(
-            name="alone",
-            title=_say("alone_may_open" if found.meets else "alone_may_stay"),
-            x_label=f"zone [{unit}]",
-            series=(
-                Series(label="now", kind="bars", x=names, y=list(now)),
-                Series(
-                    label="alone, with its 90 % interval",
-                    kind="bars",
-                    x=names,
-                    y=[zone_in(active[at], unit, found.zone[at]) for at in rows],
-                    low=list(now * found.low[rows]),
-                    high=list(now * found.high[rows]),
-                ),
-            ),
-        )
-
 
 def _carried(narrowed: float) -> str:
     """Return how much narrower a control variate makes intervals, nothing where it does not."""
@@ -622,7 +480,7 @@ def _carried(narrowed: float) -> str:
     return " " + _say("carried", narrowed=f"{narrowed:.2f}" if narrowed >= _LEAST_CARRIED else "less than 0.01")
 
 
-def _drivers(sobol: SobolIndices) -> Iterator[str]:
+def _drivers(sobol: SourceIndices) -> Iterator[str]:
     """Yield who drives the leading output, and how sure each place is."""
     low, high = sobol.total_interval
     following = {pair.before: pair for pair in sobol.neighbours}
@@ -638,14 +496,14 @@ def _drivers(sobol: SobolIndices) -> Iterator[str]:
         )
 
 
-def _unseen(sobol: SobolIndices) -> Iterator[str]:
+def _unseen(sobol: SourceIndices) -> Iterator[str]:
     """Yield of which sources too few blocks show enough to say how much they do."""
     names = [sobol.sources[at] for at in np.flatnonzero(sobol.unseen > _SLIGHT)]
     if names:
         yield _say("unseen", blocks=sobol.blocks, fewest=FEWEST_SHOWING, names=", ".join(names))
 
 
-def _named_drivers(sobol: SobolIndices, output: str) -> str:
+def _named_drivers(sobol: SourceIndices, output: str) -> str:
     """Return the same of all of them in one sentence, without the places."""
     low, high = sobol.total_interval
     named = (
@@ -690,16 +548,6 @@ def chosen_surrogate(choice: Choice) -> str:
         error=abs(score.quantile_share),
         untried=f" {_say('surrogate_untried', names=', '.join(choice.untried))}" if choice.untried else "",
     )
-
-
-def _broken(name: str) -> str:
-    """Return a name on several lines."""
-    lines = [""]
-    for word in name.split():
-        if len(lines[-1]) + len(word) > _LINE and lines[-1]:
-            lines.append("")
-        lines[-1] = f"{lines[-1]} {word}".strip()
-    return "\n".join(lines)
 
 
 TELLER = RankingTeller

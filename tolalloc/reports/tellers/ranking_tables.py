@@ -20,7 +20,7 @@ from tolalloc.sensitivity.inverse import InverseSensitivity
 from tolalloc.sensitivity.ranking import Neighbours
 from tolalloc.sensitivity.result import OutputCapability, RankingResult
 from tolalloc.sensitivity.shapley import ShapleyEffects
-from tolalloc.sensitivity.sobol import SobolIndices
+from tolalloc.sensitivity.sobol import SourceIndices
 from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
 from tolalloc.sensitivity.surrogate.validation import LARGEST_FAILED_SHARE, LARGEST_QUANTILE_ERROR, Choice, Score
 from tolalloc.sensitivity.target import TargetSensitivity
@@ -45,7 +45,7 @@ def _told(index: Float[np.ndarray, "*source"]) -> Float[np.ndarray, "*source"]:
     return np.asarray(np.clip(index, 0.0, 1.0))
 
 
-def sobol_table(sobol: SobolIndices) -> pd.DataFrame:
+def sobol_table(sobol: SourceIndices) -> pd.DataFrame:
     """Return the sources, largest total Sobol index first, with intervals and the confidence of every place."""
     share = sobol.total / sobol.total.sum() * 100
     first, total, rank = sobol.first_interval, sobol.total_interval, sobol.rank_interval
@@ -111,7 +111,7 @@ def _with_own_words(frame: pd.DataFrame, members: Mapping[str, Sequence[Source]]
     return frame
 
 
-def ranked(sobol: SobolIndices) -> list[dict[str, Any]]:
+def ranked(sobol: SourceIndices) -> list[dict[str, Any]]:
     """Return the ranking for a program."""
     interval, among = sobol.total_interval, sobol.among_first(min(3, len(sobol.sources)))
     return of_positions(
@@ -127,7 +127,7 @@ def ranked(sobol: SobolIndices) -> list[dict[str, Any]]:
     ).records()
 
 
-def dimensions_table(result: RankingResult, found: SobolIndices) -> pd.DataFrame:
+def dimensions_table(result: RankingResult, found: SourceIndices) -> pd.DataFrame:
     """Return the dimensions of the drawing, largest total-effect index first, with what stands on the drawing."""
     by_group: dict[str, list[Source]] = {}
     for source in result.errors.active:
@@ -184,7 +184,7 @@ def _line_derivatives(result: RankingResult, members: Sequence[Source]) -> LineD
     return result.local.of_line([own.name for own in members])
 
 
-def pairs_table(sobol: SobolIndices) -> Table[int]:
+def pairs_table(sobol: SourceIndices) -> Table[int]:
     """Return what pairs of sources add only together, the largest first; empty unless second order was asked for."""
     low, high = sobol.second_interval
     return of_positions(
@@ -232,11 +232,15 @@ def convergence_table(result: RankingResult) -> pd.DataFrame:
             "first places": [", ".join(names[at] for at in step.first) for step in history],
             "share of the resamples with this order [%]": [step.probability * 100 for step in history],
         },
-        range(len(history)),
     ).frame()
 
 
-def orders_table(result: RankingResult, unit: str) -> pd.DataFrame:
+def wave_unit(result: RankingResult) -> str:
+    """Return the unit of the waves of the model's spectra."""
+    return unit_of(next(iter(result.model.spectra.values()))[0])
+
+
+def orders_table(result: RankingResult) -> pd.DataFrame:
     """Return what each source adds to the wave of each order, alone and with others."""
     found = result.orders
     assert found is not None
@@ -244,7 +248,7 @@ def orders_table(result: RankingResult, unit: str) -> pd.DataFrame:
     rows = [(at, source) for at in range(len(found.orders)) for source in largest_first(found.total[at])]
     columns: dict[str, list[Any]] = {
         "order of the output turn [-]": [found.orders[at] for at, _ in rows],
-        f"standard deviation of the wave [{unit}]": [found.deviation[at] for at, _ in rows],
+        f"standard deviation of the wave [{wave_unit(result)}]": [found.deviation[at] for at, _ in rows],
         "source": [found.sources[source] for _, source in rows],
     }
     for name, short, shares, ends in (
@@ -254,7 +258,7 @@ def orders_table(result: RankingResult, unit: str) -> pd.DataFrame:
         columns[name] = [_told(shares)[row] for row in rows]
         columns[f"{short} low 5 % [-]"] = [ends[at, 0, source] for at, source in rows]
         columns[f"{short} high 95 % [-]"] = [ends[at, 1, source] for at, source in rows]
-    return of_positions("orders", columns, range(len(rows))).frame()
+    return of_positions("orders", columns).frame()
 
 
 def shapley_table(found: ShapleyEffects) -> pd.DataFrame:
@@ -331,12 +335,13 @@ def beyond_table(result: RankingResult) -> pd.DataFrame:
             "relied on": ["yes" if item is found.estimate else "no" for item in rows],
             "cautions": ["; ".join(item.cautions) for item in rows],
         },
-        range(len(rows)),
     ).frame()
 
 
 def stack_up_table(result: RankingResult, output: str) -> pd.DataFrame:
     """Return worst case, root-sum-square and Monte Carlo side by side, of an output with its unit."""
+    import pandas as pd
+
     sample, classical = result.sample, result.classical
     rows = (
         ("worst case", classical.worst_case, _say("worst_case")),
@@ -344,9 +349,7 @@ def stack_up_table(result: RankingResult, output: str) -> pd.DataFrame:
         ("Monte Carlo mean", float(sample.values.mean()), _say("real_model")),
         (f"Monte Carlo {result.target:.2%} quantile", sample.quantile(result.target), _say("real_model")),
     )
-    headers = ("estimate", output, "assumes")
-    columns = dict(zip(headers, zip(*rows, strict=True), strict=True))
-    return of_positions("stack-up", columns, range(len(rows))).frame()
+    return pd.DataFrame(rows, columns=["estimate", output, "assumes"])
 
 
 def reject_table(found: TargetSensitivity) -> pd.DataFrame:
@@ -423,7 +426,7 @@ def measures_table(result: RankingResult) -> pd.DataFrame:
     names = list(named | dict.fromkeys(name for sources, _ in columns.values() for name in sources))
     by_name = {header: dict(zip(sources, values, strict=True)) for header, (sources, values) in columns.items()}
     aligned = {header: [own.get(name, np.nan) for name in names] for header, own in by_name.items()}
-    return of_positions("measures", {"source": names, **aligned}, range(len(names))).frame()
+    return of_positions("measures", {"source": names, **aligned}).frame()
 
 
 def quantile_name(score: Score) -> str:
@@ -465,17 +468,16 @@ def surrogate_table(choice: Choice) -> pd.DataFrame:
             "failed [-]": [score.failed for score in scores],
             "falls short": ["; ".join(shortfalls(score)) or "nowhere" for score in scores],
         },
-        range(len(scores)),
     ).frame()
 
 
 def mapping_table(result: RankingResult) -> pd.DataFrame:
     """Return how every zone became a distribution, and where the zone comes from."""
+    import pandas as pd
+
     rows = [(source.name, source.mapping, source.note) for source in result.errors.active]
     rows += [(source.name, source.mapping, _say("not_on_drawing")) for source in result.model.uncertain]
-    names, mappings, notes = zip(*rows, strict=True)
-    columns = {"source": names, "zone → distribution": mappings, "note of the table": notes}
-    return of_positions("mapping", columns, range(len(rows))).frame()
+    return pd.DataFrame(rows, columns=["source", "zone → distribution", "note of the table"])
 
 
 def measured_tables(result: RankingResult) -> tuple[tuple[str, pd.DataFrame], ...]:
@@ -499,7 +501,7 @@ def measured_tables(result: RankingResult) -> tuple[tuple[str, pd.DataFrame], ..
         "Kolmogorov–Smirnov distance [-]": [fitted.distance if fitted else np.nan for _, _, fitted in rows],
         "best": ["no" if fitted and fitted is not fit.best else "yes" for _, fit, fitted in rows],
     }
-    table = of_positions("measured parts", columns, range(len(rows)))
+    table = of_positions("measured parts", columns)
     return ((table.name, table.frame()),) if rows else ()
 
 
@@ -512,4 +514,4 @@ def work_table(header: Header) -> pd.DataFrame:
         "seconds [s]": [own["seconds"] for own in stages],
         "units per second [1/s]": [own["units per second"] for own in stages],
     }
-    return of_positions("work", columns, range(len(names))).frame()
+    return of_positions("work", columns).frame()

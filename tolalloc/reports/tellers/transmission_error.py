@@ -11,7 +11,8 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE
-from tolalloc.reducers.equivalent.hysteresis import LOOP_ASSUMPTION, FrictionLoop, HysteresisLoop
+from tolalloc.reducers.equivalent.friction import FrictionLoop
+from tolalloc.reducers.equivalent.hysteresis import LOOP_ASSUMPTION, HysteresisLoop
 from tolalloc.reducers.equivalent.model import Equilibria
 from tolalloc.reducers.equivalent.outputs import Attribution, bearings_of, forces, outputs_of
 from tolalloc.reducers.equivalent.perfect import PRELOAD_ASSUMPTION
@@ -260,17 +261,15 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
             x_label=_ANGLE,
             y_label=_ERROR,
             series=(
-                Series(
-                    label=f"{found.carrier_angle.size} equally spaced angles",
-                    kind="line",
-                    x=list(found.carrier_angle / DEGREE),
-                    y=list(found.transmission_error[0] / ARCSECOND),
+                Series.line(
+                    f"{found.carrier_angle.size} equally spaced angles",
+                    found.carrier_angle / DEGREE,
+                    found.transmission_error[0] / ARCSECOND,
                 ),
-                Series(
-                    label="extremes, refined",
-                    kind="points",
-                    x=[float(angle) for angle in extremes.carrier_angle[0] / DEGREE],
-                    y=[float(extremes.largest[0] / ARCSECOND), float(extremes.smallest[0] / ARCSECOND)],
+                Series.points(
+                    "extremes, refined",
+                    [float(angle) for angle in extremes.carrier_angle[0] / DEGREE],
+                    [float(extremes.largest[0] / ARCSECOND), float(extremes.smallest[0] / ARCSECOND)],
                 ),
             ),
         )
@@ -299,10 +298,7 @@ def force_figure(equilibria: Equilibria) -> Figure:
         title=_say("force_figure"),
         x_label=_ANGLE,
         y_label="force [N]",
-        series=tuple(
-            Series(label=name, kind="line", x=list(equilibria.carrier_angle / DEGREE), y=list(values))
-            for name, values in lines.items()
-        ),
+        series=tuple(Series.line(name, equilibria.carrier_angle / DEGREE, values) for name, values in lines.items()),
     )
 
 
@@ -355,10 +351,7 @@ def _loop_figure(loop: FrictionLoop) -> Figure:
         title=_say("loop_figure", lost_motion=lost_motion, loss=loss),
         x_label="torque on the carrier [N·m]",
         y_label="twist [arcmin]",
-        series=tuple(
-            Series(label=label, kind="line", x=list(loop.torque), y=list(branch[_UNIT] / ARCMINUTE))
-            for label, branch in branches.items()
-        ),
+        series=tuple(Series.line(label, loop.torque, branch[_UNIT] / ARCMINUTE) for label, branch in branches.items()),
     )
 
 

@@ -13,7 +13,6 @@ from scipy.stats import chi2
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree, require_seed
-from tolalloc.drawings.sources import limited_measure
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import ARCSECOND, DEGREE
 from tolalloc.reducers.choice import bind
@@ -28,6 +27,7 @@ from tolalloc.wings.bench.posterior import (
     GaugeReading,
     Noise,
     explain,
+    gauges_shown,
     posterior,
     thinned,
 )
@@ -49,6 +49,11 @@ IMPLAUSIBLE = 0.001
 
 TAILS = (0.025, 0.975)
 """Shares below the ends of the intervals [-]."""
+
+LARGEST_NOISE = 60.0
+"""Largest error of a reading that is believed [arcsec]."""
+
+PLACE = "diagnosis"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,9 +163,8 @@ def diagnose(
         probability = np.bincount(dominant(falls), minlength=len(names)) / len(falls)
     if solved[False] > LARGEST_FAILED_SHARE * solved.total():
         raise SolveError(f"{solved[False]} of {solved.total()} curves of a diagnosis failed to solve.")
-    gauge = np.stack(
-        [limited_measure(source, deviations[:, _places(errors, source.name)]) for source in errors.active], axis=1
-    )
+    gauge = gauges_shown(errors, errors.active, deviations)
+    twins = tuple((name, exchanged(name)) for name in names if name < exchanged(name))
     return Diagnosis(
         sources=names,
         columns=errors.columns,
@@ -169,20 +173,12 @@ def diagnose(
         reading_interval=np.quantile(gauge, TAILS, axis=0),
         dominant_probability=probability,
         named=tuple(names[at] for at in named_set(probability, level)) if fit.explained else (),
-        twins=_twins(names) if has_half_turn(kernel.model.reducer, errors.columns) else (),
+        twins=twins if has_half_turn(kernel.model.reducer, errors.columns) else (),
         groups=groups(numbers, errors.columns, errors.source_of_column),
         fit=fit,
         evaluations=solved.total(),
         failed=solved[False],
     )
-
-
-def _places(errors: ErrorModel, name: str) -> list[int]:
-    return [at for at, owner in enumerate(errors.source_of_column) if owner == name]
-
-
-def _twins(names: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
-    return tuple((name, exchanged(name)) for name in names if name < exchanged(name))
 
 
 def _fit(
@@ -201,12 +197,6 @@ def _fit(
         freedom=problem.freedom,
         explained=bool(chi2.sf(square, problem.freedom) >= IMPLAUSIBLE),
     )
-
-
-LARGEST_NOISE = 60.0
-"""Largest error of a reading that is believed [arcsec]."""
-
-PLACE = "diagnosis"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -228,19 +218,14 @@ class DiagnosisRequest:
     effort: DiagnosisEffort = field(default_factory=DiagnosisEffort)  # How much may be computed
 
     def __post_init__(self) -> None:
-        for name, value, good, allowed in (
-            (
-                "noise_arcsec",
-                self.noise_arcsec,
-                0 < self.noise_arcsec <= LARGEST_NOISE,
-                f"above 0 up to {LARGEST_NOISE:g}",
-            ),
-            ("discrepancy_arcsec", self.discrepancy_arcsec, 0 <= self.discrepancy_arcsec <= LARGEST_NOISE, "0 to 60"),
-            ("angle_offset_deg", self.angle_offset_deg, -360 <= self.angle_offset_deg <= 360, "-360 to 360"),
-            ("level", self.level, 0.5 <= self.level < 1, "0.5 up to but not 1"),
+        for name, good, allowed in (
+            ("noise_arcsec", 0 < self.noise_arcsec <= LARGEST_NOISE, f"above 0 up to {LARGEST_NOISE:g}"),
+            ("discrepancy_arcsec", 0 <= self.discrepancy_arcsec <= LARGEST_NOISE, f"0 to {LARGEST_NOISE:g}"),
+            ("angle_offset_deg", -360 <= self.angle_offset_deg <= 360, "-360 to 360"),
+            ("level", 0.5 <= self.level < 1, "0.5 up to but not 1"),
         ):
             if not good:
-                raise InputError.of_argument(PLACE, name, value, allowed)
+                raise InputError.of_argument(PLACE, name, getattr(self, name), allowed)
         require_seed(PLACE, self.seed)
 
 

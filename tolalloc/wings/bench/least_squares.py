@@ -14,6 +14,8 @@ from tolalloc.exceptions import InputError, SolveError
 from tolalloc.wings.bench.parameters import Parameter, box, prior_weights
 from tolalloc.wings.bench.prediction import AllReadings, Prediction, Predictor
 
+_STEPS = 40
+
 
 @dataclass(frozen=True, kw_only=True)
 class IdentificationProblem:
@@ -129,7 +131,6 @@ def require_enough(problem: IdentificationProblem) -> None:
 
 NAME = "Gauss–Newton"
 
-_STEPS = 40
 
 Batch = tuple[Float[np.ndarray, "point parameter"], Float[np.ndarray, " point"]]
 """Points that were tried together, and the objective at each [-]."""

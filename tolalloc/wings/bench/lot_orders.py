@@ -19,6 +19,7 @@ from tolalloc.reducers.equivalent.outputs import fitted_waves
 from tolalloc.reducers.model import ReducerModel
 from tolalloc.running.progress import RunRecord
 from tolalloc.wings.bench.posterior import Noise
+from tolalloc.wings.bench.processes import two_sided
 from tolalloc.wings.bench.readings import (
     ANGLE,
     TRANSMISSION_ERROR,
@@ -102,14 +103,12 @@ class PredictedOrder:
         too large against lots with them: twice the smaller tail, the lot counted as one of the simulated ones.
         """
         square = float((np.abs(waves) ** 2).mean())
-        above = self.read.size - int(np.searchsorted(self.read, square, side="left"))
-        below = int(np.searchsorted(self.exact, square, side="right"))
         low, high = float(np.quantile(self.exact, _ENDS[0])), float(np.quantile(self.read, _ENDS[1]))
         return LotOrder(
             order=self.order,
             amplitude=sqrt(square),
             predicted=(sqrt(max(low, 0.0)), sqrt(high)),
-            probability=min(1.0, 2.0 * (min(above, below) + 1) / (self.read.size + 1)),
+            probability=two_sided(square, self.exact, self.read),
         )
 
 

@@ -28,11 +28,11 @@ from tolalloc.wings.bench.processes import (
     CONFIDENCE,
     EXACT,
     Gauge,
+    GaugedProcess,
     GaugeError,
     Lots,
     NormalLaw,
     SimulatedLaw,
-    StatedProcess,
     gauged,
 )
 from tolalloc.wings.bench.readings import column_readings
@@ -58,6 +58,8 @@ _WRITTEN = 4
 """Decimals of Cp and shift in the table of a lot [-]."""
 
 
+_LENGTHS = {unit: factor * MICROMETRE for unit, factor in UNITS.items()}
+"""Unit of a column as written → factor to metres [m]."""
 _GAUGES = {Feature.SIZE: Gauge.DEVIATION, Feature.POSITION: Gauge.RADIUS}
 _ENDINGS = {
     ".x": (Gauge.X, 1.0),
@@ -108,7 +110,7 @@ class MeasuredProcess:
     """What a lot shows of one column, beside what the drawing states of it."""
 
     column: GaugedColumn
-    stated: StatedProcess
+    stated: GaugedProcess
     # Mean and standard deviation without what the gauge adds; where those of the process lie with 95 % confidence [m]
     mean: float
     deviation: float
@@ -351,8 +353,7 @@ def _stated(column: GaugedColumn, stated: TextTable | None) -> float:
     """Return the standard deviation of a reading by the row that states it; 0 where none does [m]."""
     if stated is None:
         return 0.0
-    known = {unit: factor * MICROMETRE for unit, factor in UNITS.items()}
-    factor, (shown,) = column_readings(stated, column.header, known)
+    factor, (shown,) = column_readings(stated, column.header, _LENGTHS)
     if not (np.isnan(shown) or 0.0 < shown <= LARGEST_DEVIATION * MICROMETRE):
         place = f"{stated.path}, row {stated.rows[0]}"
         raise InputError.at(
@@ -384,8 +385,7 @@ def _column(table: TextTable, header: str, sources: Sequence[Source]) -> GaugedC
     if source.systematic:
         allowed = "a source without, since a total deviation does not tell its waves from the random ones"
         raise InputError.at(path, f"systematic of {source.name}", "stated on the drawing", allowed)
-    known = {unit: factor * MICROMETRE for unit, factor in UNITS.items()}
-    factor, shown = column_readings(table, header, known)
+    factor, shown = column_readings(table, header, _LENGTHS)
     values, largest, faults = shown * part, LARGEST_DEVIATION * MICROMETRE, Faults()
     least = -largest if gauge.has_sign else 0.0
     for at in np.flatnonzero((shown < least) | (shown > largest)):
@@ -587,7 +587,7 @@ def _of_parts(values: Float[np.ndarray, " part"], error: GaugeError, *, together
     return mean * share, deviation * share
 
 
-def _cp_interval(unit: StatedProcess, values: Float[np.ndarray, " part"], gauge: Gauge) -> tuple[float, float]:
+def _cp_interval(unit: GaugedProcess, values: Float[np.ndarray, " part"], gauge: Gauge) -> tuple[float, float]:
     """Return the interval of Cp without what the gauge adds; infinite where it may be all that was seen [-]."""
     if gauge is Gauge.DEVIATION or isinstance(unit.law, NormalLaw):
         whole, (least, most) = 1.0, unit.law.process_ends(float(values.std(ddof=1)) / unit.deviation)

@@ -28,6 +28,7 @@ from tolalloc.wings.bench.readings import (
     clean_loop,
     load_readings,
     read_column,
+    require_moving,
 )
 
 
@@ -226,11 +227,7 @@ def _peak_to_peak(data: Mapping[str, Any], path: Path, positions: Mapping[str, i
                 cells[table.headers.index(header)],
                 f"a number from 0 to {LARGEST_RANGE / factor:g}",
             )
-    if values.size > 1 and np.ptp(values) == 0:
-        raise InputError(
-            f"{table.path}: all {values.size} values of column {header!r} are {values[0] / factor:.6g}; an instrument "
-            "that does not move is no measurement."
-        )
+    require_moving(table.path, header, values / factor)
     return MeasuredPeakToPeak(
         unit=np.array(units), values=values, torque=record.torque_nm, noise=_in_radians(record.noise_arcsec)
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,6 +28,30 @@ FEWEST_READINGS = 24
 
 _STEP = 1e-4
 """Step of the standard normal numbers in the derivative of the deviations, which are smooth in them [-]."""
+
+_CORRELATION = 0.4
+"""A step ends when the particles' correlation with where they stood before has fallen this far [-]."""
+
+_ACCEPTED = 0.25
+"""Share of moves that the length of a move is adapted to [-]."""
+
+_INFLATION = 1.3
+"""Covariance of the moves over that of the particles, so that the tails are reached [-]."""
+
+_DAMPINGS = 10.0 ** np.arange(-2, 3)
+"""Dampings tried in each step, over the one that did best before [-]."""
+
+_WIDER = 3.0
+"""Weight of the readings in one neighbourhood over that in the next wider one [-]."""
+
+_VAIN = 3
+"""Searches in vain, each in a wider neighbourhood, that end an attempt [-]."""
+
+_ENOUGH, _LEAST = 0.05, 0.001
+"""Plausibility with which an attempt ends once nothing better was found nearby, and with which the attempts end [-]."""
+
+_SAME_DEPTH = 2.0
+"""Objectives this close belong to one neighbourhood, whose kinks leave many small minima [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,6 +119,14 @@ def thinned(curve: MeasuredCurve, noise: Noise, most: int) -> ThinnedCurve:
     )
 
 
+def gauges_shown(
+    errors: ErrorModel, sources: Sequence[Source], deviations: Float[np.ndarray, "sample column"]
+) -> Float[np.ndarray, "sample source"]:
+    """Return what exact gauges would show of sources of units with these columns [m]."""
+    owner = np.array(errors.source_of_column)
+    return np.stack([limited_measure(source, deviations[:, owner == source.name]) for source in sources], axis=1)
+
+
 @dataclass(frozen=True, kw_only=True)
 class GaugeReading:
     """What a gauge has shown of one source of the unit."""
@@ -150,11 +182,9 @@ class CurveProblem:
 
     def _off(self, deviations: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample gauge"]:
         """Return how far the gauges would be from what they read, in standard deviations [-]."""
-        owner = np.array(self.errors.source_of_column)
-        shown = [limited_measure(own.source, deviations[:, owner == own.source.name]) for own in self.gauged]
-        return np.stack(
-            [(one - own.value) / own.deviation for one, own in zip(shown, self.gauged, strict=True)], axis=1
-        )
+        shown = gauges_shown(self.errors, [own.source for own in self.gauged], deviations)
+        value, deviation = np.array([(own.value, own.deviation) for own in self.gauged]).T
+        return np.asarray((shown - value) / deviation)
 
     def misfit(self, numbers: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, " sample"]:
         """Return the same for standard normal numbers [-]."""
@@ -182,15 +212,6 @@ class CurveProblem:
         steps = (self._off(moved).reshape(samples, size, -1) - off[:, np.newaxis]).transpose(0, 2, 1) / _STEP
         return np.concatenate([residual, off], axis=1), np.concatenate([slope, steps], axis=1)
 
-
-_CORRELATION = 0.4
-"""A step ends when the particles' correlation with where they stood before has fallen this far [-]."""
-
-_ACCEPTED = 0.25
-"""Share of moves that the length of a move is adapted to [-]."""
-
-_INFLATION = 1.3
-"""Covariance of the moves over that of the particles, so that the tails are reached [-]."""
 
 LogDensity = Callable[[Float[np.ndarray, "particle column"]], Float[np.ndarray, " particle"]]
 
@@ -301,22 +322,6 @@ def _resampled(weight: Float[np.ndarray, " particle"], generator: np.random.Gene
     return np.asarray(np.minimum(np.searchsorted(np.cumsum(weight), comb), weight.size - 1))
 
 
-_DAMPINGS = 10.0 ** np.arange(-2, 3)
-"""Dampings tried in each step, over the one that did best before [-]."""
-
-_WIDER = 3.0
-"""Weight of the readings in one neighbourhood over that in the next wider one [-]."""
-
-_VAIN = 3
-"""Searches in vain, each in a wider neighbourhood, that end an attempt [-]."""
-
-_ENOUGH, _LEAST = 0.05, 0.001
-"""Plausibility with which an attempt ends once nothing better was found nearby, and with which the attempts end [-]."""
-
-_SAME_DEPTH = 2.0
-"""Objectives this close belong to one neighbourhood, whose kinks leave many small minima [-]."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class DiagnosisEffort:
     """How much a diagnosis may compute."""
@@ -357,7 +362,10 @@ def explain(problem: CurveProblem, seeds: SeedTree, effort: DiagnosisEffort) -> 
     noise: such a curve is no near miss, and three more attempts would only repeat that.
     """
     everywhere = Neighbourhood(centre=np.zeros(problem.size), precision=np.eye(problem.size))
-    rough = _rough_weight(problem, everywhere, seeds.child("spread").generator(), effort)
+    curves = problem.curves(problem.deviations(everywhere.drawn(64, seeds.child("spread").generator())))
+    spread = float(np.nanstd(curves)) * effort.rough
+    # The weight of the readings, were they as wrong as the curves of all allowed errors differ.
+    rough = min(1.0, float(np.diag(problem.readings.covariance).mean()) / spread**2)
     found: list[Explanation] = []
     for number in range(effort.attempts):
         found.append(_attempt(problem, everywhere, rough, seeds.child(str(number)), effort))
@@ -381,15 +389,6 @@ def _attempt(
         if vain == _VAIN or (vain > 0 and best.plausible >= _ENOUGH):
             break
     return best
-
-
-def _rough_weight(
-    problem: CurveProblem, everywhere: Neighbourhood, generator: np.random.Generator, effort: DiagnosisEffort
-) -> float:
-    """Return the weight of the readings, were they as wrong as the curves of all allowed errors differ [-]."""
-    curves = problem.curves(problem.deviations(everywhere.drawn(64, generator)))
-    spread = float(np.nanstd(curves)) * effort.rough
-    return min(1.0, float(np.diag(problem.readings.covariance).mean()) / spread**2)
 
 
 def _search(

@@ -22,6 +22,15 @@ from tolalloc.wings.bench.parameters import BIAS, TORQUE, Parameter, box, values
 PEAK_TO_PEAK, CURVE, LOOP = "peak-to-peak", "curve", "loop"
 """Kinds of readings."""
 
+_SAMPLES_AT_ONCE = 16
+"""Curves solved together; each takes some 3 kB an angle for its derivatives [-]."""
+
+LARGE_DRIFT = 0.3
+"""Distance of polynomials' and model's least objective over the standard deviation that makes profiles doubtful [-]."""
+
+_DEGREES = {1: 8, 2: 6, 3: 4, 4: 3, 5: 3}
+"""Parameters → total degree; beyond them 2 [-]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ReadingBlock:
@@ -119,9 +128,6 @@ def _parts(measurements: Measurements) -> Iterator[_Part]:
     for number, loop in enumerate(measurements.loops):
         yield LOOP, number, loop.twist, np.full(loop.twist.size, loop.unit), loop.noise
 
-
-_SAMPLES_AT_ONCE = 16
-"""Curves solved together; each takes some 3 kB an angle for its derivatives [-]."""
 
 _Answer = tuple[tuple[ReadingBlock, ...], Float[np.ndarray, " reading"], Float[np.ndarray, "reading parameter"]]
 
@@ -266,13 +272,6 @@ def _with_same_angles(blocks: tuple[ReadingBlock, ...], measured: Measurements) 
         for group in groups.values()
         for start in range(0, len(group), _SAMPLES_AT_ONCE)
     ]
-
-
-LARGE_DRIFT = 0.3
-"""Distance of polynomials' and model's least objective over the standard deviation that makes profiles doubtful [-]."""
-
-_DEGREES = {1: 8, 2: 6, 3: 4, 4: 3, 5: 3}
-"""Parameters → total degree; beyond them 2 [-]."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.drawings.distributions import RAYLEIGH, Distribution, ndtr
-from tolalloc.drawings.seeds import SamplingDesign, SeedTree, uniform_chunks
+from tolalloc.drawings.seeds import SamplingDesign, SeedTree
 from tolalloc.drawings.sources import Source, limited_measure
 from tolalloc.drawings.zones import Feature, ZoneMapping
 
@@ -27,6 +27,9 @@ _BEYOND = 20
 """Simulated lots that are expected beyond the strictest level of a test [-]."""
 _CHUNK = 2**21
 """Readings of simulated lots that are held at once [-]."""
+
+_TAILS = ((1.0 - CONFIDENCE) / 2.0, (1.0 + CONFIDENCE) / 2.0)
+"""Probabilities at the ends of every interval [-]."""
 
 
 class Gauge(StrEnum):
@@ -184,22 +187,21 @@ class SimulatedLaw:
 
     def shift_probability(self, shift: float) -> float:
         """Return the probability that (x̄ − μ)/σ lies as far out as one, twice the smaller tail [-]."""
-        return _tail(self._sorted[0], shift)
+        return two_sided(shift, self._sorted[0])
 
     def spread_probability(self, ratio: float) -> float:
         """Return the probability that s/σ lies as far out as one, twice the smaller tail [-]."""
-        return _tail(self._sorted[1], ratio)
+        return two_sided(ratio, self._sorted[1])
 
 
-_TAILS = ((1.0 - CONFIDENCE) / 2.0, (1.0 + CONFIDENCE) / 2.0)
-"""Probabilities at the ends of every interval [-]."""
+def two_sided(value: float, lots: Float[np.ndarray, " lot"], above: Float[np.ndarray, " lot"] | None = None) -> float:
+    """Return twice the smaller share of lots, ascending, as far out as a value, which counts as one of them [-].
 
-
-def _tail(lots: Float[np.ndarray, " lot"], value: float) -> float:
-    """Return twice the smaller share of lots, ascending, as far out as a value, which counts as one of them."""
-    below = int(np.searchsorted(lots, value, side="right"))
-    above = lots.size - int(np.searchsorted(lots, value, side="left"))
-    return min(1.0, 2.0 * (min(below, above) + 1) / (lots.size + 1))
+    Lots that are as large may be other ones, as many, than those that are as small.
+    """
+    smaller = int(np.searchsorted(lots, value, side="right"))
+    larger = lots.size - int(np.searchsorted(lots if above is None else above, value, side="left"))
+    return min(1.0, 2.0 * (min(smaller, larger) + 1) / (lots.size + 1))
 
 
 def _ends(lots: Float[np.ndarray, " lot"]) -> tuple[float, float]:
@@ -209,7 +211,7 @@ def _ends(lots: Float[np.ndarray, " lot"]) -> tuple[float, float]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class StatedProcess:
+class GaugedProcess:
     """One reading of a drawing's process, and what lots of it do."""
 
     # Of one reading [m]
@@ -264,9 +266,9 @@ class Lots:
         self.count = min(max(least, ceil(2 * _BEYOND * tests / level)), most)
         self._seeds = SeedTree(seed).child("lot")
         self._parts: dict[tuple[ZoneMapping, Gauge], Float[np.ndarray, " part"]] = {}
-        self._drawn: dict[tuple[ZoneMapping, Gauge, int, GaugeError], StatedProcess] = {}
+        self._drawn: dict[tuple[ZoneMapping, Gauge, int, GaugeError], GaugedProcess] = {}
 
-    def process(self, source: Source, gauge: Gauge, parts: int, error: GaugeError = EXACT) -> StatedProcess:
+    def process(self, source: Source, gauge: Gauge, parts: int, error: GaugeError = EXACT) -> GaugedProcess:
         """Return what the process of a source makes of lots of so many parts, seen through a gauge."""
         mapping, gauge = source.zone_mapping, Gauge.X if gauge is Gauge.Y else gauge
         key = (mapping, gauge, parts, error / source.zone)
@@ -279,7 +281,7 @@ class Lots:
         return replace(unit, mean=mean, deviation=deviation, error=error)
 
     @staticmethod
-    def _normal(mapping: ZoneMapping, gauge: Gauge, parts: int, error: GaugeError) -> StatedProcess | None:
+    def _normal(mapping: ZoneMapping, gauge: Gauge, parts: int, error: GaugeError) -> GaugedProcess | None:
         """Return a process of normal readings per unit of zone, nothing where their distribution is not known."""
         if not isinf(error.freedom):
             return None
@@ -289,11 +291,11 @@ class Lots:
             mean, deviation = 0.0, mapping.wave_deviation
         else:
             return None
-        return StatedProcess(
+        return GaugedProcess(
             mean=mean, deviation=deviation, law=NormalLaw(parts=parts, seen=hypot(1.0, error.deviation / deviation))
         )
 
-    def _simulated(self, source: Source, gauge: Gauge, parts: int, error: GaugeError) -> StatedProcess:
+    def _simulated(self, source: Source, gauge: Gauge, parts: int, error: GaugeError) -> GaugedProcess:
         """Return a process per unit of zone, its lots drawn at random from its parts and read by its gauge."""
         key = (source.zone_mapping, gauge)
         if key not in self._parts:
@@ -317,12 +319,12 @@ class Lots:
             deviations=deviations / deviation,
             gauge=errors / deviation,
         )
-        return StatedProcess(mean=mean, deviation=deviation, law=law)
+        return GaugedProcess(mean=mean, deviation=deviation, law=law)
 
     def _readings(self, source: Source, gauge: Gauge) -> Float[np.ndarray, " part"]:
         """Return what the gauge shows of parts of a process, per unit of zone."""
         seeds, width = self._seeds.child("parts"), len(source.columns)
-        uniform = np.concatenate(list(uniform_chunks(SamplingDesign.SOBOL, seeds, _POINTS, width)))
+        uniform = np.concatenate(list(seeds.uniform_chunks(_POINTS, width, SamplingDesign.SOBOL)))
         columns = source.standard_values(uniform)
         return columns[:, 0] * source.lever if gauge in (Gauge.X, Gauge.Y) else gauged(source, columns)
 

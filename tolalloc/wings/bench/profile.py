@@ -19,6 +19,11 @@ from tolalloc.wings.bench.prediction import AllReadings, Prediction, Predictor, 
 BOX_POINTS, NEAR_POINTS, NEAR = 13, 17, 4.0
 """Values at which a parameter is held: evenly between its bounds, and within so many standard errors of its best."""
 
+RESAMPLES = 400
+
+FEWEST_UNITS = 5
+"""Units below which neither a bootstrap nor leaving one out says anything [-]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterProfile:
@@ -188,11 +193,6 @@ def as_stiffness(
         correlation=correlation[np.ix_(places, places)],
         notes=tuple(notes),
     )
-
-
-RESAMPLES = 400
-FEWEST_UNITS = 5
-"""Units below which neither a bootstrap nor leaving one out says anything [-]."""
 
 
 def bootstrap(

@@ -42,6 +42,48 @@ UNITS = {
 }
 """Column that a file may hold, by its header without unit → unit as written → factor to SI [-]."""
 
+READINGS = 936
+"""Angles of a resampled curve; order 80 has 12 of them per period, and the spline errs by 1e-4 of its amplitude [-]."""
+
+FULL = 2 * READINGS
+"""Most readings that keep their own angles [-].
+
+With less than two readings between knots the spline all but interpolates, and where readings fall between knots it
+amplifies their noise.
+"""
+
+WRAPPED = 24
+"""Knot spacings that a whole turn is continued beyond its ends; a reading's influence falls to 0.4 per spacing [-]."""
+
+TURN = 2.0 * pi
+
+BACKWARD_SHARE = 0.01
+"""Largest share of steps against the direction of rotation, each no longer than the median step [-]."""
+
+SMALLEST_COVER = 0.1
+"""Smallest part of a turn: of the slowest order, one per turn, less shows next to nothing [turn]."""
+
+# A turn is 6.28 rad, so below 7 "degrees" stands at most one turn and its run-out in radians; in degrees it would be
+# a fiftieth of a turn, which is refused anyway, so that the check costs nothing and only finds the better sentence.
+# Few readings are more likely a short piece.
+RADIANS_SPAN, RADIANS_READINGS = 7.0, 50
+
+# More than 50 "radians" would be eight turns of the carrier, longer than a bench turns; in degrees it is the shortest
+# piece that is of use. From 36 to 50 both can be true, and the header is believed.
+DEGREES_SPAN = 50.0
+
+MISSING_SHARE = 0.05
+"""Largest share of readings without a number; an instrument that loses more is not trusted with the rest [-]."""
+
+SAME_ANGLE = 1e-9
+"""Angles this close are one angle: rounding of several turns to one, far below any encoder [rad]."""
+
+LARGEST_RANGE = DEGREE
+"""Largest range of errors and twists that is believed: reducers stay far below it, wrong units do not [rad]."""
+
+SAME_TORQUE = 1e-9
+"""Torques this close, over the largest, are one torque [-]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class RawReadings:
@@ -69,7 +111,8 @@ def read_column(table: TextTable, name: str) -> tuple[str, float, Float[np.ndarr
     InputError
         The column is missing or there twice, its unit is missing or unknown, or a cell holds text.
     """
-    headers = [header for header in table.headers if _same_name(header, name)]
+    wanted = name.replace("_", " ")
+    headers = [own for own in table.headers if split_header(own)[0].lower().replace("_", " ") == wanted]
     known = UNITS[name]
     units = " or ".join(known)
     if not headers:
@@ -120,10 +163,6 @@ def _reading(cell: str, place: str, header: str) -> float:
     return value
 
 
-def _same_name(header: str, name: str) -> bool:
-    return split_header(header)[0].lower().replace("_", " ") == name.replace("_", " ")
-
-
 def load_readings(path: Path, along: str, values: str) -> RawReadings:
     """Return the two columns of a file in SI units; columns of other names are not read.
 
@@ -138,12 +177,7 @@ def load_readings(path: Path, along: str, values: str) -> RawReadings:
     header, factor, places = read_column(table, along)
     value_header, value_factor, shown = read_column(table, values)
     for name, column, unit in ((header, places, factor), (value_header, shown, value_factor)):
-        finite = column[np.isfinite(column)]
-        if finite.size > 1 and np.ptp(finite) == 0:
-            raise InputError(
-                f"{path}: all {finite.size} values of column {name!r} are {finite[0] / unit:.6g}; an instrument that "
-                "does not move is no measurement."
-            )
+        require_moving(path, name, column[np.isfinite(column)] / unit)
     return RawReadings(
         path=path,
         header=header,
@@ -153,6 +187,15 @@ def load_readings(path: Path, along: str, values: str) -> RawReadings:
         values=shown,
         averaged=np.ones(len(table.rows)),
     )
+
+
+def require_moving(path: Path, header: str, values: Float[np.ndarray, " reading"]) -> None:
+    """Raise if all readings of a column, in its own unit, are equal."""
+    if values.size > 1 and np.ptp(values) == 0:
+        raise InputError(
+            f"{path}: all {values.size} values of column {header!r} are {values[0]:.6g}; an instrument that does not "
+            "move is no measurement."
+        )
 
 
 def require_torque(file: Path, torque: float) -> None:
@@ -176,20 +219,6 @@ def require_readings(readings: RawReadings, what: str) -> None:
     """Raise unless enough readings are left for a shape."""
     if readings.along.size < FEWEST:
         raise InputError.at(readings.path, f"the number of {what}s", readings.along.size, f"{FEWEST} or more")
-
-
-READINGS = 936
-"""Angles of a resampled curve; order 80 has 12 of them per period, and the spline errs by 1e-4 of its amplitude [-]."""
-
-FULL = 2 * READINGS
-"""Most readings that keep their own angles [-].
-
-With less than two readings between knots the spline all but interpolates, and where readings fall between knots it
-amplifies their noise.
-"""
-
-WRAPPED = 24
-"""Knot spacings that a whole turn is continued beyond its ends; a reading's influence falls to 0.4 per spacing [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -271,24 +300,6 @@ def _variance(
     for offset in range(4):
         bands[3 - offset, offset:] = gram.diagonal(offset)
     return np.asarray(np.einsum("ij,ji->i", wanted, solveh_banded(bands, wanted.T)))
-
-
-TURN = 2.0 * pi
-
-BACKWARD_SHARE = 0.01
-"""Largest share of steps against the direction of rotation, each no longer than the median step [-]."""
-
-SMALLEST_COVER = 0.1
-"""Smallest part of a turn: of the slowest order, one per turn, less shows next to nothing [turn]."""
-
-# A turn is 6.28 rad, so below 7 "degrees" stands at most one turn and its run-out in radians; in degrees it would be
-# a fiftieth of a turn, which is refused anyway, so that the check costs nothing and only finds the better sentence.
-# Few readings are more likely a short piece.
-RADIANS_SPAN, RADIANS_READINGS = 7.0, 50
-
-# More than 50 "radians" would be eight turns of the carrier, longer than a bench turns; in degrees it is the shortest
-# piece that is of use. From 36 to 50 both can be true, and the header is believed.
-DEGREES_SPAN = 50.0
 
 
 def in_stated_unit(readings: RawReadings) -> tuple[RawReadings, str]:
@@ -401,19 +412,6 @@ def whole_turns(readings: RawReadings) -> tuple[RawReadings, str]:
         kept = kept.chosen(np.argsort(kept.along, kind="stable"))
         sentences.append(f"{kept.along.size} readings of {turns} turns folded onto one")
     return kept, "; ".join(sentences)
-
-
-MISSING_SHARE = 0.05
-"""Largest share of readings without a number; an instrument that loses more is not trusted with the rest [-]."""
-
-SAME_ANGLE = 1e-9
-"""Angles this close are one angle: rounding of several turns to one, far below any encoder [rad]."""
-
-LARGEST_RANGE = DEGREE
-"""Largest range of errors and twists that is believed: reducers stay far below it, wrong units do not [rad]."""
-
-SAME_TORQUE = 1e-9
-"""Torques this close, over the largest, are one torque [-]."""
 
 
 Step = Callable[[RawReadings], tuple[RawReadings, str]]

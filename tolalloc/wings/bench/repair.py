@@ -14,12 +14,12 @@ from pydantic import AfterValidator, Field
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawings.distributions import ndtr
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.sources import Source, known_as, limited_measure, meant
+from tolalloc.drawings.sources import Source, known_as, meant
 from tolalloc.exceptions import Faults, SolveError, UnknownNameError
 from tolalloc.reading.files import Record, read_toml, validated
 from tolalloc.reading.units import MICROMETRE, currency_in
 from tolalloc.reducers.response.kernel import KernelResponse
-from tolalloc.wings.bench.posterior import GaugeReading
+from tolalloc.wings.bench.posterior import GaugeReading, gauges_shown
 
 KEEP, SCRAP = "leave it as it is", "scrap it"
 """Decisions besides the change of a part."""
@@ -209,11 +209,9 @@ def advised(
 ) -> Advice:
     """Return what to do with a unit that is equally likely to be each of these, and what to measure before."""
     decisions, costs = repair_costs(kernel, errors, units, repair, generator)
-    owner, readings = np.array(errors.source_of_column), []
+    shown, readings = gauges_shown(errors, errors.active, units), []
     for at, minutes, gauge in repair.candidates(errors.active):
-        source = errors.active[at]
-        shown = limited_measure(source, units[:, owner == source.name])
-        readings.append(worth_of(source.name, costs, shown, gauge, minutes, repair.minute))
+        readings.append(worth_of(errors.active[at].name, costs, shown[:, at], gauge, minutes, repair.minute))
     return Advice(
         decisions=decisions,
         cost=costs.mean(axis=0),

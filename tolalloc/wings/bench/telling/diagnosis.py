@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE
-from tolalloc.reports.columns import Column, Table
+from tolalloc.reports.columns import Column, Table, of_positions
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.teller import Teller
@@ -29,57 +29,44 @@ _say = Sentences("diagnosis", "tolalloc.wings.bench")
 
 @dataclass(frozen=True, kw_only=True)
 class _Gauged:
-    """What the gauge of one source would show, or one column of it: mean and 95 % interval [µm]."""
+    """What the gauge of one source would show: mean and 95 % interval [µm]."""
 
     name: str
     mean: float
     low: float
     high: float
-    zone: float = 0.0  # What the drawing allows [µm]
-    probability: float = 0.0  # Of being the dominant source [-]
-    named: bool = False  # Whether it is among those that hold the dominant one
+    zone: float  # What the drawing allows [µm]
+    probability: float  # Of being the dominant source [-]
+    named: bool  # Whether it is among those that hold the dominant one
 
 
-_MEAN: tuple[Column[_Gauged], ...] = (
-    Column(header="low 2.5 % [µm]", value=lambda row: row.low),
-    Column(header="high 97.5 % [µm]", value=lambda row: row.high),
-)
 _SOURCES: tuple[Column[_Gauged], ...] = (
-    Column(header="source", value=lambda row: row.name),
-    Column(header="P(dominant) [%]", value=lambda row: row.probability * 100),
-    Column(header="named", value=lambda row: "yes" if row.named else "no"),
-    Column(header="reading [µm]", value=lambda row: row.mean),
-    *_MEAN,
-    Column(header="zone [µm]", value=lambda row: row.zone),
-)
-_COLUMNS: tuple[Column[_Gauged], ...] = (
-    Column(header="column", value=lambda row: row.name),
-    Column(header="mean [µm]", value=lambda row: row.mean),
-    *_MEAN,
+    Column("source", lambda row: row.name),
+    Column("P(dominant) [%]", lambda row: row.probability * 100),
+    Column("named", lambda row: "yes" if row.named else "no"),
+    Column("reading [µm]", lambda row: row.mean),
+    Column("low 2.5 % [µm]", lambda row: row.low),
+    Column("high 97.5 % [µm]", lambda row: row.high),
+    Column("zone [µm]", lambda row: row.zone),
 )
 _GROUPS: tuple[Column[tuple[int, InseparableColumns, int]], ...] = (
-    Column(header="group [-]", value=lambda row: row[0]),
-    Column(header="column", value=lambda row: row[1].columns[row[2]]),
-    Column(header="spread alone over the drawing's [-]", value=lambda row: row[1].alone[row[2]]),
-    Column(header="weight in the known sum [-]", value=lambda row: row[1].combination[row[2]]),
-    Column(header="known sum over the drawing's spread [-]", value=lambda row: row[1].value),
-    Column(header="its spread over the drawing's [-]", value=lambda row: row[1].together),
+    Column("group [-]", lambda row: row[0]),
+    Column("column", lambda row: row[1].columns[row[2]]),
+    Column("spread alone over the drawing's [-]", lambda row: row[1].alone[row[2]]),
+    Column("weight in the known sum [-]", lambda row: row[1].combination[row[2]]),
+    Column("known sum over the drawing's spread [-]", lambda row: row[1].value),
+    Column("its spread over the drawing's [-]", lambda row: row[1].together),
 )
 _NEXT: tuple[Column[NextReading], ...] = (
-    Column(header="source", value=lambda row: row.source, terminal=1),
-    Column(header="gauge minutes [min]", value=lambda row: row.minutes, terminal=1),
-    Column(header="standard deviation of the gauge [µm]", value=lambda row: row.gauge / MICROMETRE),
-    Column(header="expected cost before [{cost}]", value=lambda row: row.before),
-    Column(header="expected cost after [{cost}]", value=lambda row: row.after, terminal=1),
-    Column(header="standard error of what it saves [{cost}]", value=lambda row: row.error),
-    Column(header="saved per minute [{cost}]", value=lambda row: row.gain_per_minute, terminal=1),
-    Column(header="saved beyond its minutes [{cost}]", value=lambda row: row.worth, terminal=1),
-    Column(header="pays", value=lambda row: "yes" if row.pays else "no", terminal=1),
-)
-_DECISIONS: tuple[Column[tuple[str, float, float]], ...] = (
-    Column(header="decision", value=lambda row: row[0]),
-    Column(header="expected cost [{cost}]", value=lambda row: row[1]),
-    Column(header="standard error [{cost}]", value=lambda row: row[2]),
+    Column("source", lambda row: row.source, terminal=1),
+    Column("gauge minutes [min]", lambda row: row.minutes, terminal=1),
+    Column("standard deviation of the gauge [µm]", lambda row: row.gauge / MICROMETRE),
+    Column("expected cost before [{cost}]", lambda row: row.before),
+    Column("expected cost after [{cost}]", lambda row: row.after, terminal=1),
+    Column("standard error of what it saves [{cost}]", lambda row: row.error),
+    Column("saved per minute [{cost}]", lambda row: row.gain_per_minute, terminal=1),
+    Column("saved beyond its minutes [{cost}]", lambda row: row.worth, terminal=1),
+    Column("pays", lambda row: "yes" if row.pays else "no", terminal=1),
 )
 
 
@@ -112,17 +99,14 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
         return Table(name="sources", columns=_SOURCES, rows=self._gauged)
 
     @property
-    def _columns(self) -> Table[_Gauged]:
+    def _columns(self) -> Table[int]:
         """Every column with its interval."""
         found = self.result.diagnosis
         levers = [source.lever for source in self.result.errors.active for _ in source.columns]
         scale = np.array(levers) / MICROMETRE
-        (low, high), mean = found.column_interval * scale, found.column_mean * scale
-        rows = [
-            _Gauged(name=name, mean=float(mean[at]), low=float(low[at]), high=float(high[at]))
-            for at, name in enumerate(found.columns)
-        ]
-        return Table(name="columns", columns=_COLUMNS, rows=rows)
+        low, high = found.column_interval * scale
+        shown = {"mean [µm]": found.column_mean * scale, "low 2.5 % [µm]": low, "high 97.5 % [µm]": high}
+        return of_positions("columns", {"column": found.columns, **shown})
 
     @property
     def _groups(self) -> Table[tuple[int, InseparableColumns, int]]:
@@ -135,11 +119,10 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
     def _next(self) -> Table[NextReading]:
         return Table(name="next", columns=_NEXT, rows=self.result.advice.readings if self.result.advice else ())
 
-    @cached_property
-    def _decisions(self) -> Table[tuple[str, float, float]]:
-        found = self.result.advice
-        rows = zip(found.decisions, found.cost.tolist(), found.error.tolist(), strict=True) if found else ()
-        return Table(name="decisions", columns=_DECISIONS, rows=sorted(rows, key=lambda row: row[1]))
+    def _decisions(self, found: Advice) -> Table[int]:
+        """Return what every decision is expected to cost, the cheapest first."""
+        costs = {"expected cost [{cost}]": found.cost, "standard error [{cost}]": found.error}
+        return of_positions("decisions", {"decision": found.decisions, **costs}, np.argsort(found.cost, kind="stable"))
 
     def _advised(self, found: Advice) -> str:
         """Return what to measure next, or that nothing is worth its time, and what to do without it."""
@@ -246,7 +229,7 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
         if not advice:
             return {}
         measure = advice.next.source if advice.next else None
-        tables = {"readings": self._next.records(), "decisions": self._decisions.records()}
+        tables = {"readings": self._next.records(), "decisions": self._decisions(advice).records()}
         return {"measure next": measure, "decision": advice.best, **tables}
 
     @property
@@ -283,10 +266,10 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
 
     @property
     def _advice_section(self) -> tuple[Section, ...]:
-        if not self.result.advice:
+        unit, advice = self.header.cost_unit, self.result.advice
+        if not advice:
             return ()
-        unit = self.header.cost_unit
-        tables = (("next", self._next.frame(unit)), ("decisions", self._decisions.frame(unit)))
+        tables = (("next", self._next.frame(unit)), ("decisions", self._decisions(advice).frame(unit)))
         return (Section(heading=_say("next_heading"), paragraphs=(_say("next_meaning"),), tables=tables),)
 
     def _dominant_figure(self) -> Figure:
@@ -295,7 +278,7 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
             name="dominant",
             title=_say("dominant_figure"),
             x_label="probability of being the dominant source [%]",
-            series=(Series(label="probability", kind="bars", x=names, y=shares),),
+            series=(Series.bars("probability", names, shares),),
         )
 
     def _reading_figure(self) -> Figure:
@@ -305,13 +288,12 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
             title=_say("readings_figure"),
             x_label="reading over zone [-]",
             series=(
-                Series(
-                    label="mean and 95 % interval",
-                    kind="bars",
-                    x=[row.name for row in rows],
-                    y=[row.mean / row.zone for row in rows],
-                    low=[row.low / row.zone for row in rows],
-                    high=[row.high / row.zone for row in rows],
+                Series.bars(
+                    "mean and 95 % interval",
+                    [row.name for row in rows],
+                    [row.mean / row.zone for row in rows],
+                    [row.low / row.zone for row in rows],
+                    [row.high / row.zone for row in rows],
                 ),
             ),
             vertical=((1.0, "zone"),),
@@ -331,8 +313,8 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
                 x_label=axis,
                 y_label="transmission error [arcsec]",
                 series=(
-                    Series(label="measured", kind="points", x=angle, y=measured),
-                    Series(label="model, mean and 95 % band", kind="line", x=angle, y=fitted, low=low, high=high),
+                    Series.points("measured", angle, measured),
+                    Series.line("model, mean and 95 % band", angle, fitted, low, high),
                 ),
             ),
             Figure(
@@ -340,7 +322,7 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
                 title=_say("left_figure"),
                 x_label=axis,
                 y_label="transmission error [arcsec]",
-                series=(Series(label="measured less model", kind="line", x=angle, y=left),),
+                series=(Series.line("measured less model", angle, left),),
                 horizontal=((0.0, ""),),
             ),
         )

@@ -37,10 +37,10 @@ _SMALL = 0.05
 _say = Sentences("identification", "tolalloc.wings.bench")
 
 _ESTIMATES: tuple[Column[ParameterEstimate], ...] = (
-    Column(header="parameter", value=lambda row: f"{row.parameter.symbol} [{row.parameter.unit}]"),
-    Column(header="given", value=lambda row: row.parameter.start),
-    Column(header="identified", value=lambda row: row.value if row.identified else "no"),
-    Column(header="95 % interval", value=lambda row: _interval(row.interval)),
+    Column("parameter", lambda row: f"{row.parameter.symbol} [{row.parameter.unit}]"),
+    Column("given", lambda row: row.parameter.start),
+    Column("identified", lambda row: row.value if row.identified else "no"),
+    Column("95 % interval", lambda row: _interval(row.interval)),
 )
 """What a person reads first of every parameter."""
 
@@ -310,7 +310,7 @@ class IdentificationTeller(Teller[IdentificationResult]):
             "written": [f"{row.value:.4g}" for row in own.estimates],
             "standard uncertainty": [uncertainty(row) for row in own.estimates],
         }
-        return of_positions("parameters", columns, range(len(items)))
+        return of_positions("parameters", columns)
 
     @property
     def _directions(self) -> Table[int]:
@@ -328,7 +328,7 @@ class IdentificationTeller(Teller[IdentificationResult]):
             "left by the bounds alone [%]": [100 * own.half_width for own in found],
             "fixed": [_yes(own.is_fixed) for own in found],
         }
-        return of_positions("directions", columns, range(len(found)))
+        return of_positions("directions", columns)
 
     @property
     def _choices(self) -> Table[ParameterChoice]:
@@ -337,16 +337,16 @@ class IdentificationTeller(Teller[IdentificationResult]):
 
         def rms(kind: str, *, unseen: bool) -> Column[ParameterChoice]:
             return Column(
-                header=f"{kind}, {'units left out, ' if unseen else ''}rms [arcsec]",
-                value=lambda row: row.rms(data, kind, unseen=unseen) / ARCSECOND,
+                f"{kind}, {'units left out, ' if unseen else ''}rms [arcsec]",
+                lambda row: row.rms(data, kind, unseen=unseen) / ARCSECOND,
             )
 
         columns: tuple[Column[ParameterChoice], ...] = (
-            Column(header="fitted", value=choice_name, terminal=True),
-            Column(header="parameters [-]", value=lambda row: len(row.parameters)),
+            Column("fitted", choice_name, terminal=True),
+            Column("parameters [-]", lambda row: len(row.parameters)),
             *(rms(kind, unseen=unseen) for kind in data.kinds for unseen in (False, True)),
-            Column(header="units left out, over noise [-]", value=lambda row: row.score, terminal=True),
-            Column(header="chosen", value=lambda row: "yes" if chosen is row else "", terminal=True),
+            Column("units left out, over noise [-]", lambda row: row.score, terminal=True),
+            Column("chosen", lambda row: "yes" if chosen is row else "", terminal=True),
         )
         return Table(name="choices", columns=columns, rows=self.result.choices)
 
@@ -381,7 +381,7 @@ class IdentificationTeller(Teller[IdentificationResult]):
                 continue
             shown = own.rise <= _TOP * own.threshold
             change = [100 * (item.value(float(at)) / item.start - 1) for at in own.coordinate[shown]]
-            series.append(Series(label=item.symbol, kind="line", x=change, y=list(own.rise[shown])))
+            series.append(Series.line(item.symbol, change, own.rise[shown]))
         return Figure(
             name="profiles",
             title=_say("profiles_figure"),
@@ -412,9 +412,7 @@ class IdentificationTeller(Teller[IdentificationResult]):
             title=_say("peak_to_peak_figure"),
             x_label="unit [-]",
             y_label="model less measured [arcsec]",
-            series=tuple(
-                Series(label=label, kind="points", x=numbers, y=list(left)) for label, left in self._left(rows)
-            ),
+            series=tuple(Series.points(label, numbers, left) for label, left in self._left(rows)),
             horizontal=((0.0, ""),),
         )
 
@@ -441,7 +439,7 @@ class IdentificationTeller(Teller[IdentificationResult]):
                 y_label=y_label,
                 series=(
                     Series(label="measured", kind=drawn, x=x, y=measured),
-                    Series(label="model", kind="line", x=x, y=model),
+                    Series.line("model", x, model),
                 ),
             ),
             Figure(
@@ -449,9 +447,7 @@ class IdentificationTeller(Teller[IdentificationResult]):
                 title=_say("left_figure", unit=name),
                 x_label=axis,
                 y_label="model less measured [arcsec]",
-                series=tuple(
-                    Series(label=label, kind="line", x=x, y=list(own)) for label, own in self._left(block.rows)
-                ),
+                series=tuple(Series.line(label, x, own) for label, own in self._left(block.rows)),
             ),
         )
 
@@ -461,7 +457,7 @@ class IdentificationTeller(Teller[IdentificationResult]):
         series = []
         for label, left in self._left(own):
             rms = [float(np.sqrt((left[data.unit[own] == unit] ** 2).mean())) for unit in data.units]
-            series.append(Series(label=label, kind="bars", x=names, y=rms))
+            series.append(Series.bars(label, names, rms))
         return Figure(
             name=f"{kind}_residuals",
             title=_say("residuals_figure", kind=kind),
