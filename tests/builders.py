@@ -20,19 +20,23 @@ import tolalloc as ta
 from tests.import_graph import PACKAGE
 from tolalloc.allocation.front.pareto_problem import SearchedDesigns
 from tolalloc.allocation.space.design_space import DesignSpace
-from tolalloc.allocation.space.requirement import Requirement
+from tolalloc.allocation.space.requirement import Guarantee, Requirement, RootSumSquare
 from tolalloc.allocation.verify.verification import Verifier
 from tolalloc.capability.indices import Limits
 from tolalloc.drawings.correlation import Correlation
+from tolalloc.drawings.distributions import Distribution
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.measured_parts import MeasuredParts, StatedProcess
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.table_file import DATA
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import TolallocError
+from tolalloc.models.function_model import FunctionModel
 from tolalloc.models.model import Evaluation
+from tolalloc.reading.units import MILLIMETRE
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import Orders
 from tolalloc.reducers.reducer.design import Reducer
@@ -118,6 +122,28 @@ def study_of_lengths(drawing: ta.Drawing, **changes: Any) -> ta.Study:
     own = {"questions": [ta.Allocation(front=False, what_if=False)], "effort": "quick", **changes}
     model = ta.model(summed, inputs=dict.fromkeys("abc", 0.0), outputs=("length [mm]",))
     return ta.Study(model, drawing, limits={"length [mm]": ta.Limit(lower=-0.03, upper=0.03)}, **own)
+
+
+def measured_size(parts: int) -> ErrorModel:
+    """Return one size whose measured parts have mean 0 and σ = 1 [m]; half its zone is 3σ."""
+    stated = StatedProcess(mean=0.0, deviation=1.0, parts=parts)
+    made = MeasuredParts(path=Path("parts.csv"), values=(), are_radii=False, zone=6.0, middle=0.0, stated=stated)
+    return ErrorModel((source("x1", distribution=Distribution.EMPIRICAL, measured=made),))
+
+
+def verifier_of_sum(*zones: float, limit: float, guarantee: Guarantee | None = None) -> Verifier:
+    """Return what verifies designs of y = Σ xᵢ ≤ limit, xᵢ normal of σᵢ = zoneᵢ/6 [mm].
+
+    Every zone costs 1, in proportion to 1/zone. Unless another guarantee is given, √(Σ (zoneᵢ/2)²) must keep the limit.
+    """
+    names = tuple(f"x{at}" for at in range(1, len(zones) + 1))
+    errors = ErrorModel(
+        tuple(source(name, zone=zone * MILLIMETRE, group=name) for name, zone in zip(names, zones, strict=True))
+    )
+    model = FunctionModel(function=lambda *x: sum(x), inputs=names, outputs=("y [mm]",)).bound(errors, "")
+    shown = Requirement(output="y [mm]", limits=Limits(upper=limit), guarantee=guarantee or RootSumSquare())
+    space = DesignSpace(errors=errors)
+    return Verifier(space=space, model=model, requirements=(shown,), seeds=SeedTree(1), units=2000)
 
 
 @dataclass(frozen=True)

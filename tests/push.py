@@ -7,7 +7,7 @@
 
 A push is what has changed since the last whole run. Of the slow tests it gets those that every push runs, an eighth of
 the others, another one at each commit, and the nearest to what has changed, by the number of imports between, until
-its time is used up, four minutes of it at least.
+its time is used up, two minutes of it at least.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ TURNS = 8
 """Commits within which every slow test is run once [-]."""
 TIME = 1150.0
 """What the slow tests of a push may take on one core [s]."""
-NEAR = 240.0
+NEAR = 120.0
 """What of it the nearest may take at least, however long those of every push and the turn take [s]."""
 NEW = 10.0
 """What a test, or the fixtures of a file, are taken to take that the last whole run does not tell [s]."""

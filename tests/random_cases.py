@@ -21,7 +21,7 @@ from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.design import Clearances, CycloidStage, FirstStage, Load, Modification, Reducer
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.stiffness import Material, Stiffness
-from tolalloc.wings.assembly.chain import DatumFlowChain, Part
+from tolalloc.wings.assembly.chain import ChainPart, DatumFlowChain
 from tolalloc.wings.assembly.plan import AssemblyPlan
 from tolalloc.wings.assembly.steps import AssemblyStep
 
@@ -311,7 +311,7 @@ def random_plan(seed: int) -> AssemblyPlan:
     generator = np.random.default_rng(seed)
     names = [f"KC{number}" for number in range(1, int(generator.integers(4, 8)))]
     parts = tuple(
-        Part(
+        ChainPart(
             name=name,
             on=str(generator.choice(["KC0", *names[:at]])),
             turned=tuple(generator.uniform(-np.pi, np.pi, 3).tolist()),

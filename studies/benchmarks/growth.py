@@ -26,10 +26,9 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import tolalloc as ta
 from tests.builders import prepared
 from tests.random_cases import DISC_TILT, random_units
-from tests.verification.test_allocation_program import compiled, random_problem
+from tests.verification.test_process_choice import compiled, random_problem
 from tolalloc.allocation.cost.model import Process, ReciprocalPower
 from tolalloc.allocation.search import process_choice
-from tolalloc.allocation.search.convex_program import front
 from tolalloc.allocation.search.discrete import DiscreteProblem, feature_options
 from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Stack
 from tolalloc.capability.experiment import Experiment
@@ -182,7 +181,8 @@ def along_front(designs: int) -> Work:
     problem = random_problem(SEED, features=30, processes=1, stacks=2)
     program, stacks = compiled(problem), problem.stacks
     budgets = stacks[0].budget * np.linspace(0.8, 1.4, designs)
-    return lambda: front(program, stacks, 0, budgets)
+    points = [(replace(stacks[0], budget=own), *stacks[1:]) for own in budgets.tolist()]
+    return lambda: [program.solve(point) for point in points]
 
 
 def along_front_of_processes(designs: int) -> Work:

@@ -23,10 +23,11 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import ndtr
 
+from tests.builders import verifier_of_sum
 from tolalloc.allocation.search.zone_allocation import allocate, scale_in_proportion
 from tolalloc.allocation.space.effort import SearchEffort
 from tolalloc.allocation.space.requirement import AtYield
-from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, verifier_of_sum
+from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier
 from tolalloc.capability.indices import Limits
 from tolalloc.drawings.distributions import Distribution
 from tolalloc.drawings.error_model import ErrorModel

@@ -35,7 +35,7 @@ def row(case: RareCase, seeds: int) -> dict[str, Any]:
     ]
     estimates = np.array([item.estimate.probability for item in found])
     errors = np.array([item.estimate.standard_error for item in found])
-    cautioned = np.array([not item.estimate.trustworthy for item in found])
+    cautioned = np.array([bool(item.estimate.cautions) for item in found])
     factors = np.maximum(estimates, case.exact) / np.maximum(np.minimum(estimates, case.exact), np.finfo(float).tiny)
     return {
         "case": case.name,

@@ -85,7 +85,7 @@ def compared(response: Response, values: Float[np.ndarray, " unit"], limit: floa
         share=counted / values.size,
         estimates=tuple(own.probability for own in found),
         errors=tuple(own.standard_error for own in found),
-        cautioned=sum(not own.trustworthy for own in found),
+        cautioned=sum(bool(own.cautions) for own in found),
     )
 
 

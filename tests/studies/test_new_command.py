@@ -14,7 +14,6 @@ import tolalloc as ta
 from tests.studies.command import answer_of, refused, tolalloc
 from tolalloc.allocation.cost.process_costs import load_process_costs
 from tolalloc.cli.main import EXAMPLES, app
-from tolalloc.cli.samples import FACTOR
 from tolalloc.cli.start import modification_of
 from tolalloc.drawings.drawing import load_drawing
 from tolalloc.reading.units import ARCSECOND
@@ -24,6 +23,7 @@ from tolalloc.reducers.families.rv import RV
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.wings.assembly.files import load_errors, load_plan
 from tolalloc.wings.bench.measurements import load_measurements
+from tolalloc.wings.bench.samples import FACTOR
 
 
 @pytest.mark.slow

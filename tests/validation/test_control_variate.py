@@ -13,7 +13,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.ranking import percentile_interval
 from tolalloc.sensitivity.saltelli import SaltelliDesign, SaltelliIndices, saltelli_indices
-from tolalloc.sensitivity.surrogate.control_variate import Control, cheap_model
+from tolalloc.sensitivity.surrogate.control_variate import CheapAnswers, cheap_model
 
 Function = Callable[[np.ndarray], np.ndarray]
 WEIGHTS = np.array([1.0, 2.0, 0.5, 0.1])
@@ -78,7 +78,7 @@ def analysed(name: str, seed: int, cheap: Function | None = None) -> dict[bool, 
         for own, blocks in ((2 * seed + 1, BLOCKS), (2 * seed + 2, CHEAP_BLOCKS))
     )
     answer = cheap or learnt(name)
-    control = Control(own=answer(x)[:, np.newaxis], many=answer(many)[:, np.newaxis])
+    control = CheapAnswers(own=answer(x)[:, np.newaxis], many=answer(many)[:, np.newaxis])
     answers = good(function(x))
     return {
         own: saltelli_indices(answers, first.size, SeedTree(seed), control=control if own else None)

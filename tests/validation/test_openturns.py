@@ -13,10 +13,10 @@ from operator import add
 import numpy as np
 import pytest
 
-from tests.builders import source
+from tests.builders import Sum, source
 from tests.first_order import design_point
 from tests.reliability import FOUR_BRANCHES, MARGINS, PROBLEMS, problem
-from tolalloc.capability.experiment import Experiment, SumOfSizes
+from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.limit_state import RareFailure, ResponseLimit
 from tolalloc.capability.rare_failure import scaled_sigma_sampling, subset_simulation
 from tolalloc.drawings.error_model import ErrorModel
@@ -41,7 +41,7 @@ def stack() -> ResponseLimit:
     """Return the limit of a chain of sizes as a drawing states them."""
     forms = {name: Distribution.UNIFORM if name in UNIFORM else Distribution.NORMAL for name in ZONES}
     errors = ErrorModel(tuple(source(name, zone=zone, distribution=forms[name]) for name, zone in ZONES.items()))
-    return ResponseLimit(experiment=Experiment.of(SumOfSizes(errors.columns), errors, SeedTree(1)), limit=LIMIT)
+    return ResponseLimit(experiment=Experiment.of(Sum(errors.columns), errors, SeedTree(1)), limit=LIMIT)
 
 
 def theirs(kind, first, second):
@@ -97,7 +97,7 @@ def ours(name):
 
 def require_same(found: RareFailure, probability: float, error: float) -> None:
     """Require two estimates within three standard errors of their difference, and that neither is a guess."""
-    assert found.trustworthy
+    assert not found.cautions
     assert 0 < found.coefficient_of_variation < 0.12
     assert 0 <= error / probability < 0.12
     assert abs(found.probability - probability) <= 3 * np.hypot(found.standard_error, error)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.wings.assembly.chain import DatumFlowChain, Part
+from tolalloc.wings.assembly.chain import ChainPart, DatumFlowChain
 from tolalloc.wings.assembly.control import kalman_filter, regulator
 from tolalloc.wings.assembly.gains import final_errors, norms, state_weight_sweep
 from tolalloc.wings.assembly.plan import AssemblyPlan
@@ -22,10 +22,10 @@ OPPOSITE = (0.0, 0.0, np.pi)
 BX40E = DatumFlowChain(
     datum="KC0",
     parts=(
-        Part(name="KC1", on="KC0"),
-        Part(name="KC2", on="KC1", position=(0.0, 0.045, 0.012)),
-        Part(name="KC3", on="KC0", turned=OPPOSITE, position=(0.0, 0.0, 0.02)),
-        Part(name="KC4", on="KC3", turned=OPPOSITE, position=(0.0, -0.045, 0.032)),
+        ChainPart(name="KC1", on="KC0"),
+        ChainPart(name="KC2", on="KC1", position=(0.0, 0.045, 0.012)),
+        ChainPart(name="KC3", on="KC0", turned=OPPOSITE, position=(0.0, 0.0, 0.02)),
+        ChainPart(name="KC4", on="KC3", turned=OPPOSITE, position=(0.0, -0.045, 0.032)),
     ),
 )
 ERRORS = ARCSECOND * np.round(np.random.default_rng(20250711).uniform(-60, 60, 12), 2)
@@ -61,7 +61,7 @@ def test_the_norm_of_the_final_errors_over_the_precision_weight(adjust, expected
 
 @pytest.mark.parametrize("precision", [0.0, 0.3, 1.0, 10.0, 2500.0])
 def test_one_planar_chain_of_two_parts_ends_at_the_exact_fractions(precision):
-    pair = DatumFlowChain(datum="KC0", parts=(Part(name="KC1", on="KC0"), Part(name="KC2", on="KC1")))
+    pair = DatumFlowChain(datum="KC0", parts=(ChainPart(name="KC1", on="KC0"), ChainPart(name="KC2", on="KC1")))
     space = state_space(pair, steps_in_order(pair, "current", "current", Efforts()))
     first, second = errors = np.array([[37.0, -11.0, 4.0], [5.0, 23.0, -60.0]]) * ARCSECOND
     final = foreseen(space, regulator(space, precision * np.eye(6)), errors.ravel()).adjusted[-1]

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import brentq
 
-from tests.verification.test_cycloid_profile import modified_points, path_bend
+from tests.verification.test_tooth_profile import modified_points, path_bend
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
 from tolalloc.reducers.reducer.design import CycloidStage, Modification
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -29,11 +30,12 @@ verifier_of = partial(builders.verifier_of, slope_units=64)
 class KnownSample(OutputSample):
     """A trial whose values are known."""
 
-    design, groups, failed, confidence = np.array([1.0, 2.0, 3.0, 4.0]), 2, 0, 0.95
-    law = near = doubt = None
+    design, groups, confidence = np.array([1.0, 2.0, 3.0, 4.0]), 2, 0.95
+    law = near = uncertainty = None
 
     def __init__(self, values, failed=0, confidence=0.95):
-        vars(self).update(values=values, failed=failed, output="x [mm]", confidence=confidence)
+        units = SimpleNamespace(standard=np.zeros((len(values) + failed, 0)))
+        vars(self).update(values=values, units=units, output="x [mm]", confidence=confidence)
 
     def derived(self):
         return self.values, np.outer(self.values, [1.0, 0.0, 0.0, 0.0]) / self.design[0]

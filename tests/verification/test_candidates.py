@@ -9,12 +9,11 @@ import pytest
 import tolalloc as ta
 from tests.builders import says
 from tolalloc.allocation.result import AllocationResult
-from tolalloc.allocation.search.candidates import ALIKE, GRADES, TABLE
+from tolalloc.allocation.search.candidates import ALIKE, FREE, GRADES, TABLE
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.reports.header import Header
 from tolalloc.reports.tellers.allocation_drawing import sources_table
-from tolalloc.reports.tellers.allocation_sentences import free_label
 from tolalloc.study.answer import Answer
 
 ZONE = {"plus": 0.01, "minus": -0.01, "unit": "mm", "min": 0.005, "max": 0.1, "cost": 1}
@@ -78,10 +77,10 @@ def test_a_table_that_costs_less_is_kept_and_said_to_be(graded):
 
 
 def test_where_grades_are_asked_for_no_other_zones_are_drawn(graded):
-    admitted = graded.candidates.admitted(free_label(graded))
+    admitted = graded.candidates.admitted()
     assert set(admitted) == {TABLE, GRADES}
     free = replace(graded, graded=None, free=confirming(graded.free))
-    assert set(free.candidates.admitted(free_label(free))) == {TABLE, ALIKE, free_label(free)}
+    assert set(free.candidates.admitted()) == {TABLE, ALIKE, FREE}
     assert free.chosen is free.free.chosen
 
 
@@ -89,7 +88,7 @@ def test_zones_beyond_what_they_may_be_are_not_drawn(graded):
     free, alike = graded.free, graded.free.proportional
     beyond = at_cost(replace(alike, design=alike.design + 10.0, checks=free.chosen.checks), 0.5 * free.chosen.cost)
     changed = replace(graded, graded=None, free=confirming(replace(free, proportional_tried=(free.baseline, beyond))))
-    assert ALIKE not in changed.candidates.admitted(free_label(changed))
+    assert ALIKE not in changed.candidates.admitted()
     assert changed.chosen is changed.free.chosen
 
 

@@ -11,7 +11,7 @@ from tests.builders import at_constant_contact, order_spectrum, reducer_file, re
 from tolalloc.exceptions import TolallocError
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.cycloid.tooth_profile import normals
-from tolalloc.reducers.equivalent.hysteresis import friction_torques
+from tolalloc.reducers.equivalent.friction import friction_torques
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import Solved, forces
 from tolalloc.reducers.equivalent.perfect import perfect_reducer

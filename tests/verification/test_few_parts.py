@@ -12,12 +12,10 @@ from scipy import stats
 from scipy.special import ndtr
 
 import tolalloc as ta
-from tests.builders import says
+from tests.builders import measured_size, says, verifier_of_sum
 from tolalloc.allocation.space.requirement import AtCpk, AtYield
-from tolalloc.allocation.verify.verification import verifier_of_sum
-from tolalloc.capability.experiment import measured_size
 from tolalloc.capability.indices import Limits
-from tolalloc.capability.monte_carlo import ProcessDoubt, proportion
+from tolalloc.capability.monte_carlo import ProcessUncertainty, proportion
 from tolalloc.drawings.distributions import Distribution
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.measured_parts import MeasuredParts
@@ -27,9 +25,9 @@ TARGET, LIMIT = 0.9973, Limits(upper=4.0)
 NORMAL = np.random.default_rng(1).standard_normal((30_000, 2))
 
 
-def doubt_of_size(parts):
-    """Return the doubt of an output that is one measured size of σ = 1."""
-    return ProcessDoubt.of(measured_size(parts), NORMAL[:, :1], NORMAL[:, 0])
+def uncertainty_of_size(parts):
+    """Return the uncertainty of an output that is one measured size of σ = 1."""
+    return ProcessUncertainty.of(measured_size(parts), NORMAL[:, :1], NORMAL[:, 0])
 
 
 def tolerance_limit(parts):
@@ -40,10 +38,10 @@ def tolerance_limit(parts):
 @pytest.mark.parametrize("parts", [20, 50, 200])
 def test_margin_is_that_of_one_sided_tolerance_limits(parts):
     quantile = float(np.quantile(NORMAL[:, 0], TARGET))
-    found = quantile + doubt_of_size(parts).margin(LIMIT, 1 - TARGET)
+    found = quantile + uncertainty_of_size(parts).margin(LIMIT, 1 - TARGET)
     # The quantile of 30,000 units has a standard error of 0.036.
     assert found == pytest.approx(tolerance_limit(parts), abs=0.08)
-    assert doubt_of_size(20).with_parts(parts).margin(LIMIT, 1 - TARGET) == doubt_of_size(parts).margin(
+    assert uncertainty_of_size(20).with_parts(parts).margin(LIMIT, 1 - TARGET) == uncertainty_of_size(parts).margin(
         LIMIT, 1 - TARGET
     )
 
@@ -55,12 +53,12 @@ def test_margin_falls_as_one_over_the_root_of_the_parts():
         lambda own: own.margin(LIMIT, 1 - TARGET),
         lambda own: own.margin_of_spread(1, stats.norm.ppf(TARGET)),
     ):
-        found = [margin(doubt_of_size(parts)) for parts in (200, 3200)]
+        found = [margin(uncertainty_of_size(parts)) for parts in (200, 3200)]
         assert found[0] / found[1] == pytest.approx(exact[0] / exact[1], rel=0.03)
 
 
 def test_margin_with_two_limits_keeps_both_ends():
-    one, both = doubt_of_size(50), Limits(lower=-4.0, upper=4.0)
+    one, both = uncertainty_of_size(50), Limits(lower=-4.0, upper=4.0)
     centred = one.margin(both, 1 - TARGET)
     moved, wider = one._moments
     exact = []
@@ -79,7 +77,7 @@ def test_radii_leave_their_spread_open_with_twice_as_many_degrees_and_no_mean():
     source = replace(
         measured_size(30).sources[0], feature=Feature.POSITION, zone=8.0, minimum=0.8, maximum=80.0, measured=made
     )
-    found = ProcessDoubt.of(ErrorModel((source,)), NORMAL, NORMAL[:, 0]).margin(LIMIT, 1 - TARGET)
+    found = ProcessUncertainty.of(ErrorModel((source,)), NORMAL, NORMAL[:, 0]).margin(LIMIT, 1 - TARGET)
     wider = np.sqrt(60 / stats.chi2.ppf(0.05, 60))
     assert found == pytest.approx(np.quantile(NORMAL[:, 0], TARGET) * (wider - 1), rel=0.06)
 
@@ -102,7 +100,7 @@ def test_margin_of_bent_outputs_is_near_that_of_processes_that_are_drawn_again(n
     errors = ErrorModel((place, replace(size, name="size", each=12)))
     x, output = generator.standard_normal((8000, 14)), BENT[name]
     quantile = float(np.quantile(output(x), TARGET))
-    margin = ProcessDoubt.of(errors, x, output(x)).margin(Limits(upper=quantile), 1 - TARGET)
+    margin = ProcessUncertainty.of(errors, x, output(x)).margin(Limits(upper=quantile), 1 - TARGET)
     found = []
     for _ in range(200):
         wider = np.sqrt(2 * parts / generator.chisquare(2 * parts)), np.sqrt(19 / generator.chisquare(19))
@@ -115,7 +113,7 @@ def test_margin_of_bent_outputs_is_near_that_of_processes_that_are_drawn_again(n
 
 def test_interval_of_a_yield_holds_units_and_processes():
     counted = proportion(30_000, 81)
-    found = counted.doubted(doubt_of_size(20), Limits(upper=2.78))
+    found = counted.widened_by(uncertainty_of_size(20), Limits(upper=2.78))
     assert (found.estimate, found.units, found.rejected) == (counted.estimate, counted.units, counted.rejected)
     assert found.low < counted.low < counted.high < found.high
     # Lower end: the share beyond that 97.5 % of the processes keep.
@@ -124,15 +122,15 @@ def test_interval_of_a_yield_holds_units_and_processes():
     assert 1 - found.low == pytest.approx(np.quantile(beyond, 0.975), rel=0.12)
     more = found.widening.with_parts(100)
     assert found.low < more.low < counted.low
-    assert counted.doubted(None, LIMIT) is counted
+    assert counted.widened_by(None, LIMIT) is counted
 
 
 def test_nothing_is_doubted_without_measured_parts():
     verifier = verifier_of_sum(6.0, 8.0, limit=9.0, guarantee=AtYield(TARGET))
     design = verifier.verify(verifier.space.uniform(1.0), "drawn")
-    assert not design.doubts
+    assert not design.uncertainties
     assert design.achieved.widening is None and design.joint.widening is None
-    assert ProcessDoubt.about(verifier.space.errors, NORMAL) is None
+    assert ProcessUncertainty.about(verifier.space.errors, NORMAL) is None
 
 
 def made_of(zone, mean, deviation, parts, generator):
@@ -156,7 +154,9 @@ def test_promised_yield_is_held_for_the_process_behind_the_parts(parts):
             said[at] = made.shift, 1 / (3 * made.cp)
         x = (said[:, 0] + said[:, 1] * normal) * halves
         middle = float(said[:, 0] @ halves + level * np.linalg.norm(said[:, 1] * halves))
-        margin = ProcessDoubt.of(ErrorModel(tuple(sources)), x, x.sum(axis=1)).margin(Limits(upper=9.0), 1 - TARGET)
+        margin = ProcessUncertainty.of(ErrorModel(tuple(sources)), x, x.sum(axis=1)).margin(
+            Limits(upper=9.0), 1 - TARGET
+        )
         for inwards in (0.0, margin):
             scale = 9.0 / (middle + inwards)
             own = ndtr((9.0 / scale - true[:, 0] @ halves) / np.linalg.norm(true[:, 1] * halves))
@@ -193,12 +193,12 @@ def test_value_of_a_guarantee_lies_further_out_by_the_margin(guarantee):
     sources[0] = replace(sources[0], distribution=Distribution.EMPIRICAL, measured=made)
     verifier = replace(verifier, space=replace(verifier.space, errors=ErrorModel(tuple(sources))))
     design = verifier.verify(verifier.space.uniform(1.0), "drawn")
-    doubt = design.doubts["y [mm]"]
-    margin = doubt.margin(Limits(upper=9.0), 1 - TARGET) if isinstance(guarantee, AtYield) else None
-    margin = doubt.margin_of_spread(1, 3.0) if margin is None else margin
+    uncertainty = design.uncertainties["y [mm]"]
+    margin = uncertainty.margin(Limits(upper=9.0), 1 - TARGET) if isinstance(guarantee, AtYield) else None
+    margin = uncertainty.margin_of_spread(1, 3.0) if margin is None else margin
     (side,) = design.checks[0].constraints
     limited = verifier.requirements[0].sample(sample_of(verifier), verifier.confidence).limited(Limits(upper=9.0))
-    (counted,) = guarantee.bounds(replace(limited, doubt=None), verifier.confidence)
+    (counted,) = guarantee.bounds(replace(limited, uncertainty=None), verifier.confidence)
     assert side.value - counted.value == pytest.approx(margin, rel=1e-9)
     assert margin > 0.1
 

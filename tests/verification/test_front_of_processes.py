@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.verification.test_allocation_program import random_problem
-from tolalloc.allocation.cost.model import Combined, Exponential, Process, Reciprocal, ReciprocalPower
+from tests.verification.test_process_choice import random_problem
+from tolalloc.allocation.cost.model import Exponential, PowerExponential, Process, Reciprocal, ReciprocalPower
 from tolalloc.allocation.cost.points import Points, Tabulated
 from tolalloc.allocation.search.lagrange_dual import by_form
 from tolalloc.allocation.search.process_choice import allocate, front
@@ -38,7 +38,7 @@ def test_the_least_priced_cost_of_every_form_is_that_of_a_fine_grid_and_never_ab
     costs = [
         *(Reciprocal(factor=factor) for factor in (2.0, 7.0)),
         *(ReciprocalPower(factor=3.0, exponent=exponent) for exponent in (0.6, 1.4)),
-        *(Exponential(factor=8.0, scale=2.0), Combined(factor=4.0, exponent=0.5, scale=3.0), Tabulated(points)),
+        *(Exponential(factor=8.0, scale=2.0), PowerExponential(factor=4.0, exponent=0.5, scale=3.0), Tabulated(points)),
     ]
     made = [
         Process(name="p", cost=cost, minimum=1.0, maximum=8.0 - at, change=0.1 * at) for at, cost in enumerate(costs)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import multinomial
 
-from tests.verification.test_confirmation import GAP, SHOWN, TARGET, acceptance_test_of, at, designed, prepared
+from tests.verification.test_acceptance import GAP, SHOWN, TARGET, acceptance_test_of, at, designed, prepared
 from tolalloc.allocation.verify import independent_sample
 from tolalloc.allocation.verify.acceptance import FIRST
 from tolalloc.allocation.verify.independent_sample import Screen

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from tolalloc.allocation.cost.model import Exponential, Process, Reciprocal, Weighted, reciprocal_squared
+from tolalloc.allocation.cost.model import Exponential, Process, Reciprocal, ReciprocalPower, Weighted
 from tolalloc.allocation.front.price_region import SAME, graded_price_ranges, price_ranges, worst_prices
 from tolalloc.allocation.search import process_choice
 from tolalloc.allocation.search.discrete import DiscreteProblem, feature_options
@@ -21,7 +21,11 @@ def random_problem(generator: np.random.Generator, features: int = 4, ways: int 
 
     def made(at: int, way: int) -> Process:
         factor = generator.uniform(0.5, 3.0)
-        laws = (Reciprocal(factor=factor), reciprocal_squared(factor=factor), Exponential(factor=factor, scale=1.0))
+        laws = (
+            Reciprocal(factor=factor),
+            ReciprocalPower(factor=factor, exponent=2.0),
+            Exponential(factor=factor, scale=1.0),
+        )
         low, high = (0.2, 3.0) if way == 0 else (0.1, 1.0)
         return Process(name=f"way {way}", cost=laws[at % 3], minimum=low, maximum=high, change=0.4 * way)
 

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from tolalloc.allocation.cost.model import (
-    Combined,
     Exponential,
+    PowerExponential,
     Reciprocal,
     ReciprocalPower,
-    reciprocal_squared,
 )
 from tolalloc.allocation.cost.points import Spline, Tabulated, load_shop_points
 from tolalloc.allocation.cost.process_costs import UNITS, ProcessCostRow, load_process_costs, priced, today
@@ -92,9 +91,9 @@ def test_a_feature_without_a_row_keeps_the_process_of_the_tolerance_table(tmp_pa
     [
         ("reciprocal,1,20,,,", Reciprocal(fixed=1.0, factor=20.0)),
         ("reciprocal power,1,20,1.4,,", ReciprocalPower(fixed=1.0, factor=20.0, exponent=1.4)),
-        ("reciprocal squared,1,20,,,", reciprocal_squared(fixed=1.0, factor=20.0)),
+        ("reciprocal squared,1,20,,,", ReciprocalPower(fixed=1.0, factor=20.0, exponent=2.0)),
         ("exponential,1,20,,9,", Exponential(fixed=1.0, factor=20.0, scale=9.0)),
-        ("combined,1,20,0.4,9,", Combined(fixed=1.0, factor=20.0, exponent=0.4, scale=9.0)),
+        ("combined,1,20,0.4,9,", PowerExponential(fixed=1.0, factor=20.0, exponent=0.4, scale=9.0)),
     ],
 )
 def test_closed_forms_are_read_in_micrometres_and_given_in_metres(cells, model, tmp_path):

@@ -10,7 +10,7 @@ import pytest
 import tolalloc as ta
 from tests.builders import few_sources, unit_with, units_at_random
 from tests.random_cases import random_cycloid_stage, seeds
-from tests.verification.test_cycloid_clearance import second_order
+from tests.verification.test_clearance import second_order
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import ARCSECOND, MICROMETRE
 from tolalloc.reducers.cycloid.clearance import exact_clearance

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from tests.builders import verifier_of_sum
 from tolalloc.allocation.front.price_region import SAME
 from tolalloc.allocation.front.uncertain_region import COVERED, SPAN, changed_stack, uncertain_region
 from tolalloc.allocation.search.zone_allocation import allocate, scale_in_proportion
 from tolalloc.allocation.space.effort import SearchEffort
 from tolalloc.allocation.space.problem import Stack
-from tolalloc.allocation.verify.verification import verifier_of_sum
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.models.function_model import BoundFunction
 

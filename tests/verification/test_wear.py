@@ -17,7 +17,7 @@ from tolalloc.reducers.load_case import LoadCase
 from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.reducer.design import Modification, Reducer
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.reducer.form import FlankForm, Form
+from tolalloc.reducers.reducer.form import FlankForm, PartForm
 
 STIFFNESS = Path(__file__).parents[2] / "studies" / "rv20e_catalogue.stiffness.toml"
 WORK = LoadCase("work", torque=-167.0, speed=15.0)
@@ -109,7 +109,7 @@ def test_two_micrometres_off_all_flanks_make_the_lost_motion_of_practice(drawing
     choice = ta.reducer("rv20e", stiffness=STIFFNESS, neglected=("disc*.tilt",))
     modification = Modification.from_clearances(3.5e-6, 8e-6, choice.reducer.cycloid_stage)
     angle = tuple((2 * np.pi * np.arange(40) / 40).tolist())
-    form = Form(worn=FlankForm(spaces=1, angle=angle, deviation=(-2e-6,) * 40))
+    form = PartForm(worn=FlankForm(spaces=1, angle=angle, deviation=(-2e-6,) * 40))
     new, old = (
         replace(choice, reducer=replace(choice.reducer, modification=modification, form=own)).bound(
             drawing.errors, "test"

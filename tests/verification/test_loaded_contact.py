@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 
 from tests.builders import unit_with
 from tests.random_cases import LAWS, random_reducer
-from tests.verification.test_cycloid_profile import modified_points, path_bend
+from tests.verification.test_tooth_profile import modified_points, path_bend
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import MICROMETRE
 from tolalloc.reducers.cycloid.loaded_contact import (

@@ -8,14 +8,13 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 from tolalloc.allocation.cost.model import (
-    Combined,
     CostModel,
     Exponential,
+    PowerExponential,
     Process,
     Reciprocal,
     ReciprocalPower,
     SumOfCosts,
-    reciprocal_squared,
 )
 from tolalloc.allocation.cost.points import OUTER_ERROR, Points, Spline, Tabulated, best_fit, fits
 from tolalloc.exceptions import InputError
@@ -24,9 +23,9 @@ ZONES = np.geomspace(2.0, 30.0, 10)
 CLOSED = [
     Reciprocal(fixed=1.0, factor=8.0),
     ReciprocalPower(fixed=0.5, factor=20.0, exponent=1.37),
-    reciprocal_squared(factor=9.0),
+    ReciprocalPower(factor=9.0, exponent=2.0),
     Exponential(fixed=2.0, factor=9.0, scale=7.0),
-    Combined(fixed=0.7, factor=12.0, exponent=0.6, scale=9.0),
+    PowerExponential(fixed=0.7, factor=12.0, exponent=0.6, scale=9.0),
 ]
 CURVE = Points(zones=tuple(ZONES.tolist()), costs=tuple((1 + 8 / ZONES).tolist()))
 MODELS = [
@@ -143,7 +142,7 @@ def test_a_sum_counts_every_callout_at_its_own_zone():
         (Reciprocal, "fixed", -0.1),
         (ReciprocalPower, "exponent", 0.0),
         (Exponential, "scale", -2.0),
-        (Combined, "scale", float("nan")),
+        (PowerExponential, "scale", float("nan")),
     ],
 )
 def test_costs_that_would_not_fall_are_refused(form, field, value):

@@ -23,7 +23,7 @@ from tolalloc.reducers.equivalent.springs import Positions
 from tolalloc.reducers.modification import ModificationRequest, choose
 from tolalloc.reducers.reducer.design import Modification, Reducer
 from tolalloc.reducers.reducer.files import load_reducer, write_modified
-from tolalloc.reducers.reducer.form import FlankForm, Form, PinForm, flank_form, load_designed
+from tolalloc.reducers.reducer.form import FlankForm, PartForm, PinForm, flank_form, load_designed
 from tolalloc.reducers.transmission_error import transmission_error
 from tolalloc.reducers.unit_file import BuiltUnit, load_unit
 from tolalloc.wings.bench.ask.diagnose import Diagnose
@@ -80,7 +80,7 @@ def reducer() -> Reducer:
 def test_a_profile_sampled_from_amounts_has_their_transmission_error(reducer, torque):
     unit = load_unit("table4").deviations
     amounts = EquivalentModel(replace(reducer, modification=AMOUNTS))
-    free = EquivalentModel(replace(reducer, modification=NONE, form=Form(designed=sampled(reducer, AMOUNTS))))
+    free = EquivalentModel(replace(reducer, modification=NONE, form=PartForm(designed=sampled(reducer, AMOUNTS))))
     known = errors_of(amounts, unit, AMOUNTS.deviations), errors_of(free, unit, NONE.deviations)
     assert amounts.columns == free.columns
     difference = curve(amounts, known[0], torque) - curve(free, known[1], torque)
@@ -99,7 +99,7 @@ def test_the_spline_of_a_sampled_profile_converges_with_the_fourth_power(reducer
 
 
 def test_clearance_and_contact_take_a_free_profile_like_the_amounts(reducer):
-    free = replace(reducer, modification=NONE, form=Form(designed=sampled(reducer, AMOUNTS)))
+    free = replace(reducer, modification=NONE, form=PartForm(designed=sampled(reducer, AMOUNTS)))
     given = assess(replace(reducer, modification=AMOUNTS), -167.0, phases=6)
     found = assess(free, -167.0, phases=6)
     assert found.clearance.free_rotation == pytest.approx(given.clearance.free_rotation, rel=1e-4)
@@ -174,7 +174,7 @@ def test_the_gap_of_lobed_pins_and_wavy_flanks_is_exact_to_first_order(reducer, 
         spaces=1, angle=tuple(wave.tolist()), deviation=tuple((waves[1] * np.cos(waves[0] * wave)).tolist())
     )
     pins = tuple((pin, PinForm(waves=((lobes[0], lobes[1], 0.0),))) for pin in range(stage.pin_count))
-    at = Positions(replace(reducer, form=Form(designed=flank, pins=pins)), np.array([0.011]))
+    at = Positions(replace(reducer, form=PartForm(designed=flank, pins=pins)), np.array([0.011]))
     found = pin_contact(at).by_form[0, 0, 0]
     for pin in (2, 5, 9, 17, 26):
         angle = float(at.pin_direction[pin] - at.disc_direction(0)[0])
@@ -195,7 +195,7 @@ def test_a_disc_measured_off_its_centre_has_run_out_and_pitch_of_order_one(reduc
     path = write(tmp_path / "disc.csv", disc_points(reducer, NONE) + moved)
     plain = replace(reducer, modification=NONE)
     form, _ = MeasuredProfile(path=path, spans=0).form(ToothProfile.of(plain), disc)
-    built = EquivalentModel(replace(plain, form=Form(discs=((disc - 1, form),))))
+    built = EquivalentModel(replace(plain, form=PartForm(discs=((disc - 1, form),))))
     model, known = EquivalentModel(plain), load_unit("table4").deviations
     teeth = (f"disc{disc}.pitch", f"disc{disc}.runout")
     known = {name: 0.0 if name.startswith(teeth) else value for name, value in known.items()} | AMOUNTS.deviations
@@ -285,7 +285,7 @@ def test_noise_of_points_propagates_as_the_theory_page_says(reducer, spans, gain
     for seed in range(8):
         noise = sigma * np.random.default_rng(seed).standard_normal((2, around.size))
         forms = tuple((disc, flank_form(around, noise[disc], teeth, spans, "noisy")) for disc in range(2))
-        built = EquivalentModel(replace(reducer, form=Form(discs=forms)))
+        built = EquivalentModel(replace(reducer, form=PartForm(discs=forms)))
         off.append(curve(built, errors, torque, angle) - exact[0] / ARCSECOND)
     found = float(np.sqrt(np.mean(np.square(off))))
     assert found == pytest.approx(stated, rel=0.15)
@@ -300,7 +300,7 @@ def test_the_prototype_feels_the_form_where_its_pins_touch(reducer):
     )
     pins = tuple((pin, PinForm(waves=((3, 4e-7, 1e-7 * pin),))) for pin in range(0, stage.pin_count, 3))
     plain = replace(reducer, modification=NONE)  # amounts move where a pin touches
-    shaped = replace(plain, form=Form(discs=discs, pins=pins))
+    shaped = replace(plain, form=PartForm(discs=discs, pins=pins))
     carrier = 0.0137
     at = Positions(shaped, np.array([carrier]))
     asked = pin_contact(at).by_form[0, :, 0]
@@ -474,7 +474,7 @@ def test_smoothed_points_let_the_search_find_the_extremes(reducer):
         (disc, flank_form(around, 1e-6 * generator.standard_normal(around.size), teeth, None, "noisy"))
         for disc in range(2)
     )
-    model = EquivalentModel(replace(reducer, form=Form(discs=forms)))
+    model = EquivalentModel(replace(reducer, form=PartForm(discs=forms)))
     errors = errors_of(model, load_unit("table4").deviations, reducer.modification.deviations)
     found = model.exact_extremes(errors, -1.0)
     dense = curve(model, errors, -1.0, 2 * np.pi * np.arange(3744) / 3744)

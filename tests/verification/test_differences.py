@@ -11,7 +11,7 @@ import tolalloc as ta
 from tolalloc.allocation.verify.verification import Verifier
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.models.differences import derived
+from tolalloc.models.model import derived
 from tolalloc.sensitivity.derivatives import local_derivatives
 from tolalloc.study.prepared import Prepared
 

@@ -12,18 +12,15 @@ import tolalloc as ta
 from tests.builders import prepared, reducer_file, seeded_units, unit_with
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import ARCMINUTE
-from tolalloc.reducers.equivalent.hysteresis import (
-    DRAWN,
-    TURN_ANGLES,
+from tolalloc.reducers.equivalent.friction import (
     FrictionAtTorque,
-    Play,
+    PlayOperator,
     friction_loop,
     friction_torques,
-    hysteresis_loop,
-    loop_torques,
     sliding_ways,
     twist_of_friction,
 )
+from tolalloc.reducers.equivalent.hysteresis import DRAWN, TURN_ANGLES, hysteresis_loop, loop_torques
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import Solved
 from tolalloc.reducers.equivalent.perfect import preload
@@ -127,7 +124,7 @@ def test_the_play_operator_is_a_slow_stick_slip_motion():
 
     corners = [0.0, 0.9, 0.3, 0.6, -0.9, -0.85, 0.5, 0.45, 0.9]
     path = np.concatenate([np.linspace(*ends, 400) for ends in pairwise(corners)])
-    play = Play.of(inside, np.stack([friction(inside), 0.0 * inside]))
+    play = PlayOperator.of(inside, np.stack([friction(inside), 0.0 * inside]))
     found = play.follow(np.broadcast_to(path, (2, path.size)))
     np.testing.assert_allclose(found[0, 400:], stick_slip(path, friction)[400:], atol=1e-4)
     np.testing.assert_allclose(found[1], path, atol=1e-12)
@@ -140,7 +137,7 @@ def test_the_area_of_a_loop_is_the_work_of_friction():
     inside = np.linspace(-1.0, 1.0, 201)
     friction = 0.02 + 0.1 * np.abs(inside)
     down = np.linspace(0.9, -0.9, 20001)
-    felt = Play.of(inside, friction[np.newaxis]).follow(np.concatenate([down, down[::-1]])[np.newaxis])[0]
+    felt = PlayOperator.of(inside, friction[np.newaxis]).follow(np.concatenate([down, down[::-1]])[np.newaxis])[0]
     work = np.trapezoid(np.concatenate([down, down[::-1]]), felt**3)  # a spring whose twist is the cube of its torque
     lost = np.trapezoid(np.interp(felt, inside, friction) * np.sign(np.gradient(felt)), felt**3)
     assert work == pytest.approx(lost, rel=1e-3)

@@ -104,7 +104,7 @@ def test_the_limit_of_the_peak_to_peak_stands_around_the_middle_of_the_curve():
     first, *others = ask(desk, "design", unit=2)["figures"]
     (low, _), (high, name) = first["horizontal"]
     curve = first["series"][-1]["y"]
-    limit = desk.session.requirements[0].limits.upper
+    limit = desk.session.prepared.requirements[0].limits.upper
     assert high - low == pytest.approx(limit)
     assert high + low == pytest.approx(min(curve) + max(curve), abs=1e-3)
     assert name == f"limit {limit:g} arcsec peak to peak"

@@ -13,7 +13,7 @@ from tests.random_cases import random_plan, seeds
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.wings.assembly.chain import DatumFlowChain, Part
+from tolalloc.wings.assembly.chain import ChainPart, DatumFlowChain
 from tolalloc.wings.assembly.control import KalmanFilter, Regulator, kalman_filter, limiting_regulator, regulator
 from tolalloc.wings.assembly.files import load_plan
 from tolalloc.wings.assembly.gains import FinalErrors, final_errors, norms, state_weight_sweep, tuned_gains
@@ -27,7 +27,7 @@ NOISE = 2 * ARCSECOND, 1 * ARCSECOND
 
 def pair(measure: tuple[str, ...], *later: str) -> AssemblyPlan:
     """Return two parts, the second on the first and measured so, the first measured by itself."""
-    chain = DatumFlowChain(datum="KC0", parts=(Part(name="KC1", on="KC0"), Part(name="KC2", on="KC1")))
+    chain = DatumFlowChain(datum="KC0", parts=(ChainPart(name="KC1", on="KC0"), ChainPart(name="KC2", on="KC1")))
     return replace(
         random_plan(0),
         chain=chain,

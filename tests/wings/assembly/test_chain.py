@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.wings.assembly.chain import DatumFlowChain, Part
+from tolalloc.wings.assembly.chain import ChainPart, DatumFlowChain
 from tolalloc.wings.assembly.files import load_plan
 
 LARGEST = 60 * ARCSECOND
@@ -22,7 +22,7 @@ def tree(generator: np.random.Generator, count: int = 6) -> DatumFlowChain:
     return DatumFlowChain(
         datum="datum",
         parts=tuple(
-            Part(
+            ChainPart(
                 name=name,
                 on=names[generator.integers(at)],
                 turned=tuple(generator.uniform(-3, 3, 3).tolist()),
@@ -120,8 +120,8 @@ def test_a_tilt_moves_what_stands_on_it_by_its_reach():
     chain = DatumFlowChain(
         datum="bed",
         parts=(
-            Part(name="column", on="bed", position=(0.0, 0.0, 0.1)),
-            Part(name="head", on="column", position=(0.0, 0.0, 0.4)),
+            ChainPart(name="column", on="bed", position=(0.0, 0.0, 0.1)),
+            ChainPart(name="head", on="column", position=(0.0, 0.0, 0.4)),
         ),
     )
     tilt = np.zeros((2, 6))
@@ -152,9 +152,9 @@ def test_columns_take_tilts_and_rotations_where_they_belong():
     chain = DatumFlowChain(
         datum="KC0",
         parts=(
-            Part(name="KC1", on="KC0", tilts=("crank1.tilt",), rotates=("crank1.journal1.phase",)),
-            Part(name="KC2", on="KC1", tilts=("disc1.tilt", "disc2.tilt")),
-            Part(name="KC3", on="KC2"),
+            ChainPart(name="KC1", on="KC0", tilts=("crank1.tilt",), rotates=("crank1.journal1.phase",)),
+            ChainPart(name="KC2", on="KC1", tilts=("disc1.tilt", "disc2.tilt")),
+            ChainPart(name="KC3", on="KC2"),
         ),
     )
     orientations = np.arange(18.0).reshape(2, 3, 3)
@@ -211,14 +211,17 @@ def test_columns_take_tilts_and_rotations_where_they_belong():
 )
 def test_parts_that_are_no_chain_are_refused(parts, kind, sentence):
     with pytest.raises(kind, match=f"^{re.escape(sentence)}$"):
-        DatumFlowChain(datum="bed", parts=tuple(Part(name=name, on=on) for name, on in parts))
+        DatumFlowChain(datum="bed", parts=tuple(ChainPart(name=name, on=on) for name, on in parts))
 
 
 def test_two_parts_do_not_move_the_same_column():
     with pytest.raises(InputError) as refusal:
         DatumFlowChain(
             datum="bed",
-            parts=(Part(name="A", on="bed", tilts=("disc1.tilt",)), Part(name="B", on="A", tilts=("disc1.tilt",))),
+            parts=(
+                ChainPart(name="A", on="bed", tilts=("disc1.tilt",)),
+                ChainPart(name="B", on="A", tilts=("disc1.tilt",)),
+            ),
         )
     assert str(refusal.value) == (
         "datum flow chain: column of part B is 'disc1.tilt'; allowed is a column that no other part moves, and A moves "

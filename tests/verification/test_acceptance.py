@@ -13,7 +13,7 @@ from scipy.stats import binom, norm
 import tolalloc as ta
 from tolalloc.allocation.search.candidates import _still_kept
 from tolalloc.allocation.space.effort import AllocationEffort
-from tolalloc.allocation.space.output_sample import Control, LimitedSample, Surprises
+from tolalloc.allocation.space.output_sample import ControlPlane, ControlResiduals, LimitedSample
 from tolalloc.allocation.verify.acceptance import ATTEMPTS, FIRST, AcceptanceTest, accept_cheapest, confidence_of_fewer
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier
 from tolalloc.capability.indices import Limits
@@ -261,7 +261,7 @@ def test_what_units_say_beside_planes_shows_too_few_failures_no_more_often_than_
     true, called = by_law + more - fewer, generator.multinomial(units, [more, fewer, 1 - more - fewer], samples)
     wrong = {0.95: 0, 0.05: 0}
     for own, other, _ in called.tolist():
-        found = Surprises(units=units, more=own, fewer=other, sum=own - other, by_law=by_law)
+        found = ControlResiduals(units=units, more=own, fewer=other, sum=own - other, by_law=by_law)
         wrong[0.95] += found.share(0.95) < true
         wrong[0.05] += found.share(0.05) > true
     assert max(wrong.values()) <= samples * (ERROR + 3 * np.sqrt(ERROR * (1 - ERROR) / samples))
@@ -278,11 +278,11 @@ def test_a_limit_is_kept_just_where_units_and_planes_show_it(generator, scale):
 
     near = NearPlane.of(x[: 2**15], bent(x[: 2**15]), errors, errors.zones)
     limits = Limits(upper=scale * np.exp(1e4 * norm.ppf(TARGET) * np.hypot(*errors.zones) / 6))
-    control = Control(near=near, values=near(x), limits=limits)
+    control = ControlPlane(near=near, values=near(x), limits=limits)
     sample = LimitedSample.all_of(bent(x), limits, controls=(control,))
     (bound,) = SHOWN.bounds(sample, 0.95)
     called = (control.excess > 0).astype(int)
-    shown = Surprises.among(sample.excess > 0, called, near.share_above(1, limits.upper), x.shape[0]).share(0.95)
+    shown = ControlResiduals.among(sample.excess > 0, called, near.share_above(1, limits.upper), x.shape[0]).share(0.95)
     assert (bound.excess <= 0) == (shown <= 1 - TARGET)
     plain = LimitedSample.all_of(bent(x), limits)
     assert bound.standard_error < 0.3 * SHOWN.bounds(plain, 0.95)[0].standard_error

@@ -17,7 +17,14 @@ import tolalloc as ta
 from tests.builders import prepared, source, units_at_random
 from tests.sheets import cells, frames
 from tolalloc import RADIAL_CLEARANCE as RADIAL
-from tolalloc.allocation.cost.model import Combined, Exponential, Reciprocal, ReciprocalPower, SumOfCosts, Weighted
+from tolalloc.allocation.cost.model import (
+    Exponential,
+    PowerExponential,
+    Reciprocal,
+    ReciprocalPower,
+    SumOfCosts,
+    Weighted,
+)
 from tolalloc.allocation.cost.points import Points, Spline, Tabulated
 from tolalloc.allocation.cost.process_costs import load_process_costs
 from tolalloc.allocation.space.design_space import DesignSpace
@@ -92,7 +99,7 @@ MODELS = (
     Reciprocal(fixed=0.3, factor=4e-6),
     ReciprocalPower(fixed=0.1, factor=2.5, exponent=1.7),
     Exponential(fixed=0.2, factor=8.0, scale=2.3),
-    Combined(factor=6.0, exponent=0.4, scale=3.0),
+    PowerExponential(factor=6.0, exponent=0.4, scale=3.0),
     Tabulated(CURVE),
     Spline(CURVE),
     Weighted(model=Reciprocal(factor=2.0), weight=1.25),

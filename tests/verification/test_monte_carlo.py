@@ -17,7 +17,7 @@ from tolalloc.drawings.zones import Distribution
 from tolalloc.exceptions import SolveError
 from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.effort import SobolEffort
-from tolalloc.sensitivity.sobol import SobolIndices, sobol_indices
+from tolalloc.sensitivity.sobol import SourceIndices, sobol_indices
 
 
 def angles(*names: str) -> ErrorModel:
@@ -41,7 +41,7 @@ class Ishigami:
         return Evaluation(values=y[:, np.newaxis], status=status)
 
 
-def ranked(response: Ishigami, seeds: SeedTree, blocks: int) -> SobolIndices:
+def ranked(response: Ishigami, seeds: SeedTree, blocks: int) -> SourceIndices:
     errors = angles("x1", "x2", "x3")
     return sobol_indices(Experiment.of(response, errors, seeds), SobolEffort(start=blocks, limit=blocks)).of("y [-]")
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.validation_manual import shown
-from tests.verification.test_dynamics import input_of, run
+from tests.wings.motion.test_motion import input_of, run
 from tolalloc.wings.motion.motion import Damping, SpeedProfile, generalised_alpha, motion_of, newmark
 
 INTEGRATORS = {"newmark": newmark(), "alpha 0": generalised_alpha(0.0), "alpha 0.8": generalised_alpha(0.8)}

@@ -127,9 +127,10 @@ def test_a_source_has_the_frame_of_its_feature(changes, shown):
 @pytest.mark.parametrize("name", ["carrier.assembly", "sun.eccentricity", "disc1.bore1.position", "crank1.tip", "a"])
 def test_an_own_input_has_the_frame_of_its_feature_whatever_a_reducer_calls_so(name):
     drawing = ta.Drawing.of_rows(
-        [{"id": name, "feature": "position", "plus": 6, "unit": "µm", "min": 1, "max": 9, "cost": 1}]
+        [{"id": name, "feature": "position", "plus": 6, "minus": 0, "unit": "µm", "min": 1, "max": 9, "cost": 1}]
     )
-    bound = ta.model(lambda x: x, inputs=[name], outputs=["y [mm]"]).bound(drawing.errors, "")
+    inputs = [f"{name}.x", f"{name}.y"]
+    bound = ta.model(lambda x, y: x + y, inputs=inputs, outputs=["y [mm]"]).bound(drawing.errors, "")
     assert portrait_of(bound).frame(drawing.errors.sources[0]).characteristic == "position"
 
 

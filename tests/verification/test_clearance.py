@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from tests.random_cases import random_cycloid_stage, seeds
 from tests.verification.distance_search import grindable, places, random_amounts, searched, searched_between
-from tests.verification.test_cycloid_profile import path_bend
+from tests.verification.test_tooth_profile import path_bend
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.clearance import (

@@ -12,7 +12,7 @@ from scipy.stats import kstest, qmc
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import monte_carlo
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.seeds import CHUNK, SamplingDesign, SeedTree, uniform_chunk, uniform_chunks
+from tolalloc.drawings.seeds import CHUNK, SamplingDesign, SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
 from tolalloc.models.model import Evaluation
@@ -22,7 +22,7 @@ LATIN, SOBOL = SamplingDesign.LATIN_HYPERCUBE, SamplingDesign.SOBOL
 
 
 def chunks(design: SamplingDesign, seed: int, samples: int, columns: int = COLUMNS) -> np.ndarray:
-    return np.concatenate(list(uniform_chunks(design, SeedTree(seed).child("units"), samples, columns)))
+    return np.concatenate(list(SeedTree(seed).child("units").uniform_chunks(samples, columns, design)))
 
 
 @pytest.mark.parametrize("design", SamplingDesign)
@@ -30,7 +30,7 @@ def chunks(design: SamplingDesign, seed: int, samples: int, columns: int = COLUM
 def test_a_chunk_has_the_same_bits_in_any_order_and_for_any_number_of_samples(design, seed):
     whole = chunks(design, seed, 3 * CHUNK + 7)
     seeds = SeedTree(seed).child("units")
-    backwards = [uniform_chunk(design, seeds, index, COLUMNS) for index in (3, 2, 1, 0)][::-1]
+    backwards = [seeds.uniform_chunk(index, COLUMNS, design) for index in (3, 2, 1, 0)][::-1]
     np.testing.assert_array_equal(whole, np.concatenate(backwards)[: whole.shape[0]])
     np.testing.assert_array_equal(whole[: CHUNK + 9], chunks(design, seed, CHUNK + 9))
     assert 0 < whole.min() < whole.max() < 1
@@ -106,6 +106,6 @@ def test_monte_carlo_takes_every_design(design):
     errors = ErrorModel((Source(name="a", **part), Source(name="b", **part)))
     seeds = SeedTree(0)
     sample = monte_carlo(Experiment.of(First(), errors, seeds), 2 * CHUNK + 5, design)
-    uniform = np.concatenate(list(uniform_chunks(design, seeds, 2 * CHUNK + 5, 2)))
+    uniform = np.concatenate(list(seeds.uniform_chunks(2 * CHUNK + 5, 2, design)))
     np.testing.assert_array_equal(sample.x, errors.deviations(errors.standard_values(uniform), errors.zones))
     np.testing.assert_array_equal(sample.values, sample.x[:, 0])

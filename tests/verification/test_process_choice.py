@@ -11,7 +11,7 @@ from scipy.optimize import linprog, minimize
 
 from tests.random_cases import seeds
 from tolalloc.allocation.cost.model import Exponential, Process, Reciprocal
-from tolalloc.allocation.search.convex_program import ConvexProgram, front
+from tolalloc.allocation.search.convex_program import ConvexProgram
 from tolalloc.allocation.search.lagrange_dual import LagrangeDual, cost_bound
 from tolalloc.allocation.search.process_choice import allocate, second_best
 from tolalloc.allocation.space.problem import (
@@ -375,7 +375,7 @@ def test_the_front_falls_with_the_room_and_is_proven():
     low = float(stack.load(program.lower, np.empty(0)))
     high = float(stack.load(program.upper, np.empty(0)))
     budgets = np.linspace(0.9 * low, high, 12)
-    found = front(program, problem.stacks, 0, budgets)
+    found = [program.solve((replace(stack, budget=own), *problem.stacks[1:])) for own in budgets.tolist()]
     assert [design is None for design in found] == list(budgets < low)
     costs = np.array([design.cost for design in found if design is not None])
     assert (np.diff(costs) <= 1e-9 * costs[1:]).all()

@@ -17,8 +17,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import limited_measure
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
-from tolalloc.models.differences import DifferencedResponse
-from tolalloc.models.model import Evaluation
+from tolalloc.models.model import DifferencedResponse, Evaluation
 from tolalloc.reducers.response.kernel import KernelResponse, WithDerivatives
 from tolalloc.reducers.response.outputs import OutputsResponse, requirements_of
 

@@ -193,4 +193,4 @@ def test_kernel_agrees_with_random_units():
     found = subset_simulation(limit, SeedTree(0), samples=1000, runs=2)
     error = np.hypot(found.standard_error, np.sqrt(share / 3000))
     assert abs(found.probability - share) <= 3.5 * error
-    assert found.trustworthy
+    assert not found.cautions

@@ -44,7 +44,7 @@ def test_exact_probabilities_are_those_of_random_units(case):
 @pytest.mark.parametrize("case", [breitung(2), flat(10, 5.2), uniform_sum(6)], ids=lambda case: case.name)
 def test_estimates_without_a_caution_are_right_within_a_factor_of_two(case):
     found = asked(case, 0).estimate
-    assert found.trustworthy
+    assert not found.cautions
     assert 0.5 < found.probability / case.exact < 2
     assert abs(found.probability - case.exact) <= 3 * found.standard_error
 
@@ -53,7 +53,7 @@ def test_estimates_without_a_caution_are_right_within_a_factor_of_two(case):
 def test_cases_keep_their_word():
     """One seed of every third case: a factor of two without a caution, three errors with one; few cautions in all."""
     found = [(case, asked(case, 1000).estimate) for case in CASES[::3]]
-    relied = [(case, item) for case, item in found if item.trustworthy]
+    relied = [(case, item) for case, item in found if not item.cautions]
     assert all(0.5 < item.probability / case.exact < 2 for case, item in relied)
     assert sum(abs(item.probability - case.exact) > 3 * item.standard_error for case, item in found) <= 1
     assert len(relied) >= 0.9 * len(found)
@@ -110,7 +110,7 @@ def test_a_check_that_stops_is_a_caution():
     found = judged(random_units(case, SeedTree(0), 1000), levels, SolveError("Too many failed."))
     assert found.estimate.probability == levels.probability
     assert "not checked; scaled-sigma sampling stopped: Too many failed" in found.verdict
-    assert not found.estimate.trustworthy
+    assert found.estimate.cautions
 
 
 def test_random_units_alone_are_not_relied_on_where_few_fail_and_nothing_else_does():
@@ -132,7 +132,7 @@ def test_random_units_may_contradict():
 def test_an_estimate_that_a_factor_of_two_may_change_is_not_relied_on():
     found = asked(flat(2, 4.5), 0, samples=100, runs=2, scaled=100)
     assert "more than a factor of two" in found.verdict
-    assert not found.estimate.trustworthy
+    assert found.estimate.cautions
 
 
 def test_the_yield_is_that_of_the_agreement():

@@ -15,7 +15,7 @@ from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import Solved, peak_line_load
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.wings.assembly.chain import DatumFlowChain, Part
+from tolalloc.wings.assembly.chain import ChainPart, DatumFlowChain
 from tolalloc.wings.assembly.control import regulator
 from tolalloc.wings.assembly.files import load_plan
 from tolalloc.wings.assembly.orientations import OrientationResponse, transmission_curves
@@ -111,7 +111,7 @@ def test_every_status_is_told_and_a_failed_sample_fails_alone(response, x):
 
 
 def chain_with(**own):
-    return DatumFlowChain(datum="KC0", parts=(Part(name="KC1", on="KC0", **own),))
+    return DatumFlowChain(datum="KC0", parts=(ChainPart(name="KC1", on="KC0", **own),))
 
 
 @pytest.mark.parametrize(
@@ -156,6 +156,6 @@ def test_adjusting_lowers_the_largest_line_load_of_every_assembly(response, plan
 
 
 def test_a_length_is_no_angle(response):
-    chain = DatumFlowChain(datum="KC0", parts=(Part(name="KC1", on="KC0", rotates=("disc2.bore1.position.x",)),))
+    chain = DatumFlowChain(datum="KC0", parts=(ChainPart(name="KC1", on="KC0", rotates=("disc2.bore1.position.x",)),))
     with pytest.raises(InputError, match=r"column is 'disc2.bore1.position.x'; allowed is an angle, whose source ends"):
         OrientationResponse(model=response.model, chain=chain, torque=response.torque)

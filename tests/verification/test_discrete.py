@@ -111,17 +111,6 @@ def test_both_outcomes_are_among_the_random_problems():
     assert 4 <= sum(bool(np.any(all_choices(case)[1] <= 1e-12)) for case in cases) <= 16
 
 
-@pytest.mark.parametrize("seed", range(12))
-def test_the_least_violating_choice_is_the_one_of_all_combinations(seed):
-    case = random_problem(seed, features=4, shared=seed % 3)
-    least = all_choices(case)[1].min()
-    found = case.least_violating()
-    over = -found.slack / case._scales
-    assert over.max() == pytest.approx(least, rel=1e-9)
-    assert found.tightest == case.problem.stacks[int(over.argmax())].name
-    assert np.isinf(found.bound) == (least > 1e-12)
-
-
 def one_stack(zones, budget, root_sum_square=0.0, worst_case=1.0, cost=1.0):
     features = len(zones)
     process = Process(name="ground", cost=Reciprocal(factor=cost), minimum=1e-3, maximum=1e3)
@@ -175,7 +164,7 @@ def test_a_locked_feature_keeps_its_only_option():
     locked = Option(process=0, zone=5.3, label="locked", cost=free.problem.features[0].loss * 5.3**2)
     case = DiscreteProblem(problem=free.problem, options=((locked,), *free.options[1:]))
     solution = case.solve()
-    assert (solution is None) == (case.least_violating().bound == np.inf)
+    assert (solution is None) == (all_choices(case)[1].min() > 1e-12)
     wide = DiscreteProblem(
         problem=AllocationProblem(features=free.problem.features, stacks=()),
         options=((locked,), *free.options[1:]),
