@@ -33,7 +33,7 @@ from tolalloc.wings.bench.least_squares import IdentificationProblem
 from tolalloc.wings.bench.measurements import Measurements
 from tolalloc.wings.bench.parameters import SYMBOLS, Parameter, parameter
 from tolalloc.wings.bench.prediction import KernelPredictor, data_of
-from tolalloc.wings.bench.telling.identification import estimate_sentence
+from tolalloc.wings.bench.telling.identification import IdentificationTeller, estimate_sentence
 
 TRUTH = {"crank_disc_bearing": 1.15e10, "crank_carrier_bearing": 1.5e10, "carrier_bearing": 7.6e10}
 """Stiffness of the simulated units, inside the bounds of Table 5 and away from the start [N/m]."""
@@ -226,7 +226,7 @@ def build(quick: bool, progress: Progress) -> Document:
 def told(result: IdentificationResult) -> Answer[IdentificationResult]:
     """Return an identification as it is told of."""
     header = Header(name=result.measurements.name, model=result.reducer.name, seed=1)
-    return Answer(kind="identification", header=header, result=result)
+    return Answer(kind="identification", header=header, result=result, told_by=IdentificationTeller)
 
 
 def _seeds(quick: bool) -> int:

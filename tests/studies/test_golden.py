@@ -17,7 +17,8 @@ from tests.golden.cases import LONGER, PUSHED, SMALL, Case
 from tests.golden.record import CASES, Look, Run, kept, recorded
 from tests.studies.command import tolalloc
 
-NUMBER = re.compile(r"(?<![\w.])[-−+]?\d[\d,]*(?:\.\d+)?(?:[eE][-+]?\d+)?")
+NUMBER = re.compile(r"(?<![\w.])[-−+]?\d[\d,]*(?:\.\d+)?(?:[eE][-+]?\d{1,2}(?!\d))?")
+"""A number as it is written; the digits behind an e in a hash are no exponent."""
 
 
 def value(text: str) -> float:

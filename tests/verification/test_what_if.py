@@ -237,7 +237,7 @@ def test_a_zone_is_the_same_only_if_no_change_moves_it_by_more_than_a_tenth(allo
         optimum=np.array([1.0, 1.0, 2.0]),
         prices=(free, free, free),
         graded=(),
-        worst=WorstPrices(factors=np.ones(3), cheapest=allocation.inside, lost=0.0, most=0.0),
+        worst=WorstPrices(cheapest=allocation.inside, lost=0.0, most=0.0),
         at_worst=variant([1.05, 0.92, 2.19]),
         uncertain=region([1.0, 1.0, 2.21]),
         second_best=None,

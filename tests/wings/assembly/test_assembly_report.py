@@ -26,7 +26,7 @@ from tolalloc.wings.assembly.orientations import TRANSMISSION, TransmissionCurve
 from tolalloc.wings.assembly.steps import Efforts, steps_in_order
 from tolalloc.wings.assembly.telling import tables, transmission
 from tolalloc.wings.assembly.telling import tolerances as tolerance_tables
-from tolalloc.wings.assembly.telling.assembly import plan_record
+from tolalloc.wings.assembly.telling.assembly import AssemblyTeller, plan_record
 from tolalloc.wings.assembly.telling.tables import characteristic_table, larger
 from tolalloc.wings.assembly.trajectory import random_numbers
 
@@ -81,7 +81,7 @@ def run(plan, errors=None) -> AssemblyResult:
 
 def answer(results: AssemblyResult) -> Answer[AssemblyResult]:
     header = Header(name=results.plan.name, model="", seed=1, assumptions=results.plan.assumptions)
-    return Answer(kind="assembly", header=header, result=results)
+    return Answer(kind="assembly", header=header, result=results, told_by=AssemblyTeller)
 
 
 def warnings(results: AssemblyResult) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from tolalloc.reports.header import Header
 from tolalloc.reports.portraits.reducer import twist_table
 from tolalloc.study.answer import Answer
 from tolalloc.wings.bench.catalogue import identify_from_catalogue, with_bearings
+from tolalloc.wings.bench.telling.catalogue import CatalogueTeller
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +47,9 @@ def test_printed_stiffnesses_are_scaled_alike():
     assert "torsional_rigidity_nm_per_arcmin" in str(caught.value)
     found = identify_from_catalogue(printed)
     assert found.factor < 0.05
-    answer = Answer(kind="catalogue", header=Header(name="catalogue", model=printed.name), result=found)
+    answer = Answer(
+        kind="catalogue", header=Header(name="catalogue", model=printed.name), result=found, told_by=CatalogueTeller
+    )
     assert says(answer.warnings[0], "catalogue.warning", factor=found.factor)
     for name in RV.identified:
         ratio = getattr(found.after.stiffness, name) / getattr(printed.stiffness, name)
