@@ -97,16 +97,9 @@ def cost_at_yield(space: DesignSpace, allocation: ZoneAllocation, target: float)
 
     >>> from tolalloc.allocation.search.zone_allocation import allocate, scale_in_proportion
     >>> from tolalloc.allocation.space.effort import SearchEffort
-    >>> from tolalloc.allocation.space.requirement import Requirement
-    >>> from tolalloc.capability.indices import Limits
-    >>> from tolalloc.drawings.seeds import SeedTree
-    >>> import tolalloc as ta
-    >>> row = {"unit": "mm", "min": 1, "max": 60, "cost": 1}
-    >>> rows = [{"id": "a", "plus": 3, "minus": -3, **row}, {"id": "b", "plus": 4, "minus": -4, **row}]
-    >>> space = DesignSpace(errors=ta.Drawing.of_rows(rows).errors)
-    >>> model = ta.model(lambda a, b: a + b, inputs=("a", "b"), outputs=("y [mm]",)).bound(space.errors, "")
-    >>> asked = Requirement(output="y [mm]", limits=Limits(upper=5.0), guarantee=ta.AtYield(0.9973))
-    >>> verifier = Verifier(space=space, model=model, requirements=(asked,), seeds=SeedTree(1), units=2000)
+    >>> from tolalloc.allocation.space.requirement import AtYield
+    >>> from tests.builders import verifier_of_sum
+    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0, guarantee=AtYield(0.9973))
     >>> found = allocate(verifier, scale_in_proportion(verifier, 3), SearchEffort(steps=1))
     >>> round(found.chosen.cost, 1), round(cost_at_yield(verifier.space, found, 0.99), 1)
     (2.0, 1.7)
@@ -190,16 +183,8 @@ def setting_trade(
 
     >>> from tolalloc.allocation.search.zone_allocation import allocate, scale_in_proportion
     >>> from tolalloc.allocation.space.effort import SearchEffort
-    >>> from tolalloc.allocation.space.requirement import Requirement
-    >>> from tolalloc.capability.indices import Limits
-    >>> from tolalloc.drawings.seeds import SeedTree
-    >>> import tolalloc as ta
-    >>> row = {"unit": "mm", "min": 1, "max": 60, "cost": 1}
-    >>> rows = [{"id": "a", "plus": 3, "minus": -3, **row}, {"id": "b", "plus": 4, "minus": -4, **row}]
-    >>> space = DesignSpace(errors=ta.Drawing.of_rows(rows).errors)
-    >>> model = ta.model(lambda a, b: a + b, inputs=("a", "b"), outputs=("y [mm]",)).bound(space.errors, "")
-    >>> asked = Requirement(output="y [mm]", limits=Limits(upper=5.0), guarantee=ta.RootSumSquare())
-    >>> verifier = Verifier(space=space, model=model, requirements=(asked,), seeds=SeedTree(1), units=2000)
+    >>> from tests.builders import verifier_of_sum
+    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
     >>> found = allocate(verifier, scale_in_proportion(verifier, 3), SearchEffort(steps=1))
     >>> standard = np.random.default_rng(1).normal(size=(500, 2)) / 6
     >>> response = QuantileResponse(
@@ -316,16 +301,8 @@ def robustness(
 
     >>> from tolalloc.allocation.search.zone_allocation import allocate, scale_in_proportion
     >>> from tolalloc.allocation.space.effort import SearchEffort
-    >>> from tolalloc.allocation.space.requirement import Requirement
-    >>> from tolalloc.capability.indices import Limits
-    >>> from tolalloc.drawings.seeds import SeedTree
-    >>> import tolalloc as ta
-    >>> row = {"unit": "mm", "min": 1, "max": 60, "cost": 1}
-    >>> rows = [{"id": "a", "plus": 3, "minus": -3, **row}, {"id": "b", "plus": 4, "minus": -4, **row}]
-    >>> space = DesignSpace(errors=ta.Drawing.of_rows(rows).errors)
-    >>> model = ta.model(lambda a, b: a + b, inputs=("a", "b"), outputs=("y [mm]",)).bound(space.errors, "")
-    >>> asked = Requirement(output="y [mm]", limits=Limits(upper=5.0), guarantee=ta.RootSumSquare())
-    >>> verifier = Verifier(space=space, model=model, requirements=(asked,), seeds=SeedTree(1), units=2000)
+    >>> from tests.builders import verifier_of_sum
+    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
     >>> found = allocate(verifier, scale_in_proportion(verifier, 3), SearchEffort(steps=1))
     >>> robustness(verifier, found, nodes=10).at_worst.regret < 0.01
     True

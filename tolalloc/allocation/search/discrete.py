@@ -341,16 +341,8 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
     --------
     Zones a, b of 1/a and 1/b with √(a² + b²)/2 ≤ 50 µm: of R′10 50 and 80 µm are the cheapest.
 
-    >>> from tolalloc.allocation.space.requirement import Requirement
-    >>> from tolalloc.capability.indices import Limits
-    >>> from tolalloc.drawings.seeds import SeedTree
-    >>> import tolalloc as ta
-    >>> row = {"unit": "mm", "min": 0.01, "max": 0.6, "cost": 1}
-    >>> rows = [{"id": "a", "plus": 0.03, "minus": -0.03, **row}, {"id": "b", "plus": 0.04, "minus": -0.04, **row}]
-    >>> space = DesignSpace(errors=ta.Drawing.of_rows(rows).errors)
-    >>> model = ta.model(lambda a, b: a + b, inputs=("a", "b"), outputs=("y [mm]",)).bound(space.errors, "")
-    >>> asked = Requirement(output="y [mm]", limits=Limits(upper=0.05), guarantee=ta.RootSumSquare())
-    >>> verifier = Verifier(space=space, model=model, requirements=(asked,), seeds=SeedTree(1), units=2000)
+    >>> from tests.builders import verifier_of_sum
+    >>> verifier = verifier_of_sum(0.06, 0.08, limit=0.05)
     >>> found = allocate_grades(verifier, verifier.verify(verifier.space.uniform(1.0), "as drawn"), steps=6).chosen
     >>> (1e6 * found.space.zones(found.design)).round().tolist(), round(found.cost, 6)
     ([50.0, 80.0], 2.2)

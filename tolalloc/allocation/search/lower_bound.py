@@ -68,18 +68,8 @@ def lower_bound(design: VerifiedDesign) -> LowerBound:
     --------
     Least 1/a + 1/b with (3a)² + (4b)² ≤ 5²: (3^⅔ + 4^⅔)^(3/2)/5 = 1.9731.
 
-    >>> from tolalloc.allocation.space.design_space import DesignSpace
-    >>> from tolalloc.allocation.space.requirement import Requirement
-    >>> from tolalloc.allocation.verify.verification import Verifier
-    >>> from tolalloc.capability.indices import Limits
-    >>> from tolalloc.drawings.seeds import SeedTree
-    >>> import tolalloc as ta
-    >>> row = {"unit": "mm", "min": 1, "max": 60, "cost": 1}
-    >>> rows = [{"id": "a", "plus": 3, "minus": -3, **row}, {"id": "b", "plus": 4, "minus": -4, **row}]
-    >>> space = DesignSpace(errors=ta.Drawing.of_rows(rows).errors)
-    >>> model = ta.model(lambda a, b: a + b, inputs=("a", "b"), outputs=("y [mm]",)).bound(space.errors, "")
-    >>> asked = Requirement(output="y [mm]", limits=Limits(upper=5.0), guarantee=ta.RootSumSquare())
-    >>> verifier = Verifier(space=space, model=model, requirements=(asked,), seeds=SeedTree(1), units=2000)
+    >>> from tests.builders import verifier_of_sum
+    >>> verifier = verifier_of_sum(6.0, 8.0, limit=5.0)
     >>> round(lower_bound(verifier.verify(verifier.space.uniform(1.0), "as drawn")).cost, 4)
     1.9731
     """
