@@ -151,13 +151,13 @@ def test_a_model_of_a_user_is_in_order_without_a_but():
     assert says(last, "check.verdict", state=wording("check.in_order"))
 
 
-def test_teeth_that_rated_torque_presses_harder_allow_no_more_preload():
+def test_teeth_that_rated_torque_presses_harder_may_press_harder_without_it():
     reducer = ta.reducer("rv20e", flank_clearance=(1.0, 8.0), radial_clearance=(3.0, 30.0))
     asked = Prepared(study=ta.Study(reducer, ta.drawing("rv20e_drawing"), limits=LIMITS, joint=None))
-    own, settings = asked.requirements[-1], np.array([2.0, 30.0])
-    moved = own.at(asked.model, settings, asked.space.setting_steps)
-    assert rated_pin_force(asked.model.at(settings).reducer_in_force) > own.limits.upper + 200.0
-    assert (moved.limits.upper, moved.slopes) == (own.limits.upper, (0.0, 0.0))
+    own, model = asked.requirements[-1], asked.model.at(np.array([2.0, 30.0]))
+    moved = own.in_force(model)
+    assert moved.limits.upper > own.limits.upper + 200.0
+    assert moved.limits.upper == rated_pin_force(model.reducer_in_force)
 
 
 @pytest.mark.parametrize(("preset", "limited"), [("cd29", True), ("rv20e", True), ("rv20e_liu2020", False)])

@@ -15,7 +15,8 @@ from tolalloc import LOST_MOTION, PEAK_TO_PEAK
 from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.cost.model import Process, Reciprocal
 from tolalloc.allocation.front.pareto_front import exact_front
-from tolalloc.allocation.search.zone_allocation import Programs, aimed, allocate, kept_stacks, scale_in_proportion
+from tolalloc.allocation.search.steering import Programs
+from tolalloc.allocation.search.zone_allocation import aimed, allocate, kept_stacks, scale_in_proportion
 from tolalloc.allocation.space.effort import SearchEffort
 from tolalloc.allocation.space.output_sample import OutputSample
 from tolalloc.allocation.space.problem import root_sum_square_stack, worst_case_stack
@@ -34,11 +35,15 @@ class KnownSample(OutputSample):
     law = near = uncertainty = None
 
     def __init__(self, values, failed=0, confidence=0.95):
-        units = SimpleNamespace(standard=np.zeros((len(values) + failed, 0)))
+        every = np.append(values, np.full(failed, np.nan))
+        units = SimpleNamespace(standard=np.zeros((every.size, 0)), exact=(), values=lambda _: every)
         vars(self).update(values=values, units=units, output="x [mm]", confidence=confidence)
 
     def derived(self):
         return self.values, np.outer(self.values, [1.0, 0.0, 0.0, 0.0]) / self.design[0]
+
+    def slopes_at(self, rows):
+        return np.outer(self.values[rows], [1.0, 0.0, 0.0, 0.0]) / self.design[0]
 
     def worst(self, sense):
         return sense * 7.0, sense * np.array([2.0, 1.5, 0.5, -0.25])
@@ -286,7 +291,8 @@ def test_a_step_keeps_every_local_model_and_the_region(three):
     verifier, found = three
     stacks = aimed(found, [found])
     processes = verifier.space.process_positions(found.design)
-    step, _ = Programs(verifier.space, 4).step(stacks, processes, found.design, 2.5)
+    programs = Programs(verifier.space)
+    step = programs.cheapest(stacks, processes, programs.box(processes, found.design, 2.5))
     assert max(stack.load(step[:-2], step[-2:]) - stack.budget for stack in stacks) < 1e-6
     assert (step <= found.design * 2.5 * (1 + 1e-9)).all()
     assert step[-1] > found.design[-1]  # 8 µm are too few for a radial clearance above 2 µm
@@ -298,11 +304,11 @@ def test_processes_change_only_where_that_clearly_pays(three, prepared):
     stacks = aimed(found, [found])
     for factor, change in ((0.01, True), (10.0, False)):
         space, _ = with_alternatives(prepared, "housing.pitch", factor)
-        programs, present = Programs(space, 4), np.zeros(len(space.groups), dtype=int)
+        programs, present = Programs(space), np.zeros(len(space.groups), dtype=int)
         chosen = programs.choose(stacks, present)
         assert bool((chosen != present).any()) == change
-        kept = programs.of(present).solve(stacks)
-        assert programs.of(chosen).solve(stacks).cost <= kept.cost
+        kept = programs.of(present, 4).solve(stacks)
+        assert programs.of(chosen, 4).solve(stacks).cost <= kept.cost
 
 
 @pytest.mark.slow
@@ -311,7 +317,8 @@ def test_locked_clearances_stay(three, prepared):
     settings = zip(prepared.space.settings, found.settings, strict=True)
     locked = replace(prepared.space, settings=tuple(replace(own, lower=at, upper=at) for own, at in settings))
     stacks = aimed(found, [found])
-    step, _ = Programs(locked, 4).step(stacks, locked.process_positions(found.design), found.design, 2.5)
+    programs, processes = Programs(locked), locked.process_positions(found.design)
+    step = programs.cheapest(stacks, processes, programs.box(processes, found.design, 2.5))
     np.testing.assert_allclose(step[-2:], found.design[-2:], rtol=1e-12)
 
 

@@ -34,7 +34,6 @@ from tolalloc.allocation.search.zone_allocation import (
 )
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import AllocationEffort
-from tolalloc.allocation.space.joint_yield import JointRequirement
 from tolalloc.allocation.space.requirement import Requirement
 from tolalloc.allocation.verify.acceptance import (
     AS_GOOD_AS,
@@ -170,7 +169,9 @@ class DrawingQuestion:
     def free(self, fixed: ZoneAllocation) -> ZoneAllocation:
         """Return the allocation of tolerances and settings together, from where the tolerances alone ended."""
         verifier = self.verifier("joint", self.space)
-        start = self._cheaper_start(verifier, fixed.chosen)
+        # Where the settings as they are keep no limits, the tightest zones are no place to start from.
+        own = fixed.chosen if fixed.chosen.met else fixed.baseline
+        start = self._cheaper_start(verifier, own)
         return allocate(verifier, fixed.proportional_tried, self.effort.search, start)
 
     def _cheaper_start(self, verifier: Verifier, own: VerifiedDesign) -> VerifiedDesign:
@@ -486,7 +487,7 @@ class AssembledQuestion:
         """Return which random units of a drawing keep its limits if nothing is chosen."""
         design, question = found.chosen, self.question
         errors = replace(design.space.errors, compensators=())
-        asked = [own for own in found.requirements if not isinstance(own, JointRequirement)]
+        asked = (check.requirement for check in design.checks_alone)
         limits = {own.output: own.limits for own in asked}
         units = replace(design.space, errors=errors).units(
             design.design, question.seeds("as they come"), question.effort.verification_units

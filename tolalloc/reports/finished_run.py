@@ -10,6 +10,7 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tolalloc.allocation.space.requirement import OwnLimit
 from tolalloc.capability.monte_carlo import Yield
 from tolalloc.drawings.tolerance_table import heads_of
 from tolalloc.exceptions import InputError
@@ -65,9 +66,13 @@ class FinishedRun:
 
     @property
     def requirements(self) -> dict[str, tuple[object, ...]]:
-        """Output → its limits and what was to be shown, as an allocation says them, or its limits in a ranking."""
+        """Output → its limits and what was to be shown, as an allocation says them, or its limits in a ranking.
+
+        A limit that the model has of its own is nobody's question: it is what the drawn settings make it.
+        """
         said = _REQUIRED if self.allocates else _LIMITED
-        return {str(row["requirement"]): tuple(row.get(name) for name in said) for row in self._required}
+        asked = (row for row in self._required if row.get("stated by") != OwnLimit.stated_by)
+        return {str(row["requirement"]): tuple(row.get(name) for name in said) for row in asked}
 
     @property
     def allocates(self) -> bool:

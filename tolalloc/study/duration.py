@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tolalloc.allocation.front.uncertain_region import doubted
-from tolalloc.allocation.verify.verification import SLOPE_UNITS
+from tolalloc.allocation.space.tail import tail_units
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.sensitivity.inverse import fewest_units
@@ -115,7 +115,8 @@ def _of_allocation(question: Allocation, prepared: Prepared) -> tuple[_Workload,
     rough = tuple(name for name in outputs if name not in {*model.exact, *model.differentiable})
     if not rough:
         return parts
-    differences = steps * 2 * SLOPE_UNITS * (len(prepared.space.groups) + settings)
+    told = tail_units(effort.verification_units, 1 - prepared.target)
+    differences = steps * 2 * told * (len(prepared.space.groups) + settings)
     return (*parts, _Workload(units=(0, differences), seconds=_seconds(prepared, rough)))
 
 

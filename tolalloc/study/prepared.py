@@ -148,7 +148,7 @@ class Prepared:
             Requirement(output=name, limits=limit.limits, guarantee=shown(limit)) for name, limit in asked.items()
         )
         own = (
-            OwnLimit(output=name, limits=Limits(upper=upper), guarantee=shown(Limit(upper=upper)), most=upper)
+            OwnLimit(output=name, limits=Limits(upper=upper), guarantee=shown(Limit(upper=upper)))
             for name, upper in self.model.own_limits.items()
             if name not in self.study.limits
         )

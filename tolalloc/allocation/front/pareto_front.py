@@ -18,7 +18,7 @@ from tolalloc.allocation.front.pareto_problem import (
     to_genes,
 )
 from tolalloc.allocation.search import process_choice
-from tolalloc.allocation.search.zone_allocation import Programs
+from tolalloc.allocation.search.steering import Programs
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import FrontEffort
 from tolalloc.allocation.space.problem import LeastInfeasible, OneSidedConstraint, Solution, Stack
@@ -178,7 +178,7 @@ def exact_front(
     if space.has_choices:
         solved = process_choice.front(space.problem(stacks), 0, budgets)
     else:
-        program = Programs(space, len(stacks)).of(np.zeros(len(space.groups), dtype=int))
+        program = Programs(space).of(np.zeros(len(space.groups), dtype=int), len(stacks))
         solved = tuple(program.solve((replace(stacks[0], budget=own), *stacks[1:])) for own in budgets.tolist())
     known = [(share, own) for share, own in zip(shares.tolist(), solved, strict=True) if isinstance(own, Solution)]
     designs = [np.concatenate([found.zones, found.shared]) for _, found in known]

@@ -20,7 +20,8 @@ from tolalloc.allocation.front.price_region import (
 from tolalloc.allocation.front.uncertain_region import UncertainRegion, Variant, uncertain_region
 from tolalloc.allocation.search import process_choice
 from tolalloc.allocation.search.discrete import GradedAllocation
-from tolalloc.allocation.search.zone_allocation import Programs, ZoneAllocation
+from tolalloc.allocation.search.steering import Programs
+from tolalloc.allocation.search.zone_allocation import ZoneAllocation
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.problem import AllocationProblem, Solution
 from tolalloc.allocation.verify.verification import Verifier
@@ -193,7 +194,7 @@ def setting_trade(
     >>> round(float(setting_trade(response, found, ()).cost), 4)
     1.9731
     """
-    programs = Programs(response.space, len(allocation.asked_stacks))
+    programs = Programs(response.space)
     known = float(response(allocation.chosen.design[np.newaxis]).values[0, 0])
     found = [_cheapest(response, allocation, programs, known, np.array(choice)) for choice in product(*values)]
     cost, missed = np.array(found).T
@@ -221,7 +222,7 @@ def _cheapest(
         corrected = (replace(first, budget=first.budget - missed), *others)
         if number % _CHOSEN_AGAIN == 0 and space.has_choices:
             processes = process_choice.allocate(replace(space.problem(corrected), shared=held)).processes
-        program = programs.of(processes)
+        program = programs.of(processes, len(corrected))
         solution = program.solve(corrected, shared=held)
         # Where the model lets nothing keep the limits, it may still be the model that is wrong.
         found = solution or program.least_infeasible(corrected, shared=held)

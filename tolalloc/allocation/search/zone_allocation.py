@@ -7,99 +7,26 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from tolalloc.allocation.search import process_choice
-from tolalloc.allocation.search.convex_program import ConvexProgram
 from tolalloc.allocation.search.lower_bound import LowerBound, lower_bound
+from tolalloc.allocation.search.steering import (
+    LARGEST_LOG,
+    REACH_OF_MODELS,
+    REACH_OF_SETTINGS,
+    SETTLED,
+    Programs,
+    explains,
+    is_similar,
+    steering,
+)
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import SearchEffort
 from tolalloc.allocation.space.problem import Solution, Stack
 from tolalloc.allocation.space.requirement import AtYield
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, cheapest_met
 from tolalloc.exceptions import FailedUnitsError, InputError, SolveError
-
-SETTLED = 0.01
-"""Relative gain of cost that the next step must promise for a search to go on from a met design [-]."""
-
-
-class Programs:
-    """The convex programs of a design space, one for each choice of processes, compiled once.
-
-    Parameters
-    ----------
-    stacks
-        Number of one-sided constraints of all requirements [-].
-    """
-
-    def __init__(self, space: DesignSpace, stacks: int) -> None:
-        self.space, self.stacks = space, stacks
-        self._compiled: dict[tuple[int, ...], ConvexProgram] = {}
-
-    def of(self, processes: Int[np.ndarray, " group"]) -> ConvexProgram:
-        """Return the program of the processes at the given positions."""
-        key = tuple(processes.tolist())
-        if key not in self._compiled:
-            self._compiled[key] = ConvexProgram(self.space.features, processes, self.stacks, self.space.shared)
-        return self._compiled[key]
-
-    def choose(self, stacks: tuple[Stack, ...], present: Int[np.ndarray, " group"]) -> Int[np.ndarray, " group"]:
-        """Return the processes that the models prefer; the present ones stay unless another choice clearly pays.
-
-        Parameters
-        ----------
-        stacks
-            Local models with the budget that is aimed at.
-        present
-            Position of the present process of every group [-].
-        """
-        if not self.space.has_choices:
-            return present
-        best = process_choice.allocate(self.space.problem(stacks))
-        kept = self.of(present).solve(stacks)
-        if kept is not None and isinstance(best, Solution) and best.cost > (1 - SETTLED) * kept.cost:
-            return present
-        return best.processes
-
-    def step(
-        self,
-        stacks: tuple[Stack, ...],
-        processes: Int[np.ndarray, " group"],
-        around: Float[np.ndarray, " variable"],
-        reach: float,
-    ) -> tuple[Float[np.ndarray, " variable"], Float[np.ndarray, " stack"]]:
-        """Return the cheapest design near another one, or the one there that violates the stacks least; with prices.
-
-        Parameters
-        ----------
-        stacks
-            Local models with the budget that is aimed at.
-        processes
-            Position of the process of every group [-].
-        around
-            A design.
-        reach
-            Factor by which variables may change, as far as their ranges go [-].
-
-        Returns
-        -------
-        tuple
-            The design, and the shadow price of every stack, zero where the stacks are violated [cost units per unit of
-            the stack].
-        """
-        program, groups, shared = self.of(processes), len(self.space.groups), self.space.shared
-        low, high = (np.clip(around[:groups] * by, program.lower, program.upper) for by in (1 / reach, reach))
-        centre = np.clip(around[groups:], shared.lower, shared.upper)
-        size = np.maximum(np.abs(centre), 1.0)  # near zero the reach is that of 1 µm
-        near = replace(
-            shared,
-            lower=np.maximum(shared.lower, centre - size * (1 - 1 / reach)),
-            upper=np.minimum(shared.upper, centre + size * (reach - 1)),
-        )
-        found = program.solve(stacks, low, high, near) or program.least_infeasible(stacks, low, high, near)
-        prices = found.prices if isinstance(found, Solution) else np.zeros(len(stacks))
-        return np.concatenate([found.zones, found.shared]), prices
-
 
 _LEAST_RISE = 1e-6
 """What all zones together take of a limit is at least so much of the limit, where it is what a step divides by [-]."""
@@ -150,17 +77,14 @@ def _factor(tried: VerifiedDesign) -> float:
     return float(np.clip(min(factors), 0.4, 2.5))
 
 
-REACH_OF_MODELS = 1.25
-"""Ratio of zones up to which designs share their models [-]."""
 ROUNDING = 1e-9
 """Part of a budget by which rounding may lay a load that is its own budget beyond it [-]."""
-_LARGEST_LOG = float(np.log(REACH_OF_MODELS)) + 1e-9
-_REACH_OF_SETTINGS = 1.0
-"""Difference of settings, over ten steps of theirs, up to which they do [-]."""
 _REPAIRS = 3
 """Steps more where the last design does not quite keep the limits and is cheaper than any that does [-]."""
-_DIVIDING_STEPS, _DIVISIONS = 2, 4
-"""Steps that divide the failures of a joint yield anew, and how many divisions each of them tries [-]."""
+_WORTH = 0.003
+"""Relative gain of cost that the next step must promise for a search to go on from a met design [-]."""
+_AGAIN = 0.02
+"""Excess up to which a step aims as far inside as the last one lay beyond, over the deviation of an output [-]."""
 _LEAST_REACH = 1.05
 """Ratio of zones below which a step does not fall back where units have no answer [-]."""
 _EXPLAINED = 2.0
@@ -185,7 +109,7 @@ def aimed(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float = 1.0
 
     budget′ = budget − margin·standard error − mean deviation (own derivation) [unit of the output].
     """
-    similar = [item.divided(last.parts) for item in tried if _is_similar(item, last)]
+    similar = [item.divided(last.parts) for item in tried if is_similar(item, last)]
     stacks = []
     for at, constraint in enumerate(last.constraints):
         found = [
@@ -198,12 +122,6 @@ def aimed(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float = 1.0
             replace(constraint.stack, budget=constraint.stack.budget - margin * constraint.standard_error - deviation)
         )
     return tuple(stacks)
-
-
-def _is_similar(first: VerifiedDesign, second: VerifiedDesign) -> bool:
-    scales = np.abs(np.log(first.scales / second.scales)).max(initial=0.0)
-    moved = np.abs(first.settings - second.settings) / (10 * first.space.setting_steps)
-    return bool(scales <= _LARGEST_LOG and moved.max(initial=0.0) <= _REACH_OF_SETTINGS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -233,7 +151,7 @@ def model_range(chosen: VerifiedDesign, tried: Iterable[VerifiedDesign]) -> Mode
         ratios = own.space.zones(own.design) / zones
         same = np.array_equal(own.design, chosen.design) and np.allclose(ratios, 1.0)
         moved = np.abs(own.settings - chosen.settings) / (10 * chosen.space.setting_steps)
-        if same or np.abs(np.log(ratios)).max() > _LARGEST_LOG or moved.max(initial=0.0) > _REACH_OF_SETTINGS:
+        if same or np.abs(np.log(ratios)).max() > LARGEST_LOG or moved.max(initial=0.0) > REACH_OF_SETTINGS:
             continue
         design = own.design_in(chosen.space)
         wider = design[:groups] - chosen.scales
@@ -284,9 +202,9 @@ def step_from(
         Factor by which a variable may change [-].
     """
     processes = last.space.process_positions(last.design)
-    return Programs(last.space, len(last.constraints)).step(
-        aimed(last, [*tried, last], margin), processes, last.design, reach
-    )[0]
+    return Programs(last.space).step(
+        steering(last, [*tried, last], margin).moved_out(_AGAIN), processes, last.design, reach
+    )
 
 
 def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach: float) -> tuple[VerifiedDesign, ...]:
@@ -305,8 +223,9 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
 
     Notes
     -----
-    Where all limits are kept at once, the failures that this allows are divided among the limits by what they cost, in
-    each of the first two steps.
+    Every step is the cheapest design near by that the units of the last one let keep the limits, each with its own
+    derivatives: where all limits are kept at once, a unit fails the one that it lies furthest beyond, and no failures
+    need be divided.
 
     Where the units of a step are further from the prediction than chance explains, by more than two standard errors of
     both, the next step reaches less: the square root of the factor, 1.25 at least. So it does, 1.05 at least, where
@@ -328,64 +247,27 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
     [1.121, 0.925]
     """
     space, tried = verifier.space, [start]
-    programs, processes = Programs(space, len(start.constraints)), space.process_positions(start.design)
+    programs, processes = Programs(space), space.process_positions(start.design)
     for step in range(steps + _REPAIRS):
-        kept = [own.cost for own in tried if own.met]
-        if step >= steps and (tried[-1].met or tried[-1].cost >= (1 - SETTLED) * min(kept, default=np.inf)):
+        last, kept = tried[-1], [own.cost for own in tried if own.met]
+        if step >= steps and (last.met or last.cost >= (1 - _WORTH) * min(kept, default=np.inf)):
             break
-        processes = programs.choose(aimed(tried[-1], tried), processes)
-        if step < _DIVIDING_STEPS:
-            tried[-1] = _divided(programs, tried, processes, reach)
-        last = tried[-1]
-        verifier = verifier.dividing_as(last)
-        goal = aimed(last, tried)
-        if step >= steps:  # what mends one side of two limits takes from the other: aim further inside
-            sides = ((own.excess, len(check.steering) > 1) for check in last.checks for own in check.steering)
-            missed = (by if two and 0.0 < by < np.inf else 0.0 for by, two in sides)
-            goal = tuple(replace(stack, budget=stack.budget - by) for stack, by in zip(goal, missed, strict=True))
-        found, _ = programs.step(goal, processes, last.design, reach)
-        settled = space.cost(found) > (1 - SETTLED) * last.cost if last.met else np.allclose(found, last.design)
+        goal = steering(last, tried)
+        if step > 0:  # what is missed by as little as units err is missed again where it is aimed at
+            goal = goal.moved_out(_AGAIN)
+        processes = programs.choose(goal.around(last.design), processes)
+        found = programs.step(goal, processes, last.design, reach)
+        settled = space.cost(found) > (1 - _WORTH) * last.cost if last.met else np.allclose(found, last.design)
         if step > 0 and settled:
             break
         try:
-            tried.append(verifier.verify(found, f"convex {step + 1}"))
+            tried.append(verifier.verify(found, f"convex {step + 1}").evenly_divided())
         except FailedUnitsError:
             reach = max(_LEAST_REACH, float(np.sqrt(reach)))
             continue
-        if not _explains(last, tried[-1]):
+        if not explains(last, tried[-1], _EXPLAINED):
             reach = max(1.25, float(np.sqrt(reach)))
     return tuple(tried[1:])
-
-
-def _divided(
-    programs: Programs, tried: list[VerifiedDesign], processes: Int[np.ndarray, " group"], reach: float
-) -> VerifiedDesign:
-    """Return the last design with the failures of a joint yield divided as its models find them cheapest.
-
-    A division that prices ask for is gone half-way to, then a quarter and so on where the program gets no cheaper: the
-    prices of limits that fail together tell nothing of how far to go.
-    """
-    last, way = tried[-1], 0.5
-    if len(last.parts) < 2:
-        return last
-    found, prices = programs.step(aimed(last, tried), processes, last.design, reach)
-    for _ in range(_DIVISIONS):
-        other = last.divided_towards(prices, way)
-        step, charged = programs.step(aimed(other, tried), processes, other.design, reach)
-        if prices.any() and charged.any() and last.space.cost(step) < last.space.cost(found):
-            last, found, prices = other, step, charged
-        else:
-            way /= 2
-    return last
-
-
-def _explains(last: VerifiedDesign, new: VerifiedDesign) -> bool:
-    """Return whether the models of a design predicted what the units of the next one said."""
-    return all(
-        abs(now.excess - before.predicted(new.design))
-        <= _EXPLAINED * np.hypot(before.standard_error, now.standard_error)
-        for before, now in zip(last.constraints, new.constraints, strict=True)
-    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -515,8 +397,7 @@ def allocate(
     tried = ((first,) if space.allows(first.design) else ()) + stepped
     if not tried:
         raise FailedUnitsError("Of every drawing inside the ranges that was tried too many units have no answer.")
-    tried = tuple(own.divided(tried[-1].parts) for own in tried)
-    chosen = cheapest_met(tried)
+    chosen = cheapest_met(tried).evenly_divided()
     return ZoneAllocation(
         limit=verifier.limit,
         chosen=chosen,

@@ -184,7 +184,7 @@ QUICK_ALLOCATION = AllocationEffort(
     confirmation_units=4608,
     shared_units=48,
     search=SearchEffort(
-        steps=2,
+        steps=4,
         front=FrontEffort(population=40, generations=40, population_on_kernel=8, designs=16, rounds=1, points=6),
     ),
     graded_steps=3,

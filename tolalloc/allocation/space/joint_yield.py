@@ -98,11 +98,9 @@ class JointRequirement(Requirement):
         """Return the planes near all that is limited, with an excess over the limit."""
         return tuple(plane for own in self.requirements for plane in own.controls(nearest, planes, relative=True))
 
-    def at(
-        self, model: Model, settings: Float[np.ndarray, " setting"], steps: Float[np.ndarray, " setting"]
-    ) -> JointRequirement:
-        """Return the requirement with every limit as it is at settings of a model."""
-        return replace(self, requirements=tuple(own.at(model, settings, steps) for own in self.requirements))
+    def in_force(self, model: Model) -> JointRequirement:
+        """Return the requirement with every limit as a model has it at its settings."""
+        return replace(self, requirements=tuple(own.in_force(model) for own in self.requirements))
 
     def check(self, sample: OutputSample) -> Check:
         """Return whether all limits are kept at once; the search is steered by the limits."""
@@ -331,36 +329,12 @@ class JointCheck(Check):
         """Return the parts of the failures at which no limit is tighter than another: as often as each one fails.
 
         pᵢ ∝ P(eᵢ > 0) by the tail of the output (own derivation): so all limits are reached by one factor of all zones.
+        One that hardly fails keeps 2 %.
         """
-        return self._parts(np.array([tail.failing_share for tail in self.tails]), 1.0)
-
-    def parts_towards(
-        self, of_limit: tuple[int, ...], prices: Float[np.ndarray, " side"], portion: float
-    ) -> tuple[float, ...]:
-        """Return the parts of the failures nearer to those at which no other division would be cheaper.
-
-        Parameters
-        ----------
-        of_limit
-            Number of constraints of every limit [-].
-        prices
-            Shadow price of every constraint that steers the search [cost units per unit of the output].
-        portion
-            How far the parts go there from the present ones [-].
-
-        Notes
-        -----
-        Least Σ λᵢ·eᵢ(fᵢ) with Σ fᵢ given is where λᵢ·∂eᵢ/∂fᵢ are equal. As −∂e/∂ln f = s·f/φ(z) hardly depends on f,
-        fᵢ ∝ λᵢ·sᵢ (own derivation).
-        """
-        own = np.array([part.sum() for part in np.split(prices, np.cumsum(of_limit)[:-1])])
-        return self._parts(own * [tail.slope for tail in self.tails], portion)
-
-    def _parts(self, weights: Float[np.ndarray, " limit"], portion: float) -> tuple[float, ...]:
-        """Return parts nearer by a portion to those in proportion to weights; a limit without weight keeps 2 %."""
-        if not weights.sum() > 0:
+        failing = np.array([tail.failing_share for tail in self.tails])
+        if not failing.sum() > 0:
             return self.joint.parts
-        parts = np.maximum(portion * weights / weights.sum() + (1 - portion) * np.array(self.joint.parts), _LEAST_PART)
+        parts = np.maximum(failing / failing.sum(), _LEAST_PART)
         return tuple((parts / parts.sum()).tolist())
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from tolalloc.allocation.space.design_space import DesignSpace
+from tolalloc.allocation.space.tail import FurthestUnits, tail_units
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.halving import halved
 from tolalloc.capability.indices import Limits
@@ -27,8 +28,9 @@ _EVEN_ODDS, _TENTH = 0.5, 0.1
 _FURTHER, _SURELY = 4, 200
 """Units that are compared with planes: so many times the share that may fail, and so many more [-]."""
 _HALVINGS = 40
-_STEP = 1e-3
-"""Step of the derivative of a share, over the range of the furthest units [-]."""
+_STEP, _NEAREST = 1e-3, 100
+"""Step of the derivative of a share by law, over the range of the furthest units, and units that tell it otherwise [-].
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,7 +186,8 @@ class LimitedSample:
 
         Notes
         -----
-        By halving, in 40 steps, where `ControlResiduals.share` is the share; on the right side of the limits.
+        By halving, in 40 steps, where `ControlResiduals.share` is the share; on the right side of the limits. Its error
+        is that of the share over the density there, by the planes or by the units themselves, whichever is more.
         """
         own, planes = self._furthest(share)
         ends = np.maximum(own, planes.max(axis=0))
@@ -201,8 +204,10 @@ class LimitedSample:
             low, high = (low, 0.0) if residuals(0.0).share(confidence) <= share else (0.0, high)
         high = float(halved(lambda by: residuals(by).share(confidence) <= share, high, low, _HALVINGS))
         step = _STEP * (float(np.ptp(finite)) or 1.0)
-        fall = sum(control.share(high - step) - control.share(high + step) for control in self.controls) / (2 * step)
-        return high, residuals(high).standard_error / max(fall, np.finfo(float).tiny)
+        by_law = sum(control.share(high - step) - control.share(high + step) for control in self.controls) / (2 * step)
+        near = float(np.sort(np.abs(own - high))[min(_NEAREST, own.size) - 1])  # where planes are far, units are not
+        by_units = min(_NEAREST, own.size) / (2 * max(near, step) * self.values.size)
+        return high, residuals(high).standard_error / max(by_law, by_units)
 
     def _furthest(self, share: float) -> tuple[Float[np.ndarray, " few"], Float[np.ndarray, "control few"]]:
         """Return how far the units furthest beyond the limits lie, by themselves and by every plane.
@@ -270,13 +275,13 @@ class DesignSample:
     @cached_property
     def exact(self) -> dict[str, SettingDerivatives]:
         """Outputs whose derivatives the model knows exactly, of the first units."""
-        model, first = self._at(self.design), self.x[: self.derivative_units]
+        model, first = self.at(self.design), self.x[: self.derivative_units]
         return {output: model.derivatives(output, first) for output in self.outputs if output in model.exact}
 
     @cached_property
     def _rest(self) -> Evaluation:
         """The same outputs of the other units."""
-        return self._at(self.design).reading(tuple(self.exact))(self.x[self.derivative_units :])
+        return self.at(self.design).reading(tuple(self.exact))(self.x[self.derivative_units :])
 
     @cached_property
     def _others(self) -> tuple[str, ...]:
@@ -286,7 +291,7 @@ class DesignSample:
     @cached_property
     def others(self) -> Evaluation:
         """The other outputs, in the order of their names; a unit is good if all of them are."""
-        return self._at(self.design).reading(self._others)(self.x)
+        return self.at(self.design).reading(self._others)(self.x)
 
     def evaluation(self, output: str) -> Evaluation:
         """Return one output of every unit."""
@@ -363,20 +368,24 @@ class DesignSample:
         Theory page, equation (23): a deviation is its zone times a standard value, so ∂y/∂zone = Σ ∂y/∂xᵢ·standardᵢ,
         with the standard values as parts are arranged at assembly.
         """
-        return self._by_zone(self.exact[output])
+        return self._by_zone(self.exact[output], self.standard)
 
-    def _by_zone(self, found: SettingDerivatives) -> Float[np.ndarray, "good source"]:
+    def _by_zone(
+        self, found: SettingDerivatives, standard: Float[np.ndarray, "unit column"]
+    ) -> Float[np.ndarray, "good source"]:
         good, names = found.evaluation.good, self.space.errors.source_of_column
         starts = [names.index(source.name) for source in self.space.errors.active]
-        standard = self.space.errors.by_zone(self.standard[: good.size], self.space.zones(self.design))
-        moved = found.by_column[good] * standard[good]
+        arranged = self.space.errors.by_zone(standard[: good.size], self.space.zones(self.design))
+        moved = found.by_column[good] * arranged[good]
         return np.asarray(np.add.reduceat(moved, starts, axis=1))
 
-    def _slopes(self, found: SettingDerivatives) -> Float[np.ndarray, "first variable"]:
-        """Return the derivatives of the first units by every variable, NaN where a unit has none."""
+    def _slopes(
+        self, found: SettingDerivatives, standard: Float[np.ndarray, "unit column"]
+    ) -> Float[np.ndarray, "first variable"]:
+        """Return the derivatives of the first of some units by every variable, NaN where a unit has none."""
         good = found.evaluation.good
         slopes = np.full((good.size, self.design.size), np.nan)
-        by_scale = self.space.by_scale(self._by_zone(found))
+        by_scale = self.space.by_scale(self._by_zone(found, standard))
         slopes[good] = np.concatenate([by_scale, found.by_setting[good]], axis=1)
         return slopes
 
@@ -392,8 +401,17 @@ class DesignSample:
             values, slopes = self._others_of_first
             at = self._others.index(output)
             return values[:, at], slopes[:, at]
-        slopes = self._slopes(self.exact[output])
+        slopes = self._slopes(self.exact[output], self.standard)
         return self.values(output)[: len(slopes)], slopes
+
+    def slopes_at(self, output: str, rows: Int[np.ndarray, " few"]) -> Float[np.ndarray, "few variable"]:
+        """Return the derivatives of an output of some units by every variable, NaN where one has none."""
+        if output in self.exact and rows.max(initial=-1) < self.derivative_units:
+            return np.asarray(self._slopes(self.exact[output], self.standard)[rows])
+        model, standard = self.at(self.design), self.standard[rows]
+        if output in (*model.exact, *model.differentiable):
+            return self._slopes(model.derivatives(output, self.x[rows]), standard)
+        return np.asarray(self._differences((output,), standard)[0])
 
     def worst(self, output: str, sense: Literal[1, -1]) -> tuple[float, Float[np.ndarray, " variable"]]:
         """Return the worst value inside the zones and its derivative by every variable [unit of the output].
@@ -436,9 +454,9 @@ class DesignSample:
         self,
     ) -> tuple[Float[np.ndarray, "first output"], Float[np.ndarray, "first output variable"]]:
         """Other outputs of the first units, and their derivatives."""
-        standard, model = self.standard[: self.slope_units], self._at(self.design)
+        standard, model = self.standard[: self.slope_units], self.at(self.design)
         slopes = {
-            output: self._slopes(model.derivatives(output, self.x[: len(standard)]))
+            output: self._slopes(model.derivatives(output, self.x[: len(standard)]), standard)
             for output in self._others
             if output in model.differentiable
         }
@@ -458,16 +476,17 @@ class DesignSample:
             ends = []
             for design in (self.design + step, self.design - step):
                 deviations = self.space.errors.deviations(standard, self.space.zones(design))
-                found = self._at(design).reading(outputs)(deviations)
+                found = self.at(design).reading(outputs)(deviations)
                 ends.append(np.where(found.good[:, np.newaxis], found.values, np.nan))
             slopes[..., at] = (ends[0] - ends[1]).T / (2 * steps[at])
         return slopes
 
     def _differentiable(self, output: str) -> ResponseWithDerivatives:
         """Return the output at the design with derivatives by the columns, exact ones where the model knows them."""
-        return derived(self._at(self.design), output, self.x.std(axis=0))
+        return derived(self.at(self.design), output, self.x.std(axis=0))
 
-    def _at(self, design: Float[np.ndarray, " variable"]) -> Model:
+    def at(self, design: Float[np.ndarray, " variable"]) -> Model:
+        """Return the model at the settings of a design."""
         return self.model.at(self.space.settings_of(design))
 
 
@@ -521,6 +540,28 @@ class OutputSample:
     def derived(self) -> tuple[Float[np.ndarray, " known"], Float[np.ndarray, "known variable"]]:
         """Return the output of some units and its derivative by every variable [unit of the output]."""
         return self.units.derived(self.output)
+
+    def slopes_at(self, rows: Int[np.ndarray, " few"]) -> Float[np.ndarray, "few variable"]:
+        """Return the derivative of some units' distance from an upper limit by every variable, NaN without one."""
+        return self.units.slopes_at(self.output, rows)
+
+    @cached_property
+    def _furthest(self) -> dict[tuple[int, float], FurthestUnits]:
+        return {}
+
+    def furthest(self, limits: Limits, share: float) -> tuple[FurthestUnits, ...]:
+        """Return the units furthest beyond every limit, as many as tell what a share of all lies beyond."""
+        values = self.units.values(self.output)
+        count = tail_units(values.size, share, cheap=self.output in self.units.exact)
+        for sign, limit in limits.turned:
+            if (sign, limit) not in self._furthest:
+                turned = partial(self._turned_slopes, sign)
+                found = FurthestUnits.of(sign * (values - limit), abs(limit) or 1.0, count, turned)
+                self._furthest[sign, limit] = found
+        return tuple(self._furthest[own] for own in limits.turned)
+
+    def _turned_slopes(self, sign: int, rows: Int[np.ndarray, " few"]) -> Float[np.ndarray, "few variable"]:
+        return sign * self.slopes_at(rows)
 
     def worst(self, sense: Literal[1, -1]) -> tuple[float, Float[np.ndarray, " variable"]]:
         """Return the worst value inside the zones and its derivative by every variable [unit of the output]."""

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated, ClassVar, Literal, Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
+from tolalloc.allocation.space.excess_quantile import ExcessQuantile
 from tolalloc.allocation.space.output_sample import ControlPlane, DesignSample, LimitedSample, OutputSample
 from tolalloc.allocation.space.problem import OneSidedConstraint, Stack, root_sum_square_stack, worst_case_stack
 from tolalloc.capability.indices import Limits
@@ -26,8 +28,6 @@ _BATCHES = 16
 
 
 _EVEN_ODDS = 0.5
-_FEWEST = 16
-"""Units around an excess that tell which limit they lie near, and as many as lie beyond it, twice [-]."""
 _SURROUNDED, _SURROUNDING = 4, 4000
 """Of so many times what lies beyond a rank, and so many more values, the rank of a resample is one, surely [-]."""
 _ACCURACY = 1e-6
@@ -221,7 +221,7 @@ class AtYield(NamedFields):
 
     def constraints(self, sample: OutputSample, limits: Limits) -> tuple[OneSidedConstraint, ...]:
         """Return every one-sided constraint, the upper one first."""
-        return spread_constraints(sample, self.bounds(sample.limited(limits), sample.confidence), limits)
+        return tail_constraints(sample, self.bounds(sample.limited(limits), sample.confidence), limits, 1 - self.target)
 
     def bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what units show of every limit, or what its law does where they keep to it."""
@@ -301,7 +301,7 @@ class AtCpk(NamedFields):
     def constraints(self, sample: OutputSample, limits: Limits) -> tuple[OneSidedConstraint, ...]:
         """Return every one-sided constraint, the upper one first."""
         bounds = self.bounds(sample.limited(limits), sample.confidence)
-        return tuple(spread_constraints(sample, (own,), limits.side(own.sign))[0] for own in bounds)
+        return tuple(_moment_constraint(sample, own) for own in bounds)
 
     def bounds(self, sample: LimitedSample, confidence: float) -> tuple[QuantileBound, ...]:
         """Return what units show of every limit."""
@@ -341,29 +341,42 @@ class AtCpk(NamedFields):
         return float(needed), float(np.sqrt(variance))
 
 
-def spread_constraints(
-    sample: OutputSample, bounds: tuple[QuantileBound, ...], limits: Limits
+def tail_constraints(
+    sample: OutputSample, bounds: tuple[QuantileBound, ...], limits: Limits, share: float
 ) -> tuple[OneSidedConstraint, ...]:
-    """Return the constraints of what spreads at what is compared with the limits, each with its local model.
+    """Return the constraints of a yield at what is compared with the limits, each with its local model.
 
-    Of a law the side that decides moves as the excess beyond both limits does, the other one as its own quantile.
+    The side that decides moves as the excess beyond both limits does, the other one as its own quantile. A share of
+    the units may fail [-].
     """
     furthest = max(bounds, key=lambda bound: bound.excess)
     asked = (limits if bound is furthest else limits.side(bound.sign) for bound in bounds)
-    return tuple(_spread_constraint(sample, *own) for own in zip(bounds, asked, strict=True))
+    return tuple(_tail_constraint(sample, *own, share) for own in zip(bounds, asked, strict=True))
 
 
-def _spread_constraint(sample: OutputSample, bound: QuantileBound, limits: Limits) -> OneSidedConstraint:
-    value, groups = bound.turned(sample.values), sample.groups
-    excess, (known, derivative) = value - bound.sign * bound.limit, sample.derived()
-    weights = np.zeros(known.size)
-    own = _part(sample, bound.sign, limits, excess)
-    for sign, limit in limits.turned:
-        part, at = (own, value) if sign == bound.sign else (1.0 - own, sign * limit + excess)
-        weights += part * sign * spread_weights(sign * sample.values, sign * known, at)
-    gradient = weights @ derivative / weights.size
-    split = (np.array_split(each, min(_BATCHES, weights.size)) for each in (weights, derivative))
-    batches = np.stack([own @ slopes / own.size for own, slopes in zip(*split, strict=True)])
+def _tail_constraint(sample: OutputSample, bound: QuantileBound, limits: Limits, share: float) -> OneSidedConstraint:
+    excess, parts = bound.turned(sample.values) - bound.sign * bound.limit, sample.furthest(limits, share)
+    beyond = float(np.count_nonzero(limits.excess(sample.values).max(axis=0) > excess))
+    quantile = ExcessQuantile(
+        name=_name_of(sample, bound.sign),
+        design=sample.design,
+        share=min(max(beyond, 0.5) / parts[0].units, 0.5),
+        parts=parts,
+    )
+    batches = [quantile.batch(first, _BATCHES).gradient for first in range(_BATCHES)]
+    by_excess = parts[0].deviation
+    return _with_law(sample, bound, limits, quantile.gradient * by_excess, np.stack(batches) * by_excess)
+
+
+def _with_law(
+    sample: OutputSample,
+    bound: QuantileBound,
+    limits: Limits,
+    gradient: Float[np.ndarray, " variable"],
+    batches: Float[np.ndarray, "batch variable"],
+) -> OneSidedConstraint:
+    """Return a constraint with a gradient, that of the scales by the law where the output is linear."""
+    excess, groups = bound.turned(sample.values) - bound.sign * bound.limit, sample.groups
     if sample.law:
         gradient[:groups] = sample.units.space.by_scale(sample.law.excess_by_zone(limits, excess))
         batches[:, :groups] = gradient[:groups]
@@ -379,20 +392,14 @@ def _spread_constraint(sample: OutputSample, bound: QuantileBound, limits: Limit
     )
 
 
-def _part(sample: OutputSample, sign: int, limits: Limits, excess: float) -> float:
-    """Return by which part of its change the side that decides moves an excess, as the units around it lie [-].
-
-    No less than a half: with less a setting would go towards the limit that decides, and nothing would hold it.
-    """
-    if limits.width is None:
-        return 1.0
-    if sample.law:
-        upper = sample.law.upper_part(limits, excess)
-    else:
-        beyond = limits.excess(sample.values)
-        near = largest_first(beyond.max(axis=0), 2 * int(np.count_nonzero(beyond > excess)) + _FEWEST)
-        upper = float(np.mean(beyond[0, near] >= beyond[1, near]))
-    return max(upper if sign > 0 else 1.0 - upper, _EVEN_ODDS)
+def _moment_constraint(sample: OutputSample, bound: QuantileBound) -> OneSidedConstraint:
+    """Return the constraint of mean + spread·σ at what is compared with one limit."""
+    known, derivative = sample.derived()
+    weights = bound.sign * spread_weights(bound.sign * sample.values, bound.sign * known, bound.turned(sample.values))
+    split = (np.array_split(each, min(_BATCHES, weights.size)) for each in (weights, derivative))
+    batches = np.stack([own @ slopes / own.size for own, slopes in zip(*split, strict=True)])
+    limits = Limits(upper=bound.limit) if bound.sign > 0 else Limits(lower=bound.limit)
+    return _with_law(sample, bound, limits, weights @ derivative / weights.size, batches)
 
 
 def spread_weights(
@@ -499,6 +506,8 @@ def _left(distance: float, locked: float) -> float:
 class Requirement:
     """Limits of an output and what must be shown of them."""
 
+    stated_by: ClassVar[str] = "study"
+
     output: str  # Name of the output with its unit
     limits: Limits  # One or two limits [unit of the output]
     guarantee: Guarantee  # What must be shown
@@ -523,13 +532,8 @@ class Requirement:
         """Return what units say of it."""
         return OutputSample(units=units, output=self.output, confidence=confidence)
 
-    def at(
-        self,
-        model: Model,  # noqa: ARG002
-        settings: Float[np.ndarray, " setting"],  # noqa: ARG002
-        steps: Float[np.ndarray, " setting"],  # noqa: ARG002
-    ) -> Requirement:
-        """Return the requirement as it is at settings of a model, with steps of differences; what is stated stays."""
+    def in_force(self, model: Model) -> Requirement:  # noqa: ARG002
+        """Return the requirement as a model has it at its settings; what a study states stays."""
         return self
 
     def controls(
@@ -566,49 +570,46 @@ class OwnLimit(Requirement):
 
     Notes
     -----
-    Every design is held to the limit at its own settings, solved there, and to no more than that at the settings of the
-    study: a modification under which rated torque presses harder is no reason to press harder without torque. The
-    excess falls with a setting by the derivative of the limit, of central differences.
+    Every design is held to the limit at its own settings, solved there. The excess falls with a setting by the
+    derivative of the limit, of central differences.
     """
 
-    most: float  # Limit at the settings of the study [unit of the output]
+    stated_by: ClassVar[str] = "model"
 
-    # Change of the limit with every setting [unit of the output per unit of the setting]
-    slopes: tuple[float, ...] = ()
-
-    def at(
-        self, model: Model, settings: Float[np.ndarray, " setting"], steps: Float[np.ndarray, " setting"]
-    ) -> OwnLimit:
-        """Return the requirement with the limit at other settings."""
-        if settings.size == 0:
-            return self
-
-        def limit(own: Float[np.ndarray, " setting"]) -> float:
-            return min(float(model.at(own).own_limits[self.output]), self.most)
-
-        slopes = (
-            (limit(settings + step) - limit(settings - step)) / (2 * size)
-            for step, size in zip(np.diag(steps), steps.tolist(), strict=True)
-        )
-        return replace(self, limits=Limits(upper=limit(settings)), slopes=tuple(slopes))
+    def in_force(self, model: Model) -> OwnLimit:
+        """Return the requirement with the limit at the settings of a model."""
+        return replace(self, limits=Limits(upper=float(model.own_limits[self.output])))
 
     def sample(self, units: DesignSample, confidence: float) -> OutputSample:
         """Return what units say of the output above its limit."""
-        return _OfOwnLimit(units=units, output=self.output, confidence=confidence, slopes=self.slopes)
+        return _OfOwnLimit(units=units, output=self.output, confidence=confidence)
 
 
 @dataclass(frozen=True, kw_only=True)
 class _OfOwnLimit(OutputSample):
     """What units say of an output whose limit moves with the settings."""
 
-    slopes: tuple[float, ...]  # Of the limit [unit of the output per unit of the setting]
+    @cached_property
+    def _moved(self) -> Float[np.ndarray, " variable"]:
+        """Change of the limit with every variable, by central differences [unit of the output]."""
+
+        def limit(design: Float[np.ndarray, " variable"]) -> float:
+            return float(self.units.at(design).own_limits[self.output])
+
+        moved = np.zeros(self.design.size)
+        for at, size in enumerate(self.units.space.setting_steps.tolist(), start=self.groups):
+            step = size * (np.arange(moved.size) == at)
+            moved[at] = (limit(self.design + step) - limit(self.design - step)) / (2 * size)
+        return moved
 
     def derived(self) -> tuple[Float[np.ndarray, " known"], Float[np.ndarray, "known variable"]]:
         """Return the output of some units and the derivative, by every variable, of its distance from the limit."""
         values, slopes = self.units.derived(self.output)
-        moved = np.zeros(slopes.shape[1])
-        moved[self.groups : self.groups + len(self.slopes)] = self.slopes
-        return values, slopes - moved
+        return values, slopes - self._moved
+
+    def slopes_at(self, rows: Int[np.ndarray, " few"]) -> Float[np.ndarray, "few variable"]:
+        """Return the derivative of some units' distance from the limit by every variable, NaN without one."""
+        return np.asarray(self.units.slopes_at(self.output, rows) - self._moved)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.space.design_space import DesignSpace
+from tolalloc.allocation.space.excess_quantile import ExcessQuantile
 from tolalloc.allocation.space.joint_yield import JointCheck, divided, limited_by, tightened
 from tolalloc.allocation.space.output_sample import DesignSample
 from tolalloc.allocation.space.problem import OneSidedConstraint
 from tolalloc.allocation.space.requirement import (
+    USUAL_YIELD,
+    AtYield,
     Check,
     Requirement,
-    spread_constraints,
     spread_weights,
+    tail_constraints,
 )
+from tolalloc.allocation.space.tail import FEWEST_OF_TAIL, FurthestUnits
 from tolalloc.allocation.verify.independent_sample import IndependentSample
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.capability.linear_function import LinearLaw, NearPlane
@@ -64,6 +68,8 @@ class VerifiedDesign:
     by_deviation: Float[np.ndarray, " source"] | None
     confidence: float  # With which the units show what is compared with the limits, one-sided [-]
     near: Mapping[str, NearPlane] = field(default_factory=dict)  # Output → plane that was found near it
+    # Output → units that tell its tail, those beyond every limit
+    furthest: Mapping[str, tuple[FurthestUnits, ...]] = field(default_factory=dict)
     # What is limited → what measured parts leave open of it; all limits at once under `ALL_LIMITS`
     uncertainties: Mapping[str, ProcessUncertainty] = field(default_factory=dict)
     independent: IndependentSample | None = None  # What tested it last, none if it was not tested
@@ -101,6 +107,45 @@ class VerifiedDesign:
     def constraints(self) -> tuple[OneSidedConstraint, ...]:
         """One-sided constraints that a search keeps: of all requirements, tightened where they are kept at once."""
         return tuple(constraint for check in self.checks for constraint in check.steering)
+
+    @cached_property
+    def quantiles(self) -> tuple[ExcessQuantile, ...]:
+        """What units say of every yield, also of other designs near by; of a yield of all limits that alone decides."""
+        found, last = [], self.jointly
+        if last:
+            (verdict,), joint = last.constraints, self._quantile(last.requirement.output, self.checks_alone, last.joint)
+            found.append(joint and joint.at_level(verdict.excess, verdict.standard_error))
+        for check in self._alone_by_units:
+            side = max(check.constraints, key=lambda own: own.excess)
+            own = self._quantile(side.stack.name, (check,), check.requirement)
+            found.append(own and own.at_excess(side.excess, side.standard_error))
+        return tuple(own for own in found if own)
+
+    @property
+    def _alone_by_units(self) -> tuple[Check, ...]:
+        """Checks of yields that units tell and that a yield of all limits does not keep already.
+
+        A law tells more than units, but where a setting may move an output from one of its limits to the other.
+        """
+        joint, moves = self.jointly.joint.guarantee.target if self.jointly else 0.0, self.settings.size > 0
+        asked = (own for own in self.checks_alone if asked_yield(own) > joint)
+        return tuple(own for own in asked if not own.constraints[0].law or (moves and len(own.constraints) > 1))
+
+    @property
+    def beside_quantiles(self) -> tuple[OneSidedConstraint, ...]:
+        """Constraints of what no units decide: exact laws, worst cases, moments."""
+        if not self.quantiles:
+            return self.constraints
+        told = () if self.jointly is None else [own for own in self.checks_alone if asked_yield(own)]
+        by_units = (*self._alone_by_units, *told)
+        return tuple(side for check in self.checks_alone if check not in by_units for side in check.constraints)
+
+    def _quantile(self, name: str, checks: Sequence[Check], asked: Requirement) -> ExcessQuantile | None:
+        """Return the quantile of the largest excess over the limits of some checks, none where no unit moves it."""
+        parts = tuple(part for own in checks for part in self.furthest[own.requirement.output])
+        enough = len({*np.concatenate([own.rows for own in parts]).tolist()}) >= FEWEST_OF_TAIL
+        share = 1 - getattr(asked.guarantee, "target", USUAL_YIELD)
+        return ExcessQuantile(name=name, design=self.design, share=share, parts=parts) if enough else None
 
     @property
     def limited_sides(self) -> tuple[tuple[Check, OneSidedConstraint], ...]:
@@ -182,13 +227,6 @@ class VerifiedDesign:
         """Return the design with those failures divided as often as each limit fails."""
         return self.divided(self.jointly.parts_as_failing()) if self.jointly else self
 
-    def divided_towards(self, prices: Float[np.ndarray, " side"], portion: float) -> VerifiedDesign:
-        """Return the design with those failures divided nearer to what the prices of its constraints ask for."""
-        if self.jointly is None:
-            return self
-        sides = tuple(len(check.steering) for check in self.checks[:-1])
-        return self.divided(self.jointly.parts_towards(sides, prices, portion))
-
 
 @dataclass(frozen=True, kw_only=True)
 class Verifier:
@@ -221,8 +259,8 @@ class Verifier:
     def verify(self, design: Float[np.ndarray, " variable"], name: str) -> VerifiedDesign:
         """Return the design with what random units of its own say of it."""
         seeds, errors = self.seeds.child(name), self.space.errors
-        settings = self.space.settings_of(design)
-        requirements = tuple(own.at(self.model, settings, self.space.setting_steps) for own in self.requirements)
+        model = self.model.at(self.space.settings_of(design))
+        requirements = tuple(own.in_force(model) for own in self.requirements)
         outputs = tuple(dict.fromkeys(name for requirement in requirements for name in requirement.outputs))
         sample = DesignSample(
             space=self.space,
@@ -241,7 +279,9 @@ class Verifier:
             tuple(requirement.check(own) for requirement, own in zip(requirements, read, strict=True)),
             limited_by(sample),
             self.confidence,
-            lambda check, bounds, at: spread_constraints(read[at], bounds, check.requirement.limits),
+            lambda check, bounds, at: tail_constraints(
+                read[at], bounds, check.requirement.limits, failing_share(check)
+            ),
         )
         values = {output: sample.values(output) for output in outputs}
         uncertainties = _uncertainties(sample, requirements, values)
@@ -266,8 +306,24 @@ class Verifier:
             by_deviation=sample.sensitivity(sample.outputs[0]) if sample.outputs[0] in sample.exact else None,
             confidence=self.confidence,
             near=sample.nearest,
+            furthest={
+                own.requirement.output: units.furthest(own.requirement.limits, failing_share(own))
+                for own, units in zip(checks, read, strict=True)
+                if not isinstance(own, JointCheck) and (asked_yield(own) or isinstance(checks[-1], JointCheck))
+            },
             uncertainties=uncertainties,
         )
+
+
+def failing_share(check: Check) -> float:
+    """Return the share of units that may fail a requirement, the usual one where something else must be shown [-]."""
+    return 1 - (asked_yield(check) or USUAL_YIELD)
+
+
+def asked_yield(check: Check) -> float:
+    """Return the share of units that must keep a requirement, zero where something else must be shown [-]."""
+    guarantee = check.requirement.guarantee
+    return guarantee.target if isinstance(guarantee, AtYield) else 0.0
 
 
 ALL_LIMITS = ""

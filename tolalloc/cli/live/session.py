@@ -125,22 +125,26 @@ def names_in(sent: Mapping[str, Any], key: str, known: Collection[str]) -> froze
     return frozenset(found)
 
 
-def judged(prepared: Prepared, outputs: tuple[str, ...], values: Float[np.ndarray, "unit output"]) -> dict[str, Any]:
+def judged(
+    prepared: Prepared, model: Model, outputs: tuple[str, ...], values: Float[np.ndarray, "unit output"]
+) -> dict[str, Any]:
     """Return the yield of all limits, and of each output its quantiles, its share and its histogram.
 
     Parameters
     ----------
     prepared
         The study.
+    model
+        What answered, whose own limits are in force.
     outputs
         Names of the outputs, in the order of the values.
     values
         Outputs of every unit, NaN where a unit has none [as the names state].
     """
-    read = [(own, values[:, outputs.index(own.output)]) for own in prepared.requirements]
+    read = [(own.in_force(model), values[:, outputs.index(own.output)]) for own in prepared.requirements]
     kept = np.all([own.limits.kept_by(found) for own, found in read], axis=0)
     inside = proportion(len(values), int(np.count_nonzero(~kept)))
-    limited = prepared.model.own_limits
+    limited = model.own_limits
     return {
         "units": len(values),
         "lost": int(np.count_nonzero(np.isnan(values).any(axis=1))),
@@ -269,7 +273,7 @@ class Session:
         if not (type(count) is int and 1 <= count <= MOST):
             raise InputError.at("page", "units", count, f"a whole number up to {MOST}")
         values = self._solved(design, count, wanted)
-        return None if values is None else judged(self.prepared, self.outputs, values[:count])
+        return None if values is None else judged(self.prepared, self.model(design), self.outputs, values[:count])
 
     def _solved(
         self, design: LiveDesign, count: int, wanted: Callable[[], bool]
@@ -303,7 +307,7 @@ class Session:
             values = self._solved(scaled, FIRST, wanted)
             if values is None:
                 return None
-            outputs = judged(self.prepared, self.outputs, values[:FIRST])["outputs"]
+            outputs = judged(self.prepared, self.model(scaled), self.outputs, values[:FIRST])["outputs"]
             cost = sum(own.cost for own in self.sources(scaled))
             quantiles = [[item["value"] for item in own["quantiles"]] for own in outputs]
             found.append({"factor": factor, "cost": cost, "quantiles": quantiles})

@@ -48,6 +48,7 @@ def requirements_table(result: AllocationResult) -> Table[_Limited]:
     columns: list[Column[_Limited]] = [
         Column("requirement", lambda row: row[2].requirement.output),
         Column("limit", _limit),
+        Column("stated by", lambda row: row[2].requirement.stated_by),
         Column("shown for", lambda row: row[2].requirement.guarantee.words),
         Column(f"quantile of the units [{unit}]", lambda row: unit_quantile(result.chosen, row[2], row[1])),
         Column("units within [%]", lambda row: 100 * result.chosen.yield_of(row[2].requirement, row[1].sign).estimate),
