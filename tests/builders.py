@@ -20,7 +20,7 @@ import tolalloc as ta
 from tests.import_graph import PACKAGE
 from tolalloc.allocation.front.pareto_problem import SearchedDesigns
 from tolalloc.allocation.space.design_space import DesignSpace
-from tolalloc.allocation.space.requirement import Guarantee, Requirement, RootSumSquare
+from tolalloc.allocation.space.requirement import AtYield, Guarantee, Requirement, RootSumSquare
 from tolalloc.allocation.verify.verification import Verifier
 from tolalloc.capability.indices import Limits
 from tolalloc.drawings.correlation import Correlation
@@ -36,6 +36,7 @@ from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import TolallocError
 from tolalloc.models.function_model import FunctionModel
 from tolalloc.models.model import Evaluation
+from tolalloc.models.settings import Setting
 from tolalloc.reading.units import MILLIMETRE
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import Orders
@@ -144,6 +145,18 @@ def verifier_of_sum(*zones: float, limit: float, guarantee: Guarantee | None = N
     shown = Requirement(output="y [mm]", limits=Limits(upper=limit), guarantee=guarantee or RootSumSquare())
     space = DesignSpace(errors=errors)
     return Verifier(space=space, model=model, requirements=(shown,), seeds=SeedTree(1), units=2000)
+
+
+def verifier_with_setting(lower: float, upper: float, present: float) -> Verifier:
+    """Return what verifies designs of y = x + 0.2·setting ≤ 5, x normal of 1 [mm]."""
+    setting = Setting(name="setting [mm]", value=present, lower=lower, upper=upper, step=0.1)
+    errors = ErrorModel((source("x", zone=6 * MILLIMETRE),))
+    made = FunctionModel(
+        function=lambda x, at: x + 0.2 * at, inputs=("x",), outputs=("y [mm]",), settings=(setting,)
+    ).bound(errors, "")
+    shown = Requirement(output="y [mm]", limits=Limits(upper=5.0), guarantee=AtYield(0.9973))
+    space = DesignSpace(errors=errors, settings=(setting,))
+    return Verifier(space=space, model=made, requirements=(shown,), seeds=SeedTree(1), units=2000)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,8 @@ Sorted pins of an RV-20E
 
 What the RV-20E's main study costs at the same limits, quick, seed 1, by how its pins are chosen: sorted to grooves in
 classes, or taken in steps of 1 µm for the measured groove and disc profile. The numbers are those that
-``studies/benchmarks/sorted_batches.py --reducer`` printed in ten minutes; prices of assembly are assumed.
+``studies/benchmarks/sorted_batches.py --reducer`` of version 0.1.0 printed in ten minutes; prices of assembly are
+assumed.
 
 **Read off it:** which way of choosing pins saves more in the zones than it costs at assembly.
 """

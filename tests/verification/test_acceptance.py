@@ -163,7 +163,7 @@ def test_after_a_confirmed_design_cheaper_ones_are_tried_and_a_miss_costs_nothin
     asked = []
 
     def cheaper(kind, judged, attempt, worth):
-        asked.append((judged.accepted, worth / design.cost))
+        asked.append((judged[-1].accepted, worth / design.cost))
         following = {2: beyond, 3: between}.get(attempt.number)
         return (kind, following) if following else None
 

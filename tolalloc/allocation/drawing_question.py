@@ -23,12 +23,16 @@ from tolalloc.allocation.front.what_if import (
 )
 from tolalloc.allocation.result import AllocationResult, AssembledDrawing, AssemblyChoice
 from tolalloc.allocation.search.candidates import ALONE, FREE, GRADES, TABLE, Candidates, NextCandidate
+from tolalloc.allocation.search.cost_line import CostLine
 from tolalloc.allocation.search.discrete import GradedAllocation, allocate_grades, group_options, with_shared_zones
 from tolalloc.allocation.search.proven_bound import BoundSearch, ProvenBound, require_bounded
+from tolalloc.allocation.search.settings_scan import other_settings
+from tolalloc.allocation.search.steering import explained_by
 from tolalloc.allocation.search.zone_allocation import (
     ZoneAllocation,
     allocate,
     kept_stacks,
+    promised,
     require_groups,
     scale_in_proportion,
 )
@@ -49,7 +53,7 @@ from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import KeptLimits
 from tolalloc.drawings.compensators import Compensator, assembly_cost, choice_label
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.exceptions import ConstantOutputError, InputError, SolveError
+from tolalloc.exceptions import ConstantOutputError, FailedUnitsError, InputError, SolveError
 from tolalloc.models.checkpoint import CachedResponse, Checkpoint
 from tolalloc.models.model import Model, is_fast
 from tolalloc.running.chunks import one_blas_thread
@@ -159,7 +163,8 @@ class DrawingQuestion:
         """Return the allocation of tolerances and settings at once, from proportional scaling."""
         verifier = self.verifier("direct", self.space)
         scaled = scale_in_proportion(verifier, self.effort.search.steps)
-        return allocate(verifier, scaled, self.effort.search, self._cheaper_start(verifier, cheapest_met(scaled)))
+        start = self._at_best_settings(verifier, self._cheaper_start(verifier, cheapest_met(scaled)))
+        return allocate(verifier, scaled, self.effort.search, start)
 
     def fixed(self) -> ZoneAllocation:
         """Return the allocation of tolerances with the settings as they are."""
@@ -171,8 +176,24 @@ class DrawingQuestion:
         verifier = self.verifier("joint", self.space)
         # Where the settings as they are keep no limits, the tightest zones are no place to start from.
         own = fixed.chosen if fixed.chosen.met else fixed.baseline
-        start = self._cheaper_start(verifier, own)
+        start = self._at_best_settings(verifier, self._cheaper_start(verifier, own))
         return allocate(verifier, fixed.proportional_tried, self.effort.search, start)
+
+    def _at_best_settings(self, verifier: Verifier, own: VerifiedDesign) -> VerifiedDesign:
+        """Return a design, or the same at other settings where the next step from there is the cheaper one.
+
+        Both have the same random units, other ones than those that chose the design.
+        """
+        space = verifier.space
+        design = np.clip(own.design_in(space), space.lower, space.upper)
+        found = other_settings(verifier, design)
+        if np.array_equal(found, design):
+            return own
+        try:
+            starts = [verifier.verify(at, "at other settings").evenly_divided() for at in (design, found)]
+        except FailedUnitsError:
+            return own
+        return min(starts, key=lambda start: promised(start, self.effort.search.reach))
 
     def _cheaper_start(self, verifier: Verifier, own: VerifiedDesign) -> VerifiedDesign:
         """Return a design to start from: an own one, or that of another question where it is cheaper and met."""
@@ -216,9 +237,9 @@ class DrawingQuestion:
         test = self.acceptance_test
         admitted = found.admitted()
         # Where no search ended inside all limits, a test of its best design leads to a safer one.
-        promising = {name: own for name, own in admitted.items() if own.met} or {
-            name: own for name, own in admitted.items() if name in (ALONE, FREE, GRADES)
-        }
+        promising = {name: own for name, own in admitted.items() if own.met or name == FREE}
+        if not any(own.met for own in admitted.values()):
+            promising = {name: own for name, own in admitted.items() if name in (ALONE, FREE, GRADES)}
         next_candidate = NextCandidate(
             found=found,
             test=test,
@@ -226,10 +247,25 @@ class DrawingQuestion:
             space=self.space,
             verifier=partial(self.verifier, "confirmation"),
         )
-        result = accept_cheapest(test, promising, next_candidate, self.effort.gain, self.as_drawn)
+        stated = partial(self._cheapest_stated, found, test)
+        result = accept_cheapest(test, promising, next_candidate, self.effort.gain, stated)
         tested, missed = len(result.tested), sum(not own.accepted for _, own in result.tested)
         found = found.with_acceptance(result, self.model.drawn_amounts)
         return self.shown_as_drawn(found, test, AlphaSpending(number=tested + 1, missed=missed))
+
+    def _cheapest_stated(
+        self, found: Candidates, test: AcceptanceTest, kind: str, design: VerifiedDesign, spending: AlphaSpending
+    ) -> VerifiedDesign:
+        """Return a design as the drawing states it, or the cheapest on a line through it that a test will show."""
+        search = {ALONE: found.fixed, FREE: found.free}.get(kind)
+        if search:
+            # Which of the designs of a search is the cheapest one met is also luck; the last is what all led to.
+            around = search.tried[-1] if design is search.chosen else design
+            line = CostLine.through(around, explained_by(around, (*search.tried, around)), self.model.drawn_amounts)
+            if shown := line.cheapest_shown(test, spending):
+                verifier = self.verifier("rounded", shown.space).dividing_as(around)
+                return replace(verifier.verify(shown.design, around.name), unrounded_cost=shown.unrounded_cost)
+        return self.as_drawn(kind, design)
 
     def as_drawn(self, kind: str, design: VerifiedDesign) -> VerifiedDesign:
         """Return a design with zones and amounts as the drawing states them, verified again if that moves them.

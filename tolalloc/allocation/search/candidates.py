@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tolalloc.allocation.search.discrete import GradedAllocation, choice_beside
+from tolalloc.allocation.search.steering import explained_by
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation, step_from
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.verify.acceptance import Acceptance, AcceptanceTest, AlphaSpending
@@ -134,29 +135,30 @@ class NextCandidate:
     verifier: Callable[[DesignSpace], Verifier]  # Returns what makes the models of a design
 
     def __call__(
-        self, kind: str, tested: VerifiedDesign, spending: AlphaSpending, worth: float
+        self, kind: str, every: tuple[VerifiedDesign, ...], spending: AlphaSpending, worth: float
     ) -> tuple[str, VerifiedDesign] | None:
-        """Return the design that the search of a tested one would try next, none where it would try no other.
+        """Return the design that the search of tested ones would try after the last, none where it would try no other.
 
         After a miss that may be one that the search has tried, where it is cheaper than what the models make. From a
         drawing that no search made and that is not good enough, the search for free zones goes on.
         """
-        found = self.found
+        found, tested = self.found, every[-1]
         searches = {ALONE: found.fixed, FREE: found.free}
         if kind in (TABLE, ALIKE) and not tested.accepted and not found.graded:
             kind = FREE
-        margin = self.test.margin(tested, self._errors_inside(tested, spending, worth))
-        seen = self.test.foreseen(tested, spending)
+        errors = self._errors_inside(tested, spending, worth)
+        *before, seen = (self.test.foreseen(own, spending) for own in every)
         if kind == GRADES and found.graded:
             tried = found.graded.tried[1:]
-            design = choice_beside(self.drawn, seen, tried, margin)
+            design = choice_beside(self.drawn, seen, tried, self.test.margin(tested, errors))
         elif search := searches.get(kind):
             tried = search.tried
-            design = step_from(seen, tried, margin, _REACH)
+            known = explained_by(seen, (*tried, *before, seen))
+            design = step_from(seen, known, self.test.margin(tested, errors, known), _REACH)
         else:
             return None
-        known = () if tested.accepted else _still_kept(tried, seen)
-        cheapest = min(known, key=lambda own: own.cost, default=None)
+        kept = () if tested.accepted else _still_kept(tried, seen)
+        cheapest = min(kept, key=lambda own: own.cost, default=None)
         if cheapest and cheapest.cost <= worth and (design is None or cheapest.cost < tested.space.cost(design)):
             return kind, cheapest
         if design is None or tested.space.cost(design) > worth:

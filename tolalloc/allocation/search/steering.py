@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,6 +36,9 @@ _LESS = 0.95
 """Part of the excess that a convex program must leave where a limit is not kept, for its answer to be better [-]."""
 _SETTLED_WITHIN = 1e-4
 """Relative gain of cost of a convex program below which a step ends [-]."""
+
+_LEAST_ERROR = 0.01
+"""Standard error over the largest of those beside it below which it counts no more [-]."""
 
 Box = tuple[Float[np.ndarray, " variable"], Float[np.ndarray, " variable"]]
 """Smallest and largest value of every variable."""
@@ -134,7 +137,8 @@ class Programs:
             box = np.maximum(low, own_low), np.minimum(high, own_high)
             kept = steering.around(centre)
             # As many stacks in every round, so that the program is compiled once.
-            others = (refused + _REFUSED * [*kept[:1]])[: _REFUSED * len(steering.quantiles)]
+            count = _REFUSED * len(steering.quantiles)
+            others = [*refused, *(count * kept[:1])][:count]
             found = self.cheapest((*kept, *others), processes, box)
             beyond, price = steering.excess(found), float(self.space.cost(found))
             cheaper = excess > _KEPT or price < (1 - _SETTLED_WITHIN) * cost
@@ -204,37 +208,64 @@ def steering(last: VerifiedDesign, tried: Sequence[VerifiedDesign], margin: floa
     -----
     The values of a few thousand units are uncertain by a percent or two, so a search aims one standard error inside
     each limit. Where the units of the last design also explain other ones near by, their mean deviation from them
-    corrects them, each with the weight of its units, so the noise averages out. The law of a linear output has none.
+    corrects them, each with the weight of its standard error, so the noise averages out.
 
     level′ = level + margin·standard error + mean deviation (own derivation) [-].
     """
-    similar = [item for item in tried if is_similar(item, last) and _is_alike(item, last)]
-    weights = [item.achieved.units for item in similar]
-
-    def off(found: list[float]) -> float:
-        return float(np.average(found, weights=weights)) if similar else 0.0
-
-    quantiles = [
-        own.moved_out(
-            margin * own.error + off([item.quantiles[at].counted_as(own)[0] - own(item.design)[0] for item in similar])
-        )
-        for at, own in enumerate(last.quantiles)
-    ]
-    beside = last.beside_quantiles
-    stacks = []
-    for at, side in enumerate(beside):
-        deviation = 0.0 if side.law else off([_deviation(item.beside_quantiles[at], side, item) for item in similar])
-        stacks.append(replace(side.stack, budget=side.stack.budget - margin * side.standard_error - deviation))
+    similar = explained_by(last, tried)
+    beside, quantiles = last.beside_quantiles, []
+    for at, own in enumerate(last.quantiles):
+        told = [(*item.quantiles[at].counted_as(own), own(item.design)[0]) for item in similar]
+        off = [level - foreseen for level, _, foreseen in told]
+        quantiles.append(own.moved_out(margin * own.error + _mean(off, [error for _, error, _ in told])))
     return Steering(
         groups=len(last.space.groups),
         quantiles=tuple(quantiles),
-        stacks=tuple(stacks),
+        stacks=aimed_stacks(beside, [(item.design, item.beside_quantiles) for item in similar], margin),
         scales=tuple(side.scale for side in beside),
     )
 
 
-def _deviation(found: OneSidedConstraint, model: OneSidedConstraint, item: VerifiedDesign) -> float:
-    return float(found.predicted(item.design) - model.predicted(item.design))
+def explained_by(last: VerifiedDesign, tried: Iterable[VerifiedDesign]) -> list[VerifiedDesign]:
+    """Return the designs near by that the units of a verified one explain too."""
+    return [item for item in tried if is_similar(item, last) and _is_alike(item, last)]
+
+
+def aimed_stacks(
+    sides: Sequence[OneSidedConstraint],
+    similar: Sequence[tuple[Float[np.ndarray, " variable"], Sequence[OneSidedConstraint]]],
+    margin: float,
+) -> tuple[Stack, ...]:
+    """Return local models of constraints with the budget to aim at.
+
+    Parameters
+    ----------
+    sides
+        Constraints of a verified design.
+    similar
+        Designs near by, itself among them, and the same constraints there.
+    margin
+        How far inside each limit the aim is [standard errors].
+
+    Notes
+    -----
+    budget′ = budget − margin·standard error − mean deviation (own derivation) [unit of the output]; the law of a linear
+    output has no deviation.
+    """
+    stacks = []
+    for at, side in enumerate(sides):
+        off = [float(found[at].predicted(design) - side.predicted(design)) for design, found in similar]
+        deviation = 0.0 if side.law else _mean(off, [found[at].standard_error for _, found in similar])
+        stacks.append(replace(side.stack, budget=side.stack.budget - margin * side.standard_error - deviation))
+    return tuple(stacks)
+
+
+def _mean(off: Sequence[float], errors: Sequence[float]) -> float:
+    """Return the mean of what designs say, each with the weight of its standard error; zero without one."""
+    if not off:
+        return 0.0
+    least = (max(errors) or 1.0) * _LEAST_ERROR  # none errs where no units are asked
+    return float(np.average(off, weights=1 / np.maximum(errors, least) ** 2))
 
 
 def is_similar(first: VerifiedDesign, second: VerifiedDesign) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -17,6 +17,7 @@ from tolalloc.allocation.search.steering import (
     REACH_OF_SETTINGS,
     SETTLED,
     Programs,
+    aimed_stacks,
     explains,
     is_similar,
     steering,
@@ -79,7 +80,7 @@ def _factor(tried: VerifiedDesign) -> float:
 
 ROUNDING = 1e-9
 """Part of a budget by which rounding may lay a load that is its own budget beyond it [-]."""
-_REPAIRS = 3
+_REPAIRS = 1
 """Steps more where the last design does not quite keep the limits and is cheaper than any that does [-]."""
 _WORTH = 0.003
 """Relative gain of cost that the next step must promise for a search to go on from a met design [-]."""
@@ -87,6 +88,8 @@ _AGAIN = 0.02
 """Excess up to which a step aims as far inside as the last one lay beyond, over the deviation of an output [-]."""
 _LEAST_REACH = 1.05
 """Ratio of zones below which a step does not fall back where units have no answer [-]."""
+_PROMISED = 0.02
+"""Excess up to which a step is taken to keep its limits, over the deviation of an output [-]."""
 _EXPLAINED = 2.0
 """Standard errors by which a verified value may be off its prediction for the region to keep its size [-]."""
 
@@ -100,28 +103,9 @@ def aimed(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float = 1.0
         It and all designs before it.
     margin
         How far inside each limit the aim is [standard errors].
-
-    Notes
-    -----
-    The values of a few thousand units are uncertain by a percent or two, so a search aims one standard error inside
-    each limit. Where the models of the last design also explain other ones near by, their mean deviation from them
-    corrects them, each with the weight of its units, so the noise averages out. The law of a linear output has none.
-
-    budget′ = budget − margin·standard error − mean deviation (own derivation) [unit of the output].
     """
     similar = [item.divided(last.parts) for item in tried if is_similar(item, last)]
-    stacks = []
-    for at, constraint in enumerate(last.constraints):
-        found = [
-            float(item.constraints[at].predicted(item.design) - constraint.predicted(item.design)) for item in similar
-        ]
-        deviation = (
-            0.0 if constraint.law else float(np.average(found, weights=[item.achieved.units for item in similar]))
-        )
-        stacks.append(
-            replace(constraint.stack, budget=constraint.stack.budget - margin * constraint.standard_error - deviation)
-        )
-    return tuple(stacks)
+    return aimed_stacks(last.constraints, [(item.design, item.constraints) for item in similar], margin)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,7 +170,7 @@ def kept_stacks(
 
 
 def step_from(
-    last: VerifiedDesign, tried: tuple[VerifiedDesign, ...], margin: float, reach: float
+    last: VerifiedDesign, known: Sequence[VerifiedDesign], margin: float, reach: float
 ) -> Float[np.ndarray, " variable"]:
     """Return the cheapest design near a verified one that its models let keep the limits, made by the same processes.
 
@@ -194,17 +178,25 @@ def step_from(
     ----------
     last
         The verified design.
-    tried
-        Designs beside it that correct its models.
+    known
+        Designs that correct its models, itself among them.
     margin
         How far inside each limit the aim is [standard errors].
     reach
         Factor by which a variable may change [-].
     """
     processes = last.space.process_positions(last.design)
-    return Programs(last.space).step(
-        steering(last, [*tried, last], margin).moved_out(_AGAIN), processes, last.design, reach
-    )
+    return Programs(last.space).step(steering(last, known, margin).moved_out(_AGAIN), processes, last.design, reach)
+
+
+def promised(start: VerifiedDesign, reach: float) -> tuple[float, float]:
+    """Return how far beyond its limits the next step from a design lies [-] and what it costs [cost units].
+
+    As its units say; within the limits is one as good as another.
+    """
+    programs, goal = Programs(start.space), steering(start, [start])
+    found = programs.step(goal, start.space.process_positions(start.design), start.design, reach)
+    return max(goal.excess(found), _PROMISED), float(start.space.cost(found))
 
 
 def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach: float) -> tuple[VerifiedDesign, ...]:

@@ -15,6 +15,7 @@ from tolalloc.allocation.space.problem import Stack, root_sum_square_stack
 from tolalloc.allocation.space.tail import (
     FEWEST_OF_TAIL,
     FurthestUnits,
+    norm_score,
     norm_share,
     tail_scores,
     tail_units,
@@ -46,26 +47,31 @@ class ExcessQuantile:
             return replace(self, level=max(float(own.excess.max(initial=-np.inf)) for own in self.parts))
         return replace(self, level=excess / self.parts[0].deviation, error=error / self.parts[0].deviation)
 
-    def at_level(self, level: float, error: float) -> ExcessQuantile:
-        """Return the quantile at a level and a standard error that are told over the limits [-].
+    def at_level(self, level: float, error: float, units: int) -> ExcessQuantile:
+        """Return the quantile at a level and a standard error that so many units tell, over the limits [-].
 
         It lies where as many of these units lie further out: over the limits and over the deviations they stand in
-        other orders.
+        other orders. Its error is no larger than by the line through the tail: the outermost few of a short sample tell
+        little of how they scatter.
+
+        error = s·√(f(1 − f)/n)/φ(z), with the slope s of the line at the share f (own derivation) [-].
         """
         if not np.isfinite(level):
             return self.at_excess(level, error)
         relative = np.repeat([own.relative for own in self.parts], [own.rows.size for own in self.parts])
         over_limits = self._outermost(self._excess / relative)
-        over_deviations, units = self._outermost(self._excess), self.parts[0].units
-        scores = tail_scores(units, over_limits.size)
-        lines = [np.polyfit(scores, own[: scores.size], 1) for own in (over_limits, over_deviations)]
+        over_deviations, own_units = self._outermost(self._excess), self.parts[0].units
+        scores = tail_scores(own_units, over_limits.size)
+        lines = [np.polyfit(scores, own, 1) for own in (over_limits, over_deviations)]
         if over_limits[-1] <= level <= over_limits[0]:
             score = float(np.interp(level, over_limits[::-1], scores[::-1]))
         else:
             score = (level - lines[0][1]) / (lines[0][0] or 1.0)
-        weights = tail_weights(units, float(norm_share(score)), over_deviations.size)
+        weights = tail_weights(own_units, float(norm_share(score)), over_deviations.size)
         by = lines[1][0] / lines[0][0] if lines[0][0] > 0 else 1.0
-        return replace(self, level=float(weights @ over_deviations), error=error * by)
+        density = np.exp(-(norm_score(self.share) ** 2) / 2) / np.sqrt(2 * np.pi)
+        by_line = lines[1][0] * np.sqrt(self.share * (1 - self.share) / units) / density
+        return replace(self, level=float(weights @ over_deviations), error=float(min(error * by, by_line)))
 
     @property
     def alone(self) -> tuple[ExcessQuantile, ...]:

@@ -46,7 +46,8 @@ class JointRequirement(Requirement):
     Notes
     -----
     What is limited is the largest excess of a unit over any limit, relative to the limit, which is at most zero in a
-    good unit. A search does not follow it: it keeps every limit at the yield 1 − fᵢ of its part pᵢ of the failures,
+    good unit. Where units tell it, a search follows these (`tolalloc.allocation.space.excess_quantile`); prices,
+    bounds, grades and fronts keep every limit at the yield 1 − fᵢ of its part pᵢ of the failures,
 
     fᵢ = κ·(1 − target)·pᵢ, Σ pᵢ = 1,
 

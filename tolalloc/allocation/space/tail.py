@@ -31,6 +31,13 @@ def tail_scores(units: float, outermost: int) -> Float[np.ndarray, " outermost"]
     return -np.asarray(ndtri((np.arange(outermost) + 0.5) / units))
 
 
+def norm_score(share: float) -> float:
+    """Return the score of a normal output that a share lies further out than [-]."""
+    from scipy.special import ndtri
+
+    return -float(ndtri(share))
+
+
 def norm_share(score: float) -> float:
     """Return the share of a normal output further out than a score [-]."""
     from scipy.special import ndtr
@@ -60,13 +67,11 @@ def tail_weights(units: float, share: float, outermost: int) -> Float[np.ndarray
     wᵢ = 1/m + (z − z̄)·(zᵢ − z̄)/Σ(zⱼ − z̄)² with zᵢ = Φ⁻¹(1 − (i − ½)/n), Σ wᵢ = 1. Where many fail, the outermost third
     of these has no weight: the tail there may be another one.
     """
-    from scipy.special import ndtri
-
     failing = share * units
     first = min(int(failing / _OUTERMOST), outermost - FEWEST_OF_TAIL) if failing >= _ENOUGH else 0
     scores = tail_scores(units, outermost)[first:]
     apart = scores - scores.mean()
-    weights = 1 / scores.size + (-ndtri(share) - scores.mean()) * apart / (apart @ apart)
+    weights = 1 / scores.size + (norm_score(share) - scores.mean()) * apart / (apart @ apart)
     return np.asarray(np.concatenate([np.zeros(first), weights]))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -41,6 +41,9 @@ _MOST_DRAWN = 8
 _TO_KEEP_TO_A_LAW = 2**18
 """Units at most of designs whose outputs are all linear: then 0.0013 % of all may leave the law at 3.75 % error [-]."""
 _EVEN_ODDS = 0.5
+
+
+Designs = tuple[VerifiedDesign, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,9 +109,9 @@ class Acceptance:
 def accept_cheapest(
     test: AcceptanceTest,
     candidates: Mapping[str, VerifiedDesign],
-    next_candidate: Callable[[str, VerifiedDesign, AlphaSpending, float], tuple[str, VerifiedDesign] | None],
+    next_candidate: Callable[[str, Designs, AlphaSpending, float], tuple[str, VerifiedDesign] | None],
     gain: float,
-    as_drawn: Callable[[str, VerifiedDesign], VerifiedDesign] = lambda _, design: design,
+    stated: Callable[[str, VerifiedDesign, AlphaSpending], VerifiedDesign] = lambda _, design, __: design,
 ) -> Acceptance:
     """Return the cheapest design that an acceptance test passes.
 
@@ -119,12 +122,12 @@ def accept_cheapest(
     candidates
         Kind → design that its search holds for good.
     next_candidate
-        Makes of a kind and a tested design of it what its search would try next, with what that may spend, below a
+        Makes of a kind and all tested designs of it what its search would try next, with what that may spend, below a
         cost; with its kind. A cheaper design after an accepted one, a safer one after any other, or none.
     gain
         Relative gain of cost that a design must promise to be made once another one is accepted [-].
-    as_drawn
-        Makes of a kind and a design the one that the drawing states, with rounded zones; that one is tested.
+    stated
+        Makes of a kind, a design and what it may spend the one that the drawing states; that one is tested.
 
     Notes
     -----
@@ -140,11 +143,11 @@ def accept_cheapest(
         kind = min(waiting, key=lambda own: (own in doubtful, waiting[own].cost), default=None)
         if kind is None or (drawn and waiting[kind].cost >= drawn[1].cost):
             break
-        stated = as_drawn(kind, waiting.pop(kind))
-        if drawn and stated.cost >= drawn[1].cost:
+        design = stated(kind, waiting.pop(kind), spending)
+        if drawn and design.cost >= drawn[1].cost:
             continue
         try:
-            found = test.run(stated, spending)
+            found = test.run(design, spending)
         except FailedUnitsError:
             if not waiting and not tested:
                 raise
@@ -156,7 +159,8 @@ def accept_cheapest(
             doubtful |= {name for name, own in waiting.items() if _speaks_against(found, own)}
         worth = (1 - gain) * drawn[1].cost if drawn else np.inf
         spending = spending.after(accepted=found.accepted)
-        if spending.number <= ATTEMPTS and (after := next_candidate(kind, found, spending, worth)):
+        alike = tuple(own for name, own in tested if name == kind)
+        if spending.number <= ATTEMPTS and (after := next_candidate(kind, alike, spending, worth)):
             name, design = after
             waiting[name] = design
             doubtful.discard(name)
@@ -260,21 +264,25 @@ class AcceptanceTest:
             return tested
         return replace(tested, checks=_checks(tested, tested.independent, 1 - spending.error(self.error)))
 
-    def margin(self, tested: VerifiedDesign, errors: float) -> float:
+    def margin(self, tested: VerifiedDesign, errors: float, known: Sequence[VerifiedDesign] = ()) -> float:
         """Return how far inside a limit the next design must be aimed [standard errors of the tested one].
 
         Parameters
         ----------
         errors
             The same in standard errors of what both say: the next one has all units, this one may have been given up.
+        known
+            Designs near by whose units say the same as those of the tested one, itself among them.
 
         Notes
         -----
-        errors·√(1 + n/N), with the n plain units of the tested design and the N of the next one: variances go as 1/n.
+        errors·√(n/M + n/N), with the n plain units of the tested design, the M of all near by and the N of the next
+        one: variances go as 1/n.
         """
         solved = tested.independent.units.drawn if tested.independent else Drawn(units=self.units, whatever=self.units)
         final = self.units if solved.whatever == solved.units else np.ceil(_WHATEVER * self.units)
-        return float(errors * np.sqrt(1.0 + solved.whatever / final))
+        share = tested.achieved.units / sum(own.achieved.units for own in known) if known else 1.0
+        return float(errors * np.sqrt(share + solved.whatever / final))
 
     def _screen(self, design: VerifiedDesign) -> Screen | None:
         """Return what tells units near a limit from far ones; none where solving all of them costs little."""

@@ -114,7 +114,7 @@ class VerifiedDesign:
         found, last = [], self.jointly
         if last:
             (verdict,), joint = last.constraints, self._quantile(last.requirement.output, self.checks_alone, last.joint)
-            found.append(joint and joint.at_level(verdict.excess, verdict.standard_error))
+            found.append(joint and joint.at_level(verdict.excess, verdict.standard_error, self.achieved.units))
         for check in self._alone_by_units:
             side = max(check.constraints, key=lambda own: own.excess)
             own = self._quantile(side.stack.name, (check,), check.requirement)
