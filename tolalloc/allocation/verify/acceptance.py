@@ -44,6 +44,7 @@ _EVEN_ODDS = 0.5
 
 
 Designs = tuple[VerifiedDesign, ...]
+"""Tested designs of a kind, in order."""
 
 
 @dataclass(frozen=True, kw_only=True)
