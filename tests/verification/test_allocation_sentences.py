@@ -351,9 +351,10 @@ def test_a_grade_off_the_nominal_size_is_said_to_be_no_letter(results, middle, n
 
 
 def on_grades(results: AllocationResult, middle: float) -> AllocationResult:
-    """Return the answer on grades, with the pins' zone about another middle [m]."""
+    """Return the answer on grades, with the pins' zone of the table wider and about another middle [m]."""
     sources = (
-        replace(own, middle=middle) if own.name == "pin.diameter" else own for own in results.space.errors.sources
+        replace(own, middle=middle, zone=1.5 * own.zone) if own.name == "pin.diameter" else own
+        for own in results.space.errors.sources
     )
     space = replace(results.space, errors=replace(results.space.errors, sources=tuple(sources)))
     graded = replace(results.free, chosen=results.graded.chosen)

@@ -35,7 +35,11 @@ def line_and_model():
     verifier = replace(made, model=model)
     scale = LIMIT / (norm.ppf((1 + TARGET) / 2) * np.hypot(1.0, 8 / 6))
     around = verifier.verify(verifier.space.uniform(scale), "at the limit")
-    return CostLine.through(around, [around], AMOUNTS), model
+    return line_through(around, verifier), model
+
+
+def line_through(around, verifier) -> CostLine:
+    return CostLine.through(around, [around], AMOUNTS, lambda space: replace(verifier, space=space))
 
 
 def kept_by(design) -> float:
@@ -58,8 +62,9 @@ def test_costs_fall_along_a_line_whose_ends_lie_on_both_sides_of_the_limit():
 def test_of_the_cheapest_shown_no_more_than_the_stated_error_are_beyond_the_limit():
     """However often a line is looked at: 150 answers, three standard errors of room; hardly any is far inside."""
     line, model = line_and_model()
-    shown = [line.cheapest_shown(acceptance_test_of(model, seed), FIRST) for seed in range(150)]
-    found = [kept_by(own) for own in shown if own]
+    tests = [acceptance_test_of(model, seed) for seed in range(150)]
+    shown = [own for test in tests if (own := line.cheapest_shown(test, FIRST))]
+    found = [kept_by(own) for own in shown if own.accepted]
     wrong, error = float(np.mean(np.array(found) < TARGET)), FIRST.error(ERROR)
     assert len(found) > 140
     assert 0 < wrong <= error + 3 * np.sqrt(error * (1 - error) / len(found))
@@ -77,10 +82,20 @@ def test_the_shown_design_is_accepted_by_the_same_test_and_a_cheaper_one_is_not(
     assert not test.run(cheaper, FIRST).accepted
 
 
+def test_where_the_units_show_nothing_of_a_line_its_safe_end_is_what_missed():
+    line, model = line_and_model()
+    beyond = replace(line, safe=line.cheap, cheap=line.cheap * 1.2)
+    test = acceptance_test_of(model, 3)
+    shown = beyond.cheapest_shown(test, FIRST)
+    assert shown is not None
+    assert shown.design.tolist() == line.cheap.tolist()
+    assert not test.run(shown, FIRST).accepted
+
+
 def test_nothing_is_tested_where_a_law_tells_the_limit():
     verifier = verifier_of_sum(6.0, 8.0, limit=LIMIT, guarantee=AtYield(TARGET))
     around = verifier.verify(verifier.space.uniform(0.3), "by its law")
-    line = CostLine.through(around, [around], AMOUNTS)
+    line = line_through(around, verifier)
     assert line.cheapest_shown(acceptance_test_of(verifier.model, 1), FIRST) is None
 
 

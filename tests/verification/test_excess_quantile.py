@@ -83,6 +83,15 @@ def test_at_its_own_design_it_stands_where_the_verdict_does(case, request):
     assert np.sign(own.level) == np.sign(verdict.excess)
 
 
+@pytest.mark.parametrize("level", [-0.03, -1e-6, 0.0, 1e-6, 0.2])
+def test_over_the_deviations_what_keeps_the_limits_keeps_them(two, level):
+    """The limits of 12 µm are 3.52 and 3.50 deviations of their outputs."""
+    (own,) = two[1].quantiles
+    found, relative = own.at_level(level, 0.0, 2**14).level, [part.relative for part in own.parts]
+    assert np.sign(found) == np.sign(level)
+    assert min(relative) * abs(level) <= abs(found) <= max(relative) * abs(level)
+
+
 @pytest.mark.parametrize("case", ["kink", "two"])
 def test_its_derivative_is_that_of_differences(case, request):
     _, found = request.getfixturevalue(case)

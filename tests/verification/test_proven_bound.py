@@ -246,15 +246,15 @@ def test_the_bound_of_an_own_function_with_stated_slopes_nears_its_optimum_from_
 
 @pytest.mark.slow
 def test_bounds_of_random_chains_lie_above_their_optimum_in_no_more_than_a_twentieth():
-    """100 costs, limits and seeds with an optimum in closed form; 5 % are promised, two standard errors allowed."""
+    """50 costs, limits and seeds with an optimum in closed form; 5 % are promised, two standard errors allowed."""
     generator, above = np.random.default_rng(11), 0
     quantile = norm.isf((1 - 0.9973) / 2)
-    for seed in range(1, 101):
+    for seed in range(1, 51):
         costs, limit = generator.uniform(0.5, 3.0, 3), generator.uniform(0.15, 0.25)
         best = cheapest_normal(costs, np.array([0.1, 0.1, 0.2]), limit * 3 / quantile)
         found = chained(500, seed, limit, **dict(zip("abc", costs, strict=True)))
         above += found.proven.cost > best
-    assert above <= 100 * 0.05 + 2 * np.sqrt(100 * 0.05 * 0.95)
+    assert above <= 50 * 0.05 + 2 * np.sqrt(50 * 0.05 * 0.95)
 
 
 def test_more_units_than_allowed_fail_in_a_twentieth_of_the_samples_at_most():

@@ -281,12 +281,16 @@ def centred(start: float, limits: ta.Limit, others: dict[str, ta.Limit] | None =
     ("start", "lower", "upper"), [(0.0, 0.3, 0.7), (0.1, 0.3, 0.7), (0.0, 0.2, 1.4), (-0.1, 0.3, 0.7)]
 )
 def test_a_setting_moves_the_mean_to_the_middle_of_the_limits(start, lower, upper):
-    """There σ = z·√2/6 has 3.00 times its size to either side, and two zones of z cost 0.4/z."""
-    zone = 6 * (upper - lower) / 2 / -norm.ppf(SHARE / 2) / np.sqrt(2)
+    """There σ = z·√2/6 has 3.00 times its size to either side, and two zones of z cost 0.4/z.
+
+    A hundredth of the half width beside the middle is 0.03·σ, which costs (0.03)²/2 = 0.05 % at most.
+    """
+    half = (upper - lower) / 2
+    zone = 6 * half / -norm.ppf(SHARE / 2) / np.sqrt(2)
     found = centred(start, ta.Limit(lower=lower, upper=upper))
     assert found.met
     assert found.cost == pytest.approx(0.4 / zone, rel=3e-3)
-    assert found.chosen.settings[0] == pytest.approx((lower + upper) / 2 - 0.56, abs=2e-3)
+    assert found.chosen.settings[0] == pytest.approx((lower + upper) / 2 - 0.56, abs=half / 100)
     assert found.bound <= 0.4 / zone
 
 

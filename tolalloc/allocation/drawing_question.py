@@ -261,10 +261,10 @@ class DrawingQuestion:
         if search:
             # Which of the designs of a search is the cheapest one met is also luck; the last is what all led to.
             around = search.tried[-1] if design is search.chosen else design
-            line = CostLine.through(around, explained_by(around, (*search.tried, around)), self.model.drawn_amounts)
+            known = explained_by(around, (*search.tried, around))
+            line = CostLine.through(around, known, self.model.drawn_amounts, partial(self.verifier, "rounded"))
             if shown := line.cheapest_shown(test, spending):
-                verifier = self.verifier("rounded", shown.space).dividing_as(around)
-                return replace(verifier.verify(shown.design, around.name), unrounded_cost=shown.unrounded_cost)
+                return shown
         return self.as_drawn(kind, design)
 
     def as_drawn(self, kind: str, design: VerifiedDesign) -> VerifiedDesign:

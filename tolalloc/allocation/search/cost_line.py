@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.search.zone_allocation import step_from
+from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.verify.acceptance import AcceptanceTest, AlphaSpending
-from tolalloc.allocation.verify.verification import VerifiedDesign
+from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier
 from tolalloc.exceptions import FailedUnitsError
+from tolalloc.models.model import is_fast
 from tolalloc.models.settings import DrawnAmounts
 
 _APART = 3.0
@@ -20,12 +22,13 @@ _LEAST = 0.03
 """How far at least, over the deviation of an output [-]."""
 _REACH = 1.25
 """Factor by which a variable may change from that design to an end [-]."""
-_TESTS = 4
-"""Designs of a line that are tested at most [-]."""
+_TESTS, _TESTS_OF_FAST = 4, 12
+"""Designs of a line that are tested at most, and of a fast model [-]."""
 _FIRST_STEP = 0.25
 """Part of a line by which the second of them lies on [-]."""
-_SETTLED = 0.005
-"""Relative difference of cost between a design that is shown and one that is not below which no further is tested."""
+_SETTLED, _SETTLED_OF_FAST = 0.005, 0.0005
+"""Relative difference of cost between a design that is shown and one that is not below which no further is tested, and
+of a fast model."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,57 +51,88 @@ class CostLine:
 
     around: VerifiedDesign  # Design of a search
     drawn: DrawnAmounts  # What the drawing says of the settings
+    verifier: Callable[[DesignSpace], Verifier]  # Returns what makes the models of a design
     safe: Float[np.ndarray, " variable"]  # Scales [-] and settings
     cheap: Float[np.ndarray, " variable"]  # The same
 
     @classmethod
-    def through(cls, around: VerifiedDesign, known: Sequence[VerifiedDesign], drawn: DrawnAmounts) -> CostLine:
+    def through(
+        cls,
+        around: VerifiedDesign,
+        known: Sequence[VerifiedDesign],
+        drawn: DrawnAmounts,
+        verifier: Callable[[DesignSpace], Verifier],
+    ) -> CostLine:
         """Return the line around a design of a search; known ones near by, itself among them, correct its models."""
         error = max((own.error for own in around.quantiles), default=0.0)
         apart = max(_APART, _LEAST / error) if error > 0 else _APART
         safe, cheap = (step_from(around, known, margin, _REACH) for margin in (apart, -apart))
-        return cls(around=around, drawn=drawn, safe=safe, cheap=cheap)
+        return cls(around=around, drawn=drawn, verifier=verifier, safe=safe, cheap=cheap)
 
     def at(self, position: float) -> VerifiedDesign:
-        """Return the design at a position from 0, the safe end, to 1, with the models of the search."""
+        """Return the design at a position from 0, the safe end, to 1, with the models of the search.
+
+        With models of its own where laws tell some of its limits and settings move what they are laws of.
+        """
+        space, stated = self._stated(position)
+        before = float(self.around.space.cost(self._design(position)))
+        if self.around.laws and self.around.settings.size:
+            found = self.verifier(space).dividing_as(self.around).verify(stated, self.around.name)
+            return replace(found, unrounded_cost=before)
+        return replace(
+            self.around,
+            space=space,
+            design=stated,
+            processes=space.process_names(stated),
+            cost=float(space.cost(stated)),
+            unrounded_cost=before,
+        )
+
+    def cost(self, position: float) -> float:
+        """Return what the design at a position costs, as a drawing states it [cost units]."""
+        space, stated = self._stated(position)
+        return float(space.cost(stated))
+
+    def _design(self, position: float) -> Float[np.ndarray, " variable"]:
         groups, other = len(self.around.space.groups), 1 - position
         zones = self.safe[:groups] ** other * self.cheap[:groups] ** position
-        design = np.append(zones, other * self.safe[groups:] + position * self.cheap[groups:])
-        space, stated = self.around.space.rounded_down(design, self.drawn)
-        before = float(self.around.space.cost(design))
-        return replace(self.around, space=space, design=stated, cost=float(space.cost(stated)), unrounded_cost=before)
+        return np.append(zones, other * self.safe[groups:] + position * self.cheap[groups:])
+
+    def _stated(self, position: float) -> tuple[DesignSpace, Float[np.ndarray, " variable"]]:
+        return self.around.space.rounded_down(self._design(position), self.drawn)
 
     def cheapest_shown(self, test: AcceptanceTest, spending: AlphaSpending) -> VerifiedDesign | None:
-        """Return the cheapest design that the units of a test show, none where they show none.
+        """Return the cheapest design that a test shows, as tested, the safest that was tested where it shows none.
 
-        Nor where nothing is to be gained along the line, as where laws tell its limits.
+        None where nothing is to be gained along the line, as where laws tell its limits.
         """
-        costs = [self.at(end).cost for end in (0.0, 1.0)]
-        if costs[0] <= (1 + _SETTLED) * costs[1]:
+        many, settled = (_TESTS_OF_FAST, _SETTLED_OF_FAST) if is_fast(test.model) else (_TESTS, _SETTLED)
+        alone = self.around.jointly is None and len(self.around.laws) == len(self.around.checks_alone)
+        if alone or self.cost(0.0) <= (1 + settled) * self.cost(1.0):
             return None
-        shown, missed, position = (0.0, np.nan), (1.0, np.nan), 0.5
-        for _ in range(_TESTS):
-            found = _excess(self.at(position), test, spending)
+        shown, missed, position, designs = (0.0, np.nan), (1.0, np.nan), 0.5, dict[float, VerifiedDesign]()
+        for _ in range(many):
+            try:
+                designs[position] = test.run(self.at(position), spending)
+                found = _excess(designs[position])
+            except FailedUnitsError:
+                found = np.inf
             if found <= 0.0:
                 shown = position, found
             else:
                 missed = position, found
-            apart = self.at(shown[0]).cost / self.at(missed[0]).cost - 1
-            if shown[0] == 1.0 or missed[0] == 0.0 or (apart < _SETTLED and np.isfinite(shown[1])):
+            apart = self.cost(shown[0]) / self.cost(missed[0]) - 1
+            if shown[0] == 1.0 or missed[0] == 0.0 or (apart < settled and np.isfinite(shown[1])):
                 break
-            position = _between(shown, missed) if apart > _SETTLED else 0.0
-        return None if np.isnan(shown[1]) else self.at(shown[0])
+            position = _between(shown, missed) if apart > settled else 0.0
+        return designs.get(shown[0]) or designs.get(min(designs, default=0.0))
 
 
-def _excess(design: VerifiedDesign, test: AcceptanceTest, spending: AlphaSpending) -> float:
-    """Return how far beyond what it must show a design lies by the units of a test, above 0 where it is not shown [-].
+def _excess(found: VerifiedDesign) -> float:
+    """Return how far beyond what it must show a tested design lies, above 0 where it is not shown [-].
 
     Over the scale of the limit that it is furthest beyond.
     """
-    try:
-        found = test.run(design, spending)
-    except FailedUnitsError:
-        return np.inf
     excess = max(side.excess / side.scale for check in found.checks for side in check.constraints)
     return min(excess, 0.0) if found.accepted else max(excess, np.finfo(float).tiny)
 

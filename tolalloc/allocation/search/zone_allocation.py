@@ -82,8 +82,11 @@ ROUNDING = 1e-9
 """Part of a budget by which rounding may lay a load that is its own budget beyond it [-]."""
 _REPAIRS = 1
 """Steps more where the last design does not quite keep the limits and is cheaper than any that does [-]."""
-_WORTH = 0.003
-"""Relative gain of cost that the next step must promise for a search to go on from a met design [-]."""
+_WORTH = (1e-4, 0.003)
+"""Relative gain of cost that the next step must promise for a search to go on from a met design [-].
+
+As much as its units err, over the deviation of an output, and between these.
+"""
 _AGAIN = 0.02
 """Excess up to which a step aims as far inside as the last one lay beyond, over the deviation of an output [-]."""
 _LEAST_REACH = 1.05
@@ -242,14 +245,15 @@ def step_to_optimum(verifier: Verifier, start: VerifiedDesign, steps: int, reach
     programs, processes = Programs(space), space.process_positions(start.design)
     for step in range(steps + _REPAIRS):
         last, kept = tried[-1], [own.cost for own in tried if own.met]
-        if step >= steps and (last.met or last.cost >= (1 - _WORTH) * min(kept, default=np.inf)):
+        worth = float(np.clip(max((own.error for own in last.quantiles), default=0.0), *_WORTH))
+        if step >= steps and (last.met or last.cost >= (1 - worth) * min(kept, default=np.inf)):
             break
         goal = steering(last, tried)
         if step > 0:  # what is missed by as little as units err is missed again where it is aimed at
             goal = goal.moved_out(_AGAIN)
         processes = programs.choose(goal.around(last.design), processes)
         found = programs.step(goal, processes, last.design, reach)
-        settled = space.cost(found) > (1 - _WORTH) * last.cost if last.met else np.allclose(found, last.design)
+        settled = space.cost(found) > (1 - worth) * last.cost if last.met else np.allclose(found, last.design)
         if step > 0 and settled:
             break
         try:

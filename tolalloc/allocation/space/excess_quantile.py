@@ -51,27 +51,29 @@ class ExcessQuantile:
         """Return the quantile at a level and a standard error that so many units tell, over the limits [-].
 
         It lies where as many of these units lie further out: over the limits and over the deviations they stand in
-        other orders. Its error is no larger than by the line through the tail: the outermost few of a short sample tell
-        little of how they scatter.
+        other orders, but as many fail. Its error is no larger than by the line through the tail: the outermost few of a
+        short sample tell little of how they scatter.
 
-        error = s·√(f(1 − f)/n)/φ(z), with the slope s of the line at the share f (own derivation) [-].
+        error = s·√(f(1 − f)/n)/φ(z) at most, with the slope s of the line at the share f (own derivation) [-].
         """
         if not np.isfinite(level):
             return self.at_excess(level, error)
         relative = np.repeat([own.relative for own in self.parts], [own.rows.size for own in self.parts])
-        over_limits = self._outermost(self._excess / relative)
-        over_deviations, own_units = self._outermost(self._excess), self.parts[0].units
-        scores = tail_scores(own_units, over_limits.size)
+        over_limits, over_deviations = self._outermost(self._excess / relative), self._outermost(self._excess)
+        scores = tail_scores(self.parts[0].units, over_limits.size)
         lines = [np.polyfit(scores, own, 1) for own in (over_limits, over_deviations)]
-        if over_limits[-1] <= level <= over_limits[0]:
-            score = float(np.interp(level, over_limits[::-1], scores[::-1]))
-        else:
-            score = (level - lines[0][1]) / (lines[0][0] or 1.0)
-        weights = tail_weights(own_units, float(norm_share(score)), over_deviations.size)
-        by = lines[1][0] / lines[0][0] if lines[0][0] > 0 else 1.0
+        by = float(lines[1][0] / lines[0][0]) if lines[0][0] > 0 else 1.0
         density = np.exp(-(norm_score(self.share) ** 2) / 2) / np.sqrt(2 * np.pi)
         by_line = lines[1][0] * np.sqrt(self.share * (1 - self.share) / units) / density
-        return replace(self, level=float(weights @ over_deviations), error=float(min(error * by, by_line)))
+        if over_limits[-1] <= 0.0 <= over_limits[0]:
+            known, told = (np.sort(np.append(own, 0.0)) for own in (over_limits, over_deviations))
+            found = float(np.interp(level, known, told))
+        else:
+            inside = over_limits[-1] <= level <= over_limits[0]
+            on_line = (level - lines[0][1]) / (lines[0][0] or 1.0)
+            score = float(np.interp(level, over_limits[::-1], scores[::-1])) if inside else on_line
+            found = float(tail_weights(self.parts[0].units, norm_share(score), scores.size) @ over_deviations)
+        return replace(self, level=found, error=float(min(error * by, by_line)))
 
     @property
     def alone(self) -> tuple[ExcessQuantile, ...]:

@@ -128,7 +128,8 @@ def accept_cheapest(
     gain
         Relative gain of cost that a design must promise to be made once another one is accepted [-].
     stated
-        Makes of a kind, a design and what it may spend the one that the drawing states; that one is tested.
+        Makes of a kind, a design and what it may spend the one that the drawing states; that one is tested, unless what
+        was spent has tested it.
 
     Notes
     -----
@@ -148,7 +149,7 @@ def accept_cheapest(
         if drawn and design.cost >= drawn[1].cost:
             continue
         try:
-            found = test.run(design, spending)
+            found = design if design.independent else test.run(design, spending)
         except FailedUnitsError:
             if not waiting and not tested:
                 raise
