@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tolalloc.allocation.front.uncertain_region import doubted
+from tolalloc.allocation.search.settings_scan import units_of_scan
 from tolalloc.allocation.space.tail import tail_units
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
@@ -24,8 +25,9 @@ _TIMED = 128
 """Units that are timed [-]."""
 _TRIALS = 8
 """Units of the surrogates and their trials over those that they learn from, as counted in shipped studies [-]."""
-_CONFIRMATIONS = (0.3, 8.0)
-"""Units of a confirmation over its largest number for one design, as counted in shipped studies [-]."""
+_CONFIRMATIONS = (0.3, 16.0)
+"""Units of a confirmation over its largest number for one design: the least as counted in shipped studies, the most of
+four designs of each of four lines [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,7 +100,9 @@ def _of_allocation(question: Allocation, prepared: Prepared) -> tuple[_Workload,
     # A model without derivatives is solved on either side of every column, an output without on either side of every
     # variable of the design.
     around = effort.verification_units * (2 if model.differentiable else 1 + 2 * len(errors.columns))
-    steps = searches * (effort.search.steps + 2) + 3 * question.grades * effort.graded_steps
+    # Where settings are free, a search looks at others and begins at two.
+    steps = searches * (effort.search.steps + 2) + 3 * question.grades * effort.graded_steps + 2 * bool(settings)
+    scan = units_of_scan(effort.verification_units) * bool(settings)
     front = effort.search.front
     tried = front.designs + front.rounds * front.points + front.population_on_kernel * front.generations_on_kernel + 2
     fronts = (1 + bool(settings)) * tried * effort.shared_units * question.front
@@ -110,7 +114,7 @@ def _of_allocation(question: Allocation, prepared: Prepared) -> tuple[_Workload,
     shares += units_to_learn(errors, effort.share_blocks)
     confirmed = tuple(round(share * effort.confirmation_units) for share in _CONFIRMATIONS)
     least = effort.verification_units + confirmed[0]
-    most = steps * around + confirmed[1] + fronts + what_if + shares
+    most = steps * around + scan + confirmed[1] + fronts + what_if + shares
     parts = (_Workload(units=(least, most), seconds=_seconds(prepared, outputs)),)
     rough = tuple(name for name in outputs if name not in {*model.exact, *model.differentiable})
     if not rough:

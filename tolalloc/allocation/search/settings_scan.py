@@ -29,6 +29,11 @@ Settings = Float[np.ndarray, " setting"]
 Levels = Float[np.ndarray, " requirement"]
 
 
+def units_of_scan(units: int) -> int:
+    """Return how many units `other_settings` solves, where a verification solves so many [-]."""
+    return (1 + _SCATTERED + _FOLLOWING) * max(int(_UNITS * units), 1)
+
+
 def other_settings(verifier: Verifier, design: Float[np.ndarray, " variable"]) -> Float[np.ndarray, " variable"]:
     """Return a design with other settings that keep it far inside its limits, of some all over their ranges.
 

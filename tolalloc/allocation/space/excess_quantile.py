@@ -154,5 +154,6 @@ class ExcessQuantile:
 
         Each alone asks for nothing more, but says where another limit begins to be the nearest.
         """
-        found = ((own.name, own(design)) for own in (self, *self.alone))
-        return tuple(root_sum_square_stack(name, design, value, slopes, groups) for name, (value, slopes) in found)
+        most, _ = of_all = self(design)
+        found = [of_all, *((min(level, most), slopes) for level, slopes in (own(design) for own in self.alone))]
+        return tuple(root_sum_square_stack(self.name, design, level, slopes, groups) for level, slopes in found)
