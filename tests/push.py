@@ -5,9 +5,9 @@
     python -m tests.push scripts          # a pattern of the handbook's scripts that are run
     python -m tests.push shapes MODULES   # in which of some modules the shapes are checked
 
-A push is what has changed since the last whole run. Of the slow tests it gets those that every push runs, an eighth of
-the others, another one at each commit, and the nearest to what has changed, by the number of imports between, until
-its time is used up, two minutes of it at least.
+A push is what has changed since the last whole run. Of the slow tests it gets those that every push runs, those that
+failed in that whole run, an eighth of the others, another one at each commit, and the nearest to what has changed, by
+the number of imports between, until its time is used up, two minutes of it at least.
 """
 
 from __future__ import annotations
@@ -142,7 +142,7 @@ def chosen(tests: Sequence[str], every: set[str], run: WholeRun, touched: Touche
     tests
         Ids of the slow tests.
     every
-        Those that every push runs.
+        Those that every push runs; what failed in the last whole run is added.
     run
         The last whole run.
     touched
@@ -151,6 +151,7 @@ def chosen(tests: Sequence[str], every: set[str], run: WholeRun, touched: Touche
         Number of commits in all [-]; the turn follows from it. It is nobody's turn where that is None.
     """
     cost = {test: NEW if (own := run.taken_by(test)) is None else own for test in tests}
+    every = {*every, *run.failed}
     always = [test for test in tests if test in every]
     others = {test: own for test, own in cost.items() if test not in every}
     turn = [] if commits is None else turn_of(others, run, commits)

@@ -1,6 +1,7 @@
-"""The last whole run of the gate: the commit on which it passed and what its slow tests took.
+"""The last whole run of the gate: its commit, what its slow tests took and which of them failed.
 
-As a plugin of pytest, ``-p tests.whole_run``, it writes that down when all of them pass.
+As a plugin of pytest, ``-p tests.whole_run``, it writes that down when all of them have run. What failed stands there
+by its id, and every push runs it until the next whole run: a fault that is mended does not ask for the whole run again.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ LONG = 10.0
 
 @dataclass(frozen=True, kw_only=True)
 class WholeRun:
-    """One whole run of the gate that passed.
+    """One whole run of the gate.
 
     Parameters
     ----------
@@ -41,11 +42,13 @@ class WholeRun:
     processor
         On what, and how many cores it had.
     tests
-        Slow tests that passed [-].
+        Slow tests that ran [-].
     seconds
         Test, or function of tests that take less than ten seconds → what one takes [s].
     setups
         File → what its fixtures take, whichever of its tests is first [s].
+    failed
+        Ids of the tests that failed.
     """
 
     commit: str
@@ -55,6 +58,7 @@ class WholeRun:
     tests: int
     seconds: dict[str, float]
     setups: dict[str, float] = field(default_factory=dict)
+    failed: tuple[str, ...] = ()
 
     def taken_by(self, test: str) -> float | None:
         """Return what a test takes [s], or None where it is new."""
@@ -96,11 +100,14 @@ def processor() -> str:
 
 _taken: dict[str, float] = defaultdict(float)
 _setups: dict[str, float] = defaultdict(float)
+_failed: set[str] = set()
 _began = time.time()
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
-    """Add what calling or clearing away took, and keep the longest setting up of a file."""
+    """Add what calling or clearing away took, keep the longest setting up of a file, and what failed."""
+    if report.failed:
+        _failed.add(report.nodeid)
     if report.when == "setup":
         file = report.nodeid.partition("::")[0]
         _setups[file] = max(_setups[file], round(report.duration, 1))
@@ -109,8 +116,9 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
-    """Write the run down if all passed and the commit is what was tested."""
-    if "PYTEST_XDIST_WORKER" in os.environ or exitstatus:
+    """Write the run down if it came to its end and the commit is what was tested."""
+    ended = exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED)
+    if "PYTEST_XDIST_WORKER" in os.environ or not ended:
         return
     if git("status", "--porcelain"):
         sys.stderr.write("\nThis whole run is not written down: the tree differs from its commit.\n")
@@ -124,6 +132,7 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
         tests=len(_taken),
         seconds=summed_up(_taken),
         setups=dict(sorted(_setups.items())),
+        failed=tuple(sorted(_failed)),
     )
     FILE.write_text(json.dumps(asdict(run), indent=1) + "\n", encoding="utf-8")
     sys.stderr.write(f"\nThis whole run is written down in {FILE.relative_to(ROOT)}: commit it.\n")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from dataclasses import replace
 
 import pytest
 
@@ -68,6 +69,11 @@ def test_tests_of_every_push_are_run_whatever_they_take():
     assert push.always == (TESTS[7],)
     assert not push.near
     assert push.seconds > 2 * TIME
+
+
+def test_what_failed_in_the_last_whole_run_is_run_until_the_next():
+    run = replace(run_of(**dict.fromkeys(TESTS, 1.0)), failed=(TESTS[7],))
+    assert all(TESTS[7] in chosen(TESTS, set(), run, Touched.of([]), turn).always for turn in range(TURNS))
 
 
 def test_the_nearest_have_some_minutes_however_long_the_others_take():
