@@ -14,7 +14,14 @@ import tolalloc as ta
 from tolalloc.allocation.search.candidates import _still_kept
 from tolalloc.allocation.space.effort import AllocationEffort
 from tolalloc.allocation.space.output_sample import ControlPlane, ControlResiduals, LimitedSample
-from tolalloc.allocation.verify.acceptance import ATTEMPTS, FIRST, AcceptanceTest, accept_cheapest, confidence_of_fewer
+from tolalloc.allocation.verify.acceptance import (
+    ATTEMPTS,
+    FIRST,
+    AcceptanceTest,
+    AlphaSpending,
+    accept_cheapest,
+    confidence_of_fewer,
+)
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.linear_function import NearPlane
@@ -174,6 +181,24 @@ def test_after_a_confirmed_design_cheaper_ones_are_tried_and_a_miss_costs_nothin
     assert found.drawn == found.tested[2]
     assert found.last("table") is found.tested[2][1]
     assert asked == [(True, 1 - GAIN), (False, 1 - GAIN), (True, pytest.approx(0.9 * (1 - GAIN)))]
+
+
+@pytest.mark.parametrize("accepted", [True, False])
+def test_a_design_that_was_tested_and_is_no_cheaper_than_the_drawn_one_counts(accepted):
+    study = prepared({GAP: ta.Limit(upper=at(1 - 1e-5), show=SHOWN)})
+    judge, design = acceptance_test_of(study, 1), designed(study)
+    dearer = replace(judge.run(design, FIRST), accepted=accepted, cost=2.0 * design.cost)
+    asked = []
+
+    def another(kind, judged, spending, worth):
+        asked.append(spending)
+        return ("line", replace(design, cost=0.5 * design.cost)) if len(asked) == 1 else None
+
+    stated = {"line": dearer}
+    found = accept_cheapest(judge, {"drawn": design}, another, GAIN, lambda kind, own, _: stated.get(kind, own))
+    assert [own.accepted for _, own in found.tested] == [True, accepted]
+    assert found.drawn == found.tested[0]
+    assert asked[-1] == AlphaSpending(number=3, missed=int(not accepted))
 
 
 def test_as_many_units_are_allowed_to_fail_as_leave_the_error(generator):

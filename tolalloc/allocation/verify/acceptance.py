@@ -146,7 +146,7 @@ def accept_cheapest(
         if kind is None or (drawn and waiting[kind].cost >= drawn[1].cost):
             break
         design = stated(kind, waiting.pop(kind), spending)
-        if drawn and design.cost >= drawn[1].cost:
+        if drawn and design.cost >= drawn[1].cost and not design.independent:
             continue
         try:
             found = design if design.independent else test.run(design, spending)
@@ -156,7 +156,7 @@ def accept_cheapest(
             continue
         tested.append((kind, found))
         if found.accepted:
-            drawn = (kind, found)
+            drawn = min((kind, found), drawn or (kind, found), key=lambda own: own[1].cost)
         else:
             doubtful |= {name for name, own in waiting.items() if _speaks_against(found, own)}
         worth = (1 - gain) * drawn[1].cost if drawn else np.inf
