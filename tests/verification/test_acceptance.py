@@ -311,3 +311,31 @@ def test_a_limit_is_kept_just_where_units_and_planes_show_it(generator, scale):
     assert (bound.excess <= 0) == (shown <= 1 - TARGET)
     plain = LimitedSample.all_of(bent(x), limits)
     assert bound.standard_error < 0.3 * SHOWN.bounds(plain, 0.95)[0].standard_error
+
+
+@pytest.mark.parametrize(
+    ("function", "says_more"),
+    [
+        (lambda a, b: a + b + 5.0 * a * b, True),
+        (lambda a, b: np.exp(20.0 * (a + b)) + b, True),
+        (lambda a, b: a + 5.0 * np.maximum(b, 0.0), False),
+        (lambda a, b: np.maximum(a, b) + 0.5 * (a + b), False),
+        (lambda a, b: a + 30.0 * b**2, False),
+    ],
+)
+def test_a_plane_stands_beside_an_output_only_where_it_says_more_than_the_units_at_the_limit(function, says_more):
+    row = {"nominal": 0.0, "plus": 0.02, "minus": -0.02, "unit": "mm", "min": 1e-3, "max": 1.0, "cost": 1}
+    study = Prepared(
+        study=ta.Study(
+            ta.model(function, inputs=("a", "b"), outputs=("y [mm]",)),
+            ta.Drawing.of_rows([{"id": name, **row} for name in "ab"]),
+            limits={"y [mm]": ta.Limit(upper=0.05)},
+            questions=[ta.Allocation()],
+        )
+    )
+    space, requirements = study.space, study.requirements
+    own = Verifier(space=space, model=study.model, requirements=requirements, seeds=SeedTree(1), units=2**16)
+    found = own.verify(space.uniform(1.0), "table")
+    assert bool(found.near) == says_more
+    excess = found.sample.evaluation.values[:, 0]
+    assert found.quantile_bound < np.sort(excess)[-100]  # 0.9973 of the units, shown: 177 lie beyond it, or fewer

@@ -217,6 +217,7 @@ def sample_of(verifier):
         slope_units=64,
         derivative_units=64,
         seeds=verifier.seeds,
+        tails={"y [mm]": (Limits(upper=9.0), 1 - TARGET)},
     )
 
 

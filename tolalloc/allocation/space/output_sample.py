@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Literal
@@ -138,6 +139,20 @@ class ControlResiduals:
         """Standard error of the estimate [-]."""
         return float(np.sqrt(self.more + self.fewer)) / self.units
 
+    def bound_less_than(self, failed: int) -> bool:
+        """Return whether the share of failures is bounded closer to its estimate than by counting those that failed.
+
+        At 5 % error, where each kind of V has half of it: the planes must say more than that takes.
+
+        Examples
+        --------
+        >>> few = ControlResiduals(units=10_000, more=4, fewer=4, sum=0, by_law=0.0027)
+        >>> few.bound_less_than(27), replace(few, more=14, fewer=14).bound_less_than(27)
+        (True, False)
+        """
+        counted = self._end(failed, CONFIDENCE) - failed / self.units
+        return self.share(CONFIDENCE) - self.share(_EVEN_ODDS) < counted
+
 
 @dataclass(frozen=True, kw_only=True)
 class LimitedSample:
@@ -266,6 +281,7 @@ class DesignSample:
     slope_units: int
     derivative_units: int  # Units, the first ones, whose exact derivatives are asked for [-]
     seeds: SeedTree  # Node of the seed tree, for the worst units
+    tails: Mapping[str, tuple[Limits, float]]  # Output → its limits, and the share of units that may fail them [-]
 
     @cached_property
     def x(self) -> Float[np.ndarray, "unit column"]:
@@ -332,15 +348,25 @@ class DesignSample:
     def nearest(self) -> dict[str, NearPlane]:
         """Plane near every output that one is near, its own where it is linear; of a fast model, whose units are many.
 
-        What no plane is near to is judged by the units alone.
+        What no plane is near to, or none near its limits, is judged by the units alone.
         """
         found = {output: NearPlane(law=law) for output, law in self.laws.items()}
         if is_fast(self.model):
             zones = self.space.zones(self.design)
             rest = [output for output in self.outputs if output not in found]
             near = {output: NearPlane.of(self.x, self.values(output), self.space.errors, zones) for output in rest}
-            found |= {output: own for output, own in near.items() if own}
+            found |= {output: own for output, own in near.items() if own and self._says_more(own, output)}
         return found
+
+    def _says_more(self, near: NearPlane, output: str) -> bool:
+        """Return whether a plane says more than the units alone where the share lies that may be beyond the limits."""
+        limits, share = self.tails[output]
+        control = ControlPlane(near=near, values=near(self.x), limits=limits)
+        excess = LimitedSample.all_of(self.values(output), limits).excess
+        by = float(np.quantile(excess[np.isfinite(excess)], 1 - share))
+        fails, called = excess > by, control.excess > by
+        residuals = ControlResiduals.among(fails, called.astype(int), control.share(by), excess.size)
+        return residuals.bound_less_than(int(np.count_nonzero(fails)))
 
     @cached_property
     def planes(self) -> dict[str, Float[np.ndarray, " unit"]]:

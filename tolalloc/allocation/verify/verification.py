@@ -128,7 +128,7 @@ class VerifiedDesign:
         A law tells more than units, but where a setting may move an output from one of its limits to the other.
         """
         joint, moves = self.jointly.joint.guarantee.target if self.jointly else 0.0, self.settings.size > 0
-        asked = (own for own in self.checks_alone if asked_yield(own) > joint)
+        asked = (own for own in self.checks_alone if asked_yield(own.requirement) > joint)
         return tuple(own for own in asked if not own.constraints[0].law or (moves and len(own.constraints) > 1))
 
     @property
@@ -136,7 +136,7 @@ class VerifiedDesign:
         """Constraints of what no units decide: exact laws, worst cases, moments."""
         if not self.quantiles:
             return self.constraints
-        told = () if self.jointly is None else [own for own in self.checks_alone if asked_yield(own)]
+        told = () if self.jointly is None else [own for own in self.checks_alone if asked_yield(own.requirement)]
         by_units = (*self._alone_by_units, *told)
         return tuple(side for check in self.checks_alone if check not in by_units for side in check.constraints)
 
@@ -271,6 +271,7 @@ class Verifier:
             slope_units=self.slope_units,
             derivative_units=min(self.units, DERIVATIVE_UNITS) if is_fast(self.model) else self.units,
             seeds=seeds,
+            tails={own.output: (own.limits, failing_share(own)) for own in requirements},
         )
         for own in sample.samples:
             require_few_failures(own, "of a drawing that was tried", self.largest_failed_share)
@@ -280,7 +281,7 @@ class Verifier:
             limited_by(sample),
             self.confidence,
             lambda check, bounds, at: tail_constraints(
-                read[at], bounds, check.requirement.limits, failing_share(check)
+                read[at], bounds, check.requirement.limits, failing_share(check.requirement)
             ),
         )
         values = {output: sample.values(output) for output in outputs}
@@ -307,23 +308,23 @@ class Verifier:
             confidence=self.confidence,
             near=sample.nearest,
             furthest={
-                own.requirement.output: units.furthest(own.requirement.limits, failing_share(own))
+                own.requirement.output: units.furthest(own.requirement.limits, failing_share(own.requirement))
                 for own, units in zip(checks, read, strict=True)
-                if not isinstance(own, JointCheck) and (asked_yield(own) or isinstance(checks[-1], JointCheck))
+                if not isinstance(own, JointCheck)
+                and (asked_yield(own.requirement) or isinstance(checks[-1], JointCheck))
             },
             uncertainties=uncertainties,
         )
 
 
-def failing_share(check: Check) -> float:
+def failing_share(requirement: Requirement) -> float:
     """Return the share of units that may fail a requirement, the usual one where something else must be shown [-]."""
-    return 1 - (asked_yield(check) or USUAL_YIELD)
+    return 1 - (asked_yield(requirement) or USUAL_YIELD)
 
 
-def asked_yield(check: Check) -> float:
+def asked_yield(requirement: Requirement) -> float:
     """Return the share of units that must keep a requirement, zero where something else must be shown [-]."""
-    guarantee = check.requirement.guarantee
-    return guarantee.target if isinstance(guarantee, AtYield) else 0.0
+    return requirement.guarantee.target if isinstance(requirement.guarantee, AtYield) else 0.0
 
 
 ALL_LIMITS = ""
