@@ -313,6 +313,7 @@ def test_a_limit_is_kept_just_where_units_and_planes_show_it(generator, scale):
     assert bound.standard_error < 0.3 * SHOWN.bounds(plain, 0.95)[0].standard_error
 
 
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     ("function", "says_more"),
     [
@@ -321,6 +322,7 @@ def test_a_limit_is_kept_just_where_units_and_planes_show_it(generator, scale):
         (lambda a, b: a + 5.0 * np.maximum(b, 0.0), False),
         (lambda a, b: np.maximum(a, b) + 0.5 * (a + b), False),
         (lambda a, b: a + 30.0 * b**2, False),
+        (lambda a, b: np.floor((a + b) / 0.02) * 0.02, False),
     ],
 )
 def test_a_plane_stands_beside_an_output_only_where_it_says_more_than_the_units_at_the_limit(function, says_more):
@@ -338,4 +340,4 @@ def test_a_plane_stands_beside_an_output_only_where_it_says_more_than_the_units_
     found = own.verify(space.uniform(1.0), "table")
     assert bool(found.near) == says_more
     excess = found.sample.evaluation.values[:, 0]
-    assert found.quantile_bound < np.sort(excess)[-100]  # 0.9973 of the units, shown: 177 lie beyond it, or fewer
+    assert found.quantile_bound <= np.sort(excess)[-100]  # 0.9973 of the units, shown: 177 lie beyond it, or fewer

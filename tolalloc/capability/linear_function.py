@@ -387,8 +387,11 @@ class NearPlane:
         """Return a plane behind a curve, and by how much the curve of the output is off it over what it varies [-]."""
         from scipy.special import ndtri
 
+        order = np.argsort(values, kind="stable")
+        if np.count_nonzero(np.diff(values[order])) < _DEGREE:  # steps, through which no one curve goes
+            return None
         ranks = np.empty(values.size)
-        ranks[np.argsort(values, kind="stable")] = (np.arange(values.size) + 0.5) / values.size
+        ranks[order] = (np.arange(values.size) + 0.5) / values.size
         plane = LinearFunction.near(x, ndtri(ranks))
         law, says = LinearLaw.of(plane, errors, zones), plane(x)
         curve = np.polynomial.Polynomial.fit(values, says, _DEGREE)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.allocation.search.pattern_search import jumps
 from tolalloc.allocation.search.zone_allocation import step_from
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.verify.acceptance import AcceptanceTest, AlphaSpending
@@ -22,6 +23,8 @@ _LEAST = 0.03
 """How far at least, over the deviation of an output [-]."""
 _REACH = 1.25
 """Factor by which a variable may change from that design to an end [-]."""
+_ALIKE = 1.05
+"""The same where all zones are scaled alike [-]."""
 _TESTS, _TESTS_OF_FAST = 4, 12
 """Designs of a line that are tested at most, and of a fast model [-]."""
 _FIRST_STEP = 0.25
@@ -63,7 +66,17 @@ class CostLine:
         drawn: DrawnAmounts,
         verifier: Callable[[DesignSpace], Verifier],
     ) -> CostLine:
-        """Return the line around a design of a search; known ones near by, itself among them, correct its models."""
+        """Return the line around a design of a search; known ones near by, itself among them, correct its models.
+
+        Where an output jumps with the zones, and derivatives say little of it, all zones are scaled alike.
+        """
+        if jumps(verifier(around.space), around):
+            groups = len(around.scales)
+            low, high = around.space.lower[:groups], around.space.upper[:groups]
+            safe, cheap = (
+                np.append(np.clip(around.scales * by, low, high), around.settings) for by in (1 / _ALIKE, _ALIKE)
+            )
+            return cls(around=around, drawn=drawn, verifier=verifier, safe=safe, cheap=cheap)
         error = max((own.error for own in around.quantiles), default=0.0)
         apart = max(_APART, _LEAST / error) if error > 0 else _APART
         safe, cheap = (step_from(around, known, margin, _REACH) for margin in (apart, -apart))

@@ -15,6 +15,7 @@ from tolalloc.allocation.space.excess_quantile import ExcessQuantile
 from tolalloc.allocation.space.problem import OneSidedConstraint, Solution, Stack
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.capability.halving import halved
+from tolalloc.exceptions import SolveError
 
 SETTLED = 0.01
 """Relative gain of cost below which a common factor of all zones, or another process, is not worth a change [-]."""
@@ -139,7 +140,13 @@ class Programs:
             # As many stacks in every round, so that the program is compiled once.
             count = _REFUSED * len(steering.quantiles)
             others = [*refused, *(count * kept[:1])][:count]
-            found = self.cheapest((*kept, *others), processes, box)
+            try:
+                found = self.cheapest((*kept, *others), processes, box)
+            except SolveError:  # refused answers that are nearly one may leave a solver no way
+                refused, within = [], float(np.sqrt(within))
+                if within < _LEAST_REACH:
+                    break
+                continue
             beyond, price = steering.excess(found), float(self.space.cost(found))
             cheaper = excess > _KEPT or price < (1 - _SETTLED_WITHIN) * cost
             if beyond <= max(_KEPT, _LESS * excess) and cheaper:

@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from tolalloc.allocation.search import process_choice
 from tolalloc.allocation.search.lower_bound import LowerBound, lower_bound
+from tolalloc.allocation.search.pattern_search import by_pattern
 from tolalloc.allocation.search.steering import (
     LARGEST_LOG,
     REACH_OF_MODELS,
@@ -393,6 +394,8 @@ def allocate(
     tried = ((first,) if space.allows(first.design) else ()) + stepped
     if not tried:
         raise FailedUnitsError("Of every drawing inside the ranges that was tried too many units have no answer.")
+    if found := by_pattern(verifier, cheapest_met(tried)):
+        tried = (*tried, found)
     chosen = cheapest_met(tried).evenly_divided()
     return ZoneAllocation(
         limit=verifier.limit,

@@ -1,0 +1,160 @@
+"""Search by pattern: where an output jumps with the zones, the derivatives of its units say little of its limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from tolalloc.allocation.space.requirement import AtYield
+from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier
+from tolalloc.capability.halving import halved
+from tolalloc.models.model import is_fast
+
+_MOVED, _LESS = 0.1, 8.0
+"""Part of a zone by which it is moved to see whether an output jumps, and by what it is moved less again [-]."""
+_JUMPING = 0.5
+"""Part of the mean square that a smooth output would lose by that, of which a jumping one loses no more [-]."""
+_UNITS, _UNITS_TO_COMPARE = 2**15, 2**17
+"""Common units of the search, and others on which what it finds is compared with where it began [-]."""
+_EVALUATIONS, _MOST_VARIABLES = 40, 8
+"""Designs that are tried for each variable at most, and variables up to which a pattern is searched [-]."""
+_FIRST_STEP = 0.2
+"""First step of a zone, over it, and of a setting, over its range [-]."""
+_REACH, _HALVINGS = 0.5, 11
+"""Change of all zones alike within which a design comes to its limits, ln of a factor [-], and halvings of it."""
+_GAIN = 0.002
+"""Relative gain of cost below which what was found is no better [-]."""
+
+Design = Float[np.ndarray, " variable"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommonUnits:
+    """Units by their standard values, the same for every design."""
+
+    verifier: Verifier
+    standard: Float[np.ndarray, "unit column"]  # Standard values [-]
+
+    @classmethod
+    def of(cls, verifier: Verifier, name: str, count: int) -> CommonUnits:
+        """Return so many units, others for every name."""
+        errors = verifier.space.errors
+        uniform = verifier.seeds.child(name).uniform_chunks(count, len(errors.columns))
+        return cls(verifier=verifier, standard=np.concatenate([errors.standard_values(chunk) for chunk in uniform]))
+
+    def values(self, design: Design) -> dict[str, Float[np.ndarray, " unit"]]:
+        """Return the limited outputs of the units at a design, NaN where one has none."""
+        space, model = self.verifier.space, self.verifier.model.at(self.verifier.space.settings_of(design))
+        names = tuple(dict.fromkeys(name for own in self.verifier.requirements for name in own.outputs))
+        found = model.reading(names)(space.errors.deviations(self.standard, space.zones(design)))
+        return dict(zip(names, np.where(found.good[:, np.newaxis], found.values, np.nan).T, strict=True))
+
+    def keep(self, design: Design) -> bool:
+        """Return whether as many of them as must keep the limits."""
+        model, values = self.verifier.model.at(self.verifier.space.settings_of(design)), self.values(design)
+        asked = [own.in_force(model) for own in self.verifier.requirements]
+        kept = [np.mean(own.limits.kept_by(own.read(values))) for own in asked]
+        targets = [own.guarantee.target for own in asked if isinstance(own.guarantee, AtYield)]
+        return bool(np.all(np.array(kept) >= targets))
+
+    def scaled(self, design: Design) -> Design | None:
+        """Return a design with its zones scaled alike until the limits are just kept, none where that is far."""
+        space, groups = self.verifier.space, len(self.verifier.space.groups)
+
+        def by(change: float) -> Design:
+            zones = np.append(design[:groups] * np.exp(change), design[groups:])
+            return np.asarray(np.clip(zones, space.lower, space.upper))
+
+        if not self.keep(by(-_REACH)):
+            return None
+        return by(float(halved(lambda change: self.keep(by(change)), -_REACH, _REACH, _HALVINGS)))
+
+    def cost(self, design: Design) -> float:
+        """Return what a design costs once it just keeps the limits, infinite where that is far [cost units]."""
+        found = self.scaled(design)
+        return np.inf if found is None else float(self.verifier.space.cost(found))
+
+
+def jumps(verifier: Verifier, design: VerifiedDesign) -> bool:
+    """Return whether a limited output jumps where a zone grows, as with a class or a step.
+
+    Parameters
+    ----------
+    verifier
+        Has the model, one whose units are many; no other is asked, nor one of more than nine zones.
+    design
+        Where it is asked; not where laws decide.
+
+    Notes
+    -----
+    With a zone larger by h a smooth output, and one with kinks, differs by h in every unit, one that jumps by as much
+    as ever in a part h of them: the mean square grows with h² or with h (own derivation). It is compared at 10 % and
+    at an eighth of that.
+
+    Examples
+    --------
+    >>> from tests.builders import verifier_of_sum
+    >>> smooth = verifier_of_sum(6.0, 8.0, limit=5.0, guarantee=AtYield(0.99))
+    >>> jumps(smooth, smooth.verify(smooth.space.uniform(1.0), "drawn"))
+    False
+    """
+    groups = len(verifier.space.groups)
+    if not is_fast(verifier.model) or groups > _MOST_VARIABLES + 1 or not design.quantiles:
+        return False
+    units = CommonUnits.of(verifier, "jumps", _UNITS)
+    before = units.values(design.design)
+
+    def squares(at: int, by: float) -> list[float]:
+        moved = units.values(design.design * np.where(np.arange(design.design.size) == at, 1 + by, 1.0))
+        return [float(np.nanmean((moved[name] - own) ** 2)) for name, own in before.items()]
+
+    pairs = [
+        pair for at in range(groups) for pair in zip(squares(at, _MOVED), squares(at, _MOVED / _LESS), strict=True)
+    ]
+    return any(less * _LESS**2 * _JUMPING > more > 0 for more, less in pairs)
+
+
+def by_pattern(verifier: Verifier, start: VerifiedDesign) -> VerifiedDesign | None:
+    """Return a verified design that a search by pattern finds cheaper than one that keeps the limits, if it does.
+
+    Parameters
+    ----------
+    verifier
+        Verifies it. Where no output jumps, where not all is asked as a yield, and of many variables there is none.
+
+    Notes
+    -----
+    Nelder and Mead's simplex over the ratios of the zones and the settings, each design scaled alike until the common
+    units just keep the limits.
+
+    References
+    ----------
+    F. Gao, L. Han, Comput. Optim. Appl. 51 (2012) 259–277, for the steps in several dimensions.
+    """
+    from scipy.optimize import minimize
+
+    space, ratios = verifier.space, len(verifier.space.groups) - 1
+    size = space.shared.upper - space.shared.lower
+    free = np.flatnonzero(size > 0)
+    variables = ratios + free.size
+    yields = all(isinstance(own.guarantee, AtYield) for own in verifier.requirements)
+    if not (start.met and yields and 0 < variables <= _MOST_VARIABLES and jumps(verifier, start)):
+        return None
+
+    def at(point: Float[np.ndarray, " free"]) -> Design:
+        design = start.design.copy()
+        design[:ratios] *= np.exp(point[:ratios])
+        design[ratios + 1 + free] += point[ratios:] * size[free]
+        return np.asarray(np.clip(design, space.lower, space.upper))
+
+    units = CommonUnits.of(verifier, "pattern", _UNITS)
+    simplex = np.vstack([np.zeros(variables), _FIRST_STEP * np.eye(variables)])
+    options = {"initial_simplex": simplex, "maxfev": _EVALUATIONS * variables, "xatol": 1e-3, "adaptive": True}
+    found = minimize(lambda point: units.cost(at(point)), simplex[0], method="Nelder-Mead", options=options)
+    fresh = CommonUnits.of(verifier, "pattern compared", _UNITS_TO_COMPARE)
+    best = fresh.scaled(at(found.x))
+    if best is None or space.cost(best) > (1 - _GAIN) * fresh.cost(start.design):
+        return None
+    return verifier.verify(best, "pattern").evenly_divided()
