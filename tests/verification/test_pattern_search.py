@@ -29,7 +29,7 @@ def study_of(function, seed=1, **changes) -> ta.Study:
 
 def verifier_of(study: ta.Study) -> Verifier:
     own = Prepared(study=study)
-    return Verifier(space=own.space, model=own.model, requirements=own.requirements, seeds=SeedTree(1), units=2**14)
+    return Verifier(space=own.space, model=own.model, requirements=own.requirements, seeds=SeedTree(1), units=2**16)
 
 
 def gap(hole, shaft):
@@ -59,7 +59,7 @@ def test_of_classes_of_one_width_it_finds_the_cheapest_ratio_of_a_grid():
     start = verifier.verify(verifier.space.uniform(1.3), "alike")
     assert start.met
     found = by_pattern(verifier, start)
-    fresh = CommonUnits.of(verifier, "fresh", 2**17)
+    fresh = CommonUnits.of(verifier, "fresh", 2.0)
     grid = [fresh.cost(np.array([ratio, 1.0]) * 1.4) for ratio in np.linspace(0.6, 1.2, 13)]
     assert fresh.cost(found.design) < 1.003 * min(grid)
     assert fresh.cost(start.design) > 1.02 * min(grid)  # which the derivatives of units do not see
@@ -79,7 +79,7 @@ def test_a_line_through_a_design_that_jumps_scales_all_zones_alike():
 def test_an_allocation_with_classes_of_one_width_ends_within_two_percent_of_a_grid(seed):
     study = study_of(gap, seed, compensators=[CLASSES]).with_effort("quick")
     answer = study.ask(ta.Allocation(front=False, what_if=False)).result
-    fresh = CommonUnits.of(verifier_of(study), "fresh", 2**18)
+    fresh = CommonUnits.of(verifier_of(study), "fresh", 4.0)
     grid = [fresh.cost(np.array([ratio, 1.0]) * 1.4) for ratio in np.linspace(0.7, 1.0, 7)]
     assert answer.met
     assert answer.cost < 1.02 * min(grid)

@@ -16,8 +16,9 @@ _MOVED, _LESS = 0.1, 8.0
 """Part of a zone by which it is moved to see whether an output jumps, and by what it is moved less again [-]."""
 _JUMPING = 0.5
 """Part of the mean square that a smooth output would lose by that, of which a jumping one loses no more [-]."""
-_UNITS, _UNITS_TO_COMPARE = 2**15, 2**17
-"""Common units of the search, and others on which what it finds is compared with where it began [-]."""
+_UNITS, _UNITS_TO_COMPARE = 0.5, 2.0
+"""Common units of the search, and others on which what it finds is compared with where it began, over those of a
+verification [-]."""
 _EVALUATIONS, _MOST_VARIABLES = 40, 8
 """Designs that are tried for each variable at most, and variables up to which a pattern is searched [-]."""
 _FIRST_STEP = 0.2
@@ -38,10 +39,10 @@ class CommonUnits:
     standard: Float[np.ndarray, "unit column"]  # Standard values [-]
 
     @classmethod
-    def of(cls, verifier: Verifier, name: str, count: int) -> CommonUnits:
-        """Return so many units, others for every name."""
+    def of(cls, verifier: Verifier, name: str, share: float = _UNITS) -> CommonUnits:
+        """Return so many units over those of a verification, others for every name."""
         errors = verifier.space.errors
-        uniform = verifier.seeds.child(name).uniform_chunks(count, len(errors.columns))
+        uniform = verifier.seeds.child(name).uniform_chunks(int(share * verifier.units), len(errors.columns))
         return cls(verifier=verifier, standard=np.concatenate([errors.standard_values(chunk) for chunk in uniform]))
 
     def values(self, design: Design) -> dict[str, Float[np.ndarray, " unit"]]:
@@ -103,7 +104,7 @@ def jumps(verifier: Verifier, design: VerifiedDesign) -> bool:
     groups = len(verifier.space.groups)
     if not is_fast(verifier.model) or groups > _MOST_VARIABLES + 1 or not design.quantiles:
         return False
-    units = CommonUnits.of(verifier, "jumps", _UNITS)
+    units = CommonUnits.of(verifier, "jumps")
     before = units.values(design.design)
 
     def squares(at: int, by: float) -> list[float]:
@@ -149,7 +150,7 @@ def by_pattern(verifier: Verifier, start: VerifiedDesign) -> VerifiedDesign | No
         design[ratios + 1 + free] += point[ratios:] * size[free]
         return np.asarray(np.clip(design, space.lower, space.upper))
 
-    units = CommonUnits.of(verifier, "pattern", _UNITS)
+    units = CommonUnits.of(verifier, "pattern")
     simplex = np.vstack([np.zeros(variables), _FIRST_STEP * np.eye(variables)])
     options = {"initial_simplex": simplex, "maxfev": _EVALUATIONS * variables, "xatol": 1e-3, "adaptive": True}
     found = minimize(lambda point: units.cost(at(point)), simplex[0], method="Nelder-Mead", options=options)
