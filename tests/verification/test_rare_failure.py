@@ -146,7 +146,9 @@ def test_failed_samples_count_as_safe_up_to_one_per_cent_and_then_stop():
     found = subset_simulation(few, SeedTree(1))
     assert 0 < found.failed < 0.01 * found.calls
     assert found.cautions
-    assert "no usable answer and count as safe" in " ".join(found.cautions)
+    assert "no usable answer and count as kept; the yields of random units count them as missed" in " ".join(
+        found.cautions
+    )
     many = Flat(beta=3.0, blind_beyond=2.0)
     with pytest.raises(SolveError, match="have no usable answer"):
         subset_simulation(many, SeedTree(1))

@@ -255,6 +255,28 @@ class AllocationResult:
         alone = len(members) == len(self.dimensions[name])
         return name if alone else f"{name}: {', '.join(own.name for own in members)}"
 
+    def price_of(self, check: Check, side: OneSidedConstraint) -> float:
+        """Return what a limit of the drawing costs, nothing where the drawing does not touch it.
+
+        Of limits that are kept at once, one that hardly a unit misses leaves all that may be missed to the others.
+
+        Parameters
+        ----------
+        check, side
+            One of the chosen design's limited sides, with its requirement's check.
+
+        Returns
+        -------
+        float
+            [cost units per unit of the output]
+        """
+        price, jointly = self.free.prices.get(side.stack.name, 0.0), self.chosen.jointly
+        touches = price * side.scale > max(_WORTH * self.chosen.cost, solver_noise(self.free.optimum))
+        if touches and jointly:
+            missed = 1 - self.chosen.yield_of(check.requirement, side.sign).estimate
+            touches = missed > _USED * jointly.joint.failures
+        return price if touches else 0.0
+
     @property
     def process_changes(self) -> dict[str, float]:
         """What leaving the old process costs once, of every source whose zone may change [cost units]."""
@@ -270,6 +292,12 @@ class AllocationResult:
         sources = (replace(own, cost=own.cost - changes.get(own.name, 0.0)) for own in self.drawn_sources)
         errors = replace(self.space.errors, sources=tuple(sources))
         return Drawing(name=f"{self.name}, allocated", errors=errors)
+
+
+_WORTH = 1e-3
+"""Worth of a limit over the cost, from which it is said to bind [-]."""
+_USED = 0.02
+"""Part of the failures allowed to all limits at once that must miss one of them for it to be said to bind [-]."""
 
 
 def solver_noise(solution: Solution) -> float:

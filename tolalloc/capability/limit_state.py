@@ -76,7 +76,11 @@ class CountedLimitState:
     @property
     def cautions(self) -> tuple[str, ...]:
         """What a reader must know about the failed samples; empty if there were none."""
-        return (f"{self.failed} of {self.calls} samples have no usable answer and count as safe",) * bool(self.failed)
+        said = (
+            f"{self.failed:,} of {self.calls:,} samples behind this share have no usable answer and count as kept; "
+            "the yields of random units count them as missed"
+        )
+        return (said,) * bool(self.failed)
 
 
 @dataclass(frozen=True, kw_only=True)

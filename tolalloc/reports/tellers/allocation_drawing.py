@@ -39,6 +39,8 @@ _say = Sentences("allocation")
 _STEP = 0.1
 """Share of a zone by which the figure of effects opens it [-]."""
 
+_NOTHING_LEFT = 0.01
+"""What is left of a limit over an effect on it, up to which nothing is said to be left [-]."""
 _NOTICED = 10.0
 """Tightening from which a shop is asked whether it holds a zone [%]."""
 
@@ -237,9 +239,10 @@ def risks(result: AllocationResult) -> tuple[str, ...]:
         found.append(_say("risk_tightest", name=name, change=-change / 100, **zones))
     if result.met and driver[1] > 0:
         left = max(-result.chosen.checks[0].tightest.excess, 0.0)
-        moved = {"effect": driver[1], "left": left}
+        moved = {"effect": driver[1]} | ({"left": left} if left > _NOTHING_LEFT * driver[1] else {})
         said = {key: with_unit(f"{value:.2g}", result.leading) for key, value in moved.items()}
-        found.append(_say("risk_driver", name=driver[0], step=_STEP, output=short(result.leading), **said))
+        key = "risk_driver" if "left" in said else "risk_driver_spent"
+        found.append(_say(key, name=driver[0], step=_STEP, output=short(result.leading), **said))
     found.append(_say("risk_not_included", what=portrait_of(result.model).not_included))
     return tuple(found)
 

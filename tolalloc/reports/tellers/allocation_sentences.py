@@ -409,11 +409,10 @@ def _modification(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
 
 
 def _prices(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
-    """Return what the limits cost, to first order."""
-    free, said = result.free, []
-    for side in free.chosen.constraints if free.chosen.met else ():
-        price = free.prices[side.stack.name]
-        if price * abs(side.limit) > _NOTHING * free.chosen.cost:
+    """Return what the limits that the drawing touches cost, to first order."""
+    said = []
+    for check, side in result.chosen.limited_sides if result.free.chosen.met else ():
+        if price := result.price_of(check, side):
             cost, _ = limit_price(side, price)
             gaps = {
                 "output": quantity(side.stack.name),

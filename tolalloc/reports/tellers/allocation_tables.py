@@ -29,16 +29,12 @@ _Limited = tuple[int, OneSidedConstraint, Check]
 _Named = tuple[str, VerifiedDesign]
 """What a design is called, and the design."""
 
-_BINDS = 1e-3
-"""Worth of a limit over the cost, from which it is said to bind [-]."""
-
 
 def requirements_table(result: AllocationResult) -> Table[_Limited]:
     """Return every limited side with what each design was shown to keep, and what the limit costs."""
 
     def price(row: _Limited) -> tuple[float, str]:
-        side, own = row[1], result.free.prices.get(row[1].stack.name, 0.0)
-        return limit_price(side, own if own * side.scale > solver_noise(result.free.optimum) else 0.0)
+        return limit_price(row[1], result.price_of(row[2], row[1]))
 
     def kept(label: str, design: VerifiedDesign) -> Column[_Limited]:
         header = f"kept: {label} [{unit}]"
@@ -95,9 +91,6 @@ def today_table(result: AllocationResult, cost_unit: str) -> Table[_Compared]:
         asked = own.requirement
         if isinstance(asked, JointRequirement):
             continue
-        price, share = result.free.prices.get(drawn.stack.name, 0.0), after.yield_of(asked, drawn.sign).estimate
-        # Of limits that are kept at once, one that no unit misses leaves all that may be missed to the others.
-        uses = price * drawn.scale > _BINDS * after.cost and not (after.jointly and share == 1.0)
         rows.append(
             _Compared(
                 name=f"{portrait.display_name(asked.output)} [{unit_of(asked.output)}]",
@@ -106,8 +99,8 @@ def today_table(result: AllocationResult, cost_unit: str) -> Table[_Compared]:
                 before=side.value,
                 after=drawn.value,
                 kept_before=100 * before.yield_of(check.requirement, side.sign).estimate,
-                kept_after=100 * share,
-                binds="yes" if uses else "",
+                kept_after=100 * after.yield_of(asked, drawn.sign).estimate,
+                binds="yes" if result.price_of(own, drawn) else "",
             )
         )
     if len(after.alone) > 1:
