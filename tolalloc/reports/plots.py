@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure as Canvas
 
 from tolalloc.reports.figure import BINS, Figure, HeatMap
+from tolalloc.reports.fonts import with_letters
 
 _SEARCHED = 4000
 """Points up to which the emptiest corner is looked for, which takes long among many [-]."""
@@ -94,7 +95,7 @@ def _(figure: Figure) -> Canvas:
     axes.set_axisbelow(True)
     points = sum(len(item.x) for item in figure.series)
     axes.legend(loc="best" if points <= _SEARCHED else "upper right")
-    return canvas
+    return with_letters(canvas)
 
 
 @drawn.register
@@ -117,4 +118,4 @@ def _(figure: HeatMap) -> Canvas:
     _title(canvas, figure.title)
     axes.set(xlabel=figure.x_label)
     canvas.colorbar(image, label=figure.label)
-    return canvas
+    return with_letters(canvas)
