@@ -30,7 +30,7 @@ KINDS = ("linear", "quadratic", "product", "two limits")
 ZONE = 0.2  # first zone of every size [mm]
 DEVIATION = ZONE / 6  # its standard deviation, Cp 1 [mm]
 OUTPUTS = ("first [mm]", "second [mm]")
-_ITERATIONS, _POINTS = 25, 2**13
+_ITERATIONS, _POINTS = 60, 2**13
 
 Vector = np.ndarray
 
@@ -187,7 +187,7 @@ def optimum(own: Case) -> Vector:
             step = 1e-4 * scales[at] * np.eye(scales.size)[at]
             slopes[at] = (own.beyond[0](scales + step) - own.beyond[0](scales - step)) / (2e-4 * scales[at])
         loads = np.maximum(slopes, 1e-12) / scales  # of a share that grows with Σ load·s²
-        new = at_limits(own, (own.costs / loads) ** (1 / 3))
+        new = at_limits(own, np.sqrt(scales * at_limits(own, (own.costs / loads) ** (1 / 3))))  # half of the way
         done = np.abs(np.log(new / scales)).max() < 1e-5
         scales = new
         if done:
