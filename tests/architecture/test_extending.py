@@ -52,15 +52,9 @@ def diffs(section: str) -> list[tuple[str, list[str]]]:
     return [(path, re.split(r"^ *\.\.\.\n", body, flags=re.MULTILINE)) for path, body in blocks]
 
 
-@pytest.fixture(scope="module")
-def with_flange(tmp_path_factory):
-    """A folder with the tests and what the page adds; what it adds to the package is imported from beside it."""
-    folder = tmp_path_factory.mktemp("flange")
-    for name in ("tests", "docs/reference"):
-        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
-    for name in ("pyproject.toml", "studies", "tolalloc"):
-        (folder / name).symlink_to(ROOT / name)
-    for path, hunks in diffs("A spring group"):
+def write_typed(folder: Path, section: str) -> None:
+    """Write what a section of the page adds; what it adds to the package is imported from beside it."""
+    for path, hunks in diffs(section):
         text = (ROOT / path).read_text(encoding="utf-8")
         for hunk in hunks:
             text = typed(text, hunk)
@@ -68,6 +62,17 @@ def with_flange(tmp_path_factory):
         place.parent.mkdir(parents=True, exist_ok=True)
         place.write_text(text, encoding="utf-8")
     (folder / "typed_package.py").write_text(PLUGIN.format(root=str(ROOT)), encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def with_flange(tmp_path_factory):
+    """A folder with the tests and the flange of the page."""
+    folder = tmp_path_factory.mktemp("flange")
+    for name in ("tests", "docs/reference"):
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("pyproject.toml", "studies", "tolalloc"):
+        (folder / name).symlink_to(ROOT / name)
+    write_typed(folder, "A spring group")
     return folder
 
 
@@ -86,3 +91,32 @@ def test_the_flange_of_the_page_passes_the_tests_of_columns(with_flange, chosen,
         text=True,
     )
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+RMS = """
+import typed_package
+import tolalloc as ta
+from tolalloc.drawings.seeds import SeedTree
+from tolalloc.study.prepared import Prepared
+
+name = "rms transmission error [arcsec]"
+limits = {name: ta.Limit(upper=20.0), ta.PEAK_TO_PEAK: ta.Limit(upper=60.0)}
+known = Prepared(study=ta.Study(ta.reducer("rv20e"), ta.drawing("rv20e_table4"), limits=limits))
+x = known.space.units(known.space.uniform(1.0), SeedTree(1), 1)
+print(*known.model.reading((name, ta.PEAK_TO_PEAK))(x).values[0])
+"""
+
+
+@pytest.mark.slow
+def test_the_output_of_the_page_is_read_as_it_stands(tmp_path):
+    write_typed(tmp_path, "An output of the reducer")
+    done = subprocess.run(
+        [sys.executable, "-c", RMS],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    rms, peak_to_peak = map(float, done.stdout.split())
+    assert 0.1 * peak_to_peak < rms < 0.5 * peak_to_peak  # no more than half of a range (Popoviciu 1935)

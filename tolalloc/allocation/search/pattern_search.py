@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.requirement import AtYield
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier
 from tolalloc.capability.halving import halved
@@ -23,12 +25,21 @@ _EVALUATIONS, _MOST_VARIABLES = 40, 8
 """Designs that are tried for each variable at most, and variables up to which a pattern is searched [-]."""
 _FIRST_STEP = 0.2
 """First step of a zone, over it, and of a setting, over its range [-]."""
-_REACH, _HALVINGS = 0.5, 11
-"""Change of all zones alike within which a design comes to its limits, ln of a factor [-], and halvings of it."""
+_FAR, _REACH, _PRECISION = 2.0, 0.5, 5e-4
+"""Change of all zones alike within which a design comes to its limits, at first and around that, and its error: ln of a
+factor [-]."""
+_INSIDE = (0.0, 0.01, 0.02, 0.04)
+"""Changes of all zones by which what is found is taken inside until a verification shows it, ln of a factor [-]."""
 _GAIN = 0.002
 """Relative gain of cost below which what was found is no better [-]."""
 
 Design = Float[np.ndarray, " variable"]
+
+
+def alike(space: DesignSpace, design: Design, change: float) -> Design:
+    """Return a design with all zones changed alike, as far as their ranges go; the change is the ln of a factor [-]."""
+    zones = np.append(design[: len(space.groups)] * np.exp(change), space.settings_of(design))
+    return np.asarray(np.clip(zones, space.lower, space.upper))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,17 +71,13 @@ class CommonUnits:
         targets = [own.guarantee.target for own in asked if isinstance(own.guarantee, AtYield)]
         return bool(np.all(np.array(kept) >= targets))
 
-    def scaled(self, design: Design) -> Design | None:
-        """Return a design with its zones scaled alike until the limits are just kept, none where that is far."""
-        space, groups = self.verifier.space, len(self.verifier.space.groups)
-
-        def by(change: float) -> Design:
-            zones = np.append(design[:groups] * np.exp(change), design[groups:])
-            return np.asarray(np.clip(zones, space.lower, space.upper))
-
-        if not self.keep(by(-_REACH)):
+    def scaled(self, design: Design, reach: float = _REACH) -> Design | None:
+        """Return a design with its zones scaled alike until the limits are just kept, none where that is too far."""
+        space, halvings = self.verifier.space, int(np.ceil(np.log2(reach / _PRECISION)))
+        if not self.keep(alike(space, design, -reach)):
             return None
-        return by(float(halved(lambda change: self.keep(by(change)), -_REACH, _REACH, _HALVINGS)))
+        change = halved(lambda change: self.keep(alike(space, design, change)), -reach, reach, halvings)
+        return alike(space, design, float(change))
 
     def cost(self, design: Design) -> float:
         """Return what a design costs once it just keeps the limits, infinite where that is far [cost units]."""
@@ -134,28 +141,43 @@ def by_pattern(verifier: Verifier, start: VerifiedDesign) -> VerifiedDesign | No
     ----------
     F. Gao, L. Han, Comput. Optim. Appl. 51 (2012) 259–277, for the steps in several dimensions.
     """
-    from scipy.optimize import minimize
-
     space, ratios = verifier.space, len(verifier.space.groups) - 1
     size = space.shared.upper - space.shared.lower
     free = np.flatnonzero(size > 0)
     variables = ratios + free.size
     yields = all(isinstance(own.guarantee, AtYield) for own in verifier.requirements)
-    if not (start.met and yields and 0 < variables <= _MOST_VARIABLES and jumps(verifier, start)):
+    if not (start.met and yields and variables <= _MOST_VARIABLES and jumps(verifier, start)):
+        return None
+
+    units = CommonUnits.of(verifier, "pattern")
+    around = units.scaled(start.design, _FAR)
+    if around is None:
         return None
 
     def at(point: Float[np.ndarray, " free"]) -> Design:
-        design = start.design.copy()
+        design = around.copy()
         design[:ratios] *= np.exp(point[:ratios])
         design[ratios + 1 + free] += point[ratios:] * size[free]
         return np.asarray(np.clip(design, space.lower, space.upper))
 
-    units = CommonUnits.of(verifier, "pattern")
+    point = _least(lambda point: units.cost(at(point)), variables)
+    fresh = CommonUnits.of(verifier, "pattern compared", _UNITS_TO_COMPARE)
+    best = fresh.scaled(at(point))
+    if best is None or space.cost(best) > (1 - _GAIN) * start.cost:
+        return None
+    for number, inside in enumerate(_INSIDE, start=1):
+        verified = verifier.verify(alike(space, best, -inside), f"pattern {number}").evenly_divided()
+        if verified.met:
+            break
+    return verified
+
+
+def _least(cost: Callable[[Float[np.ndarray, " free"]], float], variables: int) -> Float[np.ndarray, " free"]:
+    """Return where a cost is least, as a simplex finds it from zero."""
+    from scipy.optimize import minimize
+
+    if not variables:
+        return np.zeros(0)
     simplex = np.vstack([np.zeros(variables), _FIRST_STEP * np.eye(variables)])
     options = {"initial_simplex": simplex, "maxfev": _EVALUATIONS * variables, "xatol": 1e-3, "adaptive": True}
-    found = minimize(lambda point: units.cost(at(point)), simplex[0], method="Nelder-Mead", options=options)
-    fresh = CommonUnits.of(verifier, "pattern compared", _UNITS_TO_COMPARE)
-    best = fresh.scaled(at(found.x))
-    if best is None or space.cost(best) > (1 - _GAIN) * fresh.cost(start.design):
-        return None
-    return verifier.verify(best, "pattern").evenly_divided()
+    return np.asarray(minimize(cost, simplex[0], method="Nelder-Mead", options=options).x)
