@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,8 +22,11 @@ _UNITS, _UNITS_TO_COMPARE = 0.5, 2.0
 verification [-]."""
 _EVALUATIONS, _MOST_VARIABLES = 40, 8
 """Designs that are tried for each variable at most, and variables up to which a pattern is searched [-]."""
+_ROUNDS, _AGAIN = 8, 0.01
+"""Searches one after another, each around what the one before found, and the gain of cost for which one more is made
+[-]."""
 _FIRST_STEP = 0.2
-"""First step of a zone, over it, and of a setting, over its range [-]."""
+"""First step of a ratio of zones, its ln, and of a setting, over its range [-]."""
 _FAR, _REACH, _PRECISION = 2.0, 0.5, 5e-4
 """Change of all zones alike within which a design comes to its limits, at first and around that, and its error: ln of a
 factor [-]."""
@@ -141,28 +143,20 @@ def by_pattern(verifier: Verifier, start: VerifiedDesign) -> VerifiedDesign | No
     ----------
     F. Gao, L. Han, Comput. Optim. Appl. 51 (2012) 259–277, for the steps in several dimensions.
     """
-    space, ratios = verifier.space, len(verifier.space.groups) - 1
-    size = space.shared.upper - space.shared.lower
-    free = np.flatnonzero(size > 0)
-    variables = ratios + free.size
+    space, units = verifier.space, CommonUnits.of(verifier, "pattern")
     yields = all(isinstance(own.guarantee, AtYield) for own in verifier.requirements)
-    if not (start.met and yields and variables <= _MOST_VARIABLES and jumps(verifier, start)):
+    few = len(_Around(units=units, design=start.design).steps) <= _MOST_VARIABLES
+    if not (start.met and yields and few and jumps(verifier, start)):
         return None
-
-    units = CommonUnits.of(verifier, "pattern")
-    around = units.scaled(start.design, _FAR)
-    if around is None:
-        return None
-
-    def at(point: Float[np.ndarray, " free"]) -> Design:
-        design = around.copy()
-        design[:ratios] *= np.exp(point[:ratios])
-        design[ratios + 1 + free] += point[ratios:] * size[free]
-        return np.asarray(np.clip(design, space.lower, space.upper))
-
-    point = _least(lambda point: units.cost(at(point)), variables)
+    found = units.scaled(start.design, _FAR)
+    for _ in range(_ROUNDS):
+        if found is None:
+            return None
+        before, found = float(space.cost(found)), units.scaled(_Around(units=units, design=found).best)
+        if found is None or space.cost(found) > (1 - _AGAIN) * before:
+            break
     fresh = CommonUnits.of(verifier, "pattern compared", _UNITS_TO_COMPARE)
-    best = fresh.scaled(at(point))
+    best = None if found is None else fresh.scaled(found)
     if best is None or space.cost(best) > (1 - _GAIN) * start.cost:
         return None
     for number, inside in enumerate(_INSIDE, start=1):
@@ -172,12 +166,37 @@ def by_pattern(verifier: Verifier, start: VerifiedDesign) -> VerifiedDesign | No
     return verified
 
 
-def _least(cost: Callable[[Float[np.ndarray, " free"]], float], variables: int) -> Float[np.ndarray, " free"]:
-    """Return where a cost is least, as a simplex finds it from zero."""
-    from scipy.optimize import minimize
+@dataclass(frozen=True, kw_only=True)
+class _Around:
+    """Designs around one, by the changes of the ratios of its zones and of its free settings."""
 
-    if not variables:
-        return np.zeros(0)
-    simplex = np.vstack([np.zeros(variables), _FIRST_STEP * np.eye(variables)])
-    options = {"initial_simplex": simplex, "maxfev": _EVALUATIONS * variables, "xatol": 1e-3, "adaptive": True}
-    return np.asarray(minimize(cost, simplex[0], method="Nelder-Mead", options=options).x)
+    units: CommonUnits
+    design: Design
+
+    @property
+    def steps(self) -> Float[np.ndarray, " change"]:
+        """First step of every change: ln of a ratio [-], a setting [unit of its name]."""
+        shared, groups = self.units.verifier.space.shared, len(self.units.verifier.space.groups)
+        size = shared.upper - shared.lower
+        return np.append(np.full(groups - 1, _FIRST_STEP), _FIRST_STEP * size[size > 0])
+
+    def at(self, changes: Float[np.ndarray, " change"]) -> Design:
+        """Return the design at some changes; the last zone keeps its size."""
+        space, ratios = self.units.verifier.space, len(self.units.verifier.space.groups) - 1
+        design = self.design.copy()
+        design[:ratios] *= np.exp(changes[:ratios])
+        design[ratios + 1 + np.flatnonzero(space.shared.upper > space.shared.lower)] += changes[ratios:]
+        return np.asarray(np.clip(design, space.lower, space.upper))
+
+    @property
+    def best(self) -> Design:
+        """The cheapest that a simplex finds, each design scaled alike."""
+        from scipy.optimize import minimize
+
+        count = self.steps.size
+        simplex = np.vstack([np.zeros(count), np.diag(self.steps)])
+        if not count:
+            return self.design
+        options = {"initial_simplex": simplex, "maxfev": _EVALUATIONS * count, "xatol": 1e-3, "adaptive": True}
+        found = minimize(lambda own: self.units.cost(self.at(own)), simplex[0], method="Nelder-Mead", options=options)
+        return self.at(found.x)
