@@ -58,6 +58,16 @@ def test_costs_fall_along_a_line_whose_ends_lie_on_both_sides_of_the_limit():
     assert kept_by(designs[0]) > TARGET + 0.01 > TARGET - 0.01 > kept_by(designs[-1])
 
 
+def test_a_line_begins_no_less_safe_than_the_design_that_was_verified():
+    line, _ = line_and_model()
+    verifier = line.verifier(line.around.space)
+    inside = verifier.verify(0.5 * line.around.design, "far inside")
+    assert inside.met
+    assert line_through(inside, verifier).safe.tolist() == inside.design.tolist()
+    assert not line.around.met
+    assert line.cost(0.0) > line.around.cost  # as its models say
+
+
 @pytest.mark.slow
 def test_of_the_cheapest_shown_no_more_than_the_stated_error_are_beyond_the_limit():
     """However often a line is looked at: 150 answers, three standard errors of room; hardly any is far inside."""

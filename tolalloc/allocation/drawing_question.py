@@ -256,9 +256,13 @@ class DrawingQuestion:
     def _cheapest_stated(
         self, found: Candidates, test: AcceptanceTest, kind: str, design: VerifiedDesign, spending: AlphaSpending
     ) -> VerifiedDesign:
-        """Return a design as the drawing states it, or the cheapest on a line through it that a test will show."""
+        """Return a design as the drawing states it, or the cheapest on a line through it that a test will show.
+
+        What a search chose comes back after a miss where it still lies inside, and is then tested itself: its line may
+        be what missed.
+        """
         search = {ALONE: found.fixed, FREE: found.free}.get(kind)
-        if search:
+        if search and not (design is search.chosen and spending.missed):
             # Which of the designs of a search is the cheapest one met is also luck; the last is what all led to.
             around = search.tried[-1] if design is search.chosen else design
             known = explained_by(around, (*search.tried, around))

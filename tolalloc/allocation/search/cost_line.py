@@ -80,6 +80,8 @@ class CostLine:
         error = max((own.error for own in around.quantiles), default=0.0)
         apart = max(_APART, _LEAST / error) if error > 0 else _APART
         safe, cheap = (step_from(around, known, margin, _REACH) for margin in (apart, -apart))
+        if around.met and around.space.cost(safe) < around.cost:  # what was verified is safer than what models say
+            safe = around.design
         return cls(around=around, drawn=drawn, verifier=verifier, safe=safe, cheap=cheap)
 
     def at(self, position: float) -> VerifiedDesign:
