@@ -24,7 +24,9 @@ def map_of(name: str) -> HeatMap:
 def test_a_second_font_draws_what_the_usual_one_lacks():
     canvas = drawn(map_of(f"pin {SCRIPT}"))
     canvas.savefig(io.BytesIO(), format="png")
-    assert fonts.font_with(frozenset(SCRIPT)) in canvas.findobj(Text)[0].get_fontfamily()
+    second = fonts.font_with(frozenset(SCRIPT))
+    assert second is not None
+    assert second.name in canvas.findobj(Text)[0].get_fontfamily()
 
 
 def test_letters_that_no_font_has_are_said_once_and_no_raw_warning_follows(monkeypatch, capsys):
@@ -41,3 +43,9 @@ def test_letters_that_no_font_has_are_said_once_and_no_raw_warning_follows(monke
 def test_usual_letters_keep_the_usual_font():
     canvas = drawn(map_of("Bolzen ⌀ Maß é µ ″"))
     assert len(canvas.findobj(Text)[0].get_fontfamily()) == 1
+
+
+def test_a_file_that_is_no_font_has_no_letters(tmp_path):
+    broken = tmp_path / "broken.ttf"
+    broken.write_bytes(b"no font")
+    assert fonts._letters_of(str(broken)) == frozenset()

@@ -24,27 +24,31 @@ def with_letters(canvas: Canvas) -> Canvas:
     letters = frozenset("".join(own.get_text() for own in texts)) - {"\n"}
     usual = font_manager.findfont(font_manager.FontProperties())
     if missing := letters - _letters_of(usual):
-        if second := font_with(missing):
+        second = font_with(missing)
+        if second:
             for own in texts:
-                own.set_fontfamily([*own.get_fontfamily(), second])
-        else:
-            _say_once("".join(sorted(missing)[:8]))
+                own.set_fontfamily([*own.get_fontfamily(), second.name])
+        if boxes := missing - (_letters_of(second.fname) if second else frozenset()):
+            _say_once("".join(sorted(boxes)[:8]))
     return canvas
 
 
 @cache
-def font_with(letters: frozenset[str]) -> str | None:
+def font_with(letters: frozenset[str]) -> font_manager.FontEntry | None:
     """Return the installed font that has most of some letters, none where no font has any."""
     found, most = None, 0
     for entry in font_manager.fontManager.ttflist:
         if not entry.name.startswith(_BOXES) and (has := len(letters & _letters_of(entry.fname))) > most:
-            found, most = entry.name, has
+            found, most = entry, has
     return found
 
 
 @cache
 def _letters_of(file: str) -> frozenset[str]:
-    return frozenset(map(chr, FT2Font(file).get_charmap()))
+    try:
+        return frozenset(map(chr, FT2Font(file).get_charmap()))
+    except (OSError, RuntimeError):  # a file that is no font that matplotlib can draw with
+        return frozenset()
 
 
 @cache

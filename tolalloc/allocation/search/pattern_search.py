@@ -11,6 +11,7 @@ from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.requirement import AtYield
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier
 from tolalloc.capability.halving import halved
+from tolalloc.exceptions import FailedUnitsError
 from tolalloc.models.model import is_fast
 
 _MOVED, _LESS = 0.1, 8.0
@@ -118,7 +119,8 @@ def jumps(verifier: Verifier, design: VerifiedDesign) -> bool:
 
     def squares(at: int, by: float) -> list[float]:
         moved = units.values(design.design * np.where(np.arange(design.design.size) == at, 1 + by, 1.0))
-        return [float(np.nanmean((moved[name] - own) ** 2)) for name, own in before.items()]
+        changes = ((moved[name] - own)[np.isfinite(moved[name] - own)] for name, own in before.items())
+        return [float(change @ change) / max(change.size, 1) for change in changes]
 
     pairs = [
         pair for at in range(groups) for pair in zip(squares(at, _MOVED), squares(at, _MOVED / _LESS), strict=True)
@@ -143,11 +145,11 @@ def by_pattern(verifier: Verifier, start: VerifiedDesign) -> VerifiedDesign | No
     ----------
     F. Gao, L. Han, Comput. Optim. Appl. 51 (2012) 259–277, for the steps in several dimensions.
     """
-    space, units = verifier.space, CommonUnits.of(verifier, "pattern")
+    space = verifier.space
     yields = all(isinstance(own.guarantee, AtYield) for own in verifier.requirements)
-    few = len(_Around(units=units, design=start.design).steps) <= _MOST_VARIABLES
-    if not (start.met and yields and few and jumps(verifier, start)):
+    if not (start.met and yields and _first_steps(space).size <= _MOST_VARIABLES and jumps(verifier, start)):
         return None
+    units = CommonUnits.of(verifier, "pattern")
     found = units.scaled(start.design, _FAR)
     for _ in range(_ROUNDS):
         if found is None:
@@ -159,11 +161,21 @@ def by_pattern(verifier: Verifier, start: VerifiedDesign) -> VerifiedDesign | No
     best = None if found is None else fresh.scaled(found)
     if best is None or space.cost(best) > (1 - _GAIN) * start.cost:
         return None
+    verified = None
     for number, inside in enumerate(_INSIDE, start=1):
-        verified = verifier.verify(alike(space, best, -inside), f"pattern {number}").evenly_divided()
+        try:
+            verified = verifier.verify(alike(space, best, -inside), f"pattern {number}").evenly_divided()
+        except FailedUnitsError:  # further inside fewer units are without an answer
+            continue
         if verified.met:
             break
     return verified
+
+
+def _first_steps(space: DesignSpace) -> Float[np.ndarray, " change"]:
+    """Return the first step of every change: ln of a ratio of zones [-], a free setting [unit of its name]."""
+    size = space.shared.upper - space.shared.lower
+    return np.append(np.full(len(space.groups) - 1, _FIRST_STEP), _FIRST_STEP * size[size > 0])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,13 +184,6 @@ class _Around:
 
     units: CommonUnits
     design: Design
-
-    @property
-    def steps(self) -> Float[np.ndarray, " change"]:
-        """First step of every change: ln of a ratio [-], a setting [unit of its name]."""
-        shared, groups = self.units.verifier.space.shared, len(self.units.verifier.space.groups)
-        size = shared.upper - shared.lower
-        return np.append(np.full(groups - 1, _FIRST_STEP), _FIRST_STEP * size[size > 0])
 
     def at(self, changes: Float[np.ndarray, " change"]) -> Design:
         """Return the design at some changes; the last zone keeps its size."""
@@ -193,10 +198,10 @@ class _Around:
         """The cheapest that a simplex finds, each design scaled alike."""
         from scipy.optimize import minimize
 
-        count = self.steps.size
-        simplex = np.vstack([np.zeros(count), np.diag(self.steps)])
-        if not count:
+        steps = _first_steps(self.units.verifier.space)
+        if not steps.size:
             return self.design
-        options = {"initial_simplex": simplex, "maxfev": _EVALUATIONS * count, "xatol": 1e-3, "adaptive": True}
+        simplex = np.vstack([np.zeros(steps.size), np.diag(steps)])
+        options = {"initial_simplex": simplex, "maxfev": _EVALUATIONS * steps.size, "xatol": 1e-3, "adaptive": True}
         found = minimize(lambda own: self.units.cost(self.at(own)), simplex[0], method="Nelder-Mead", options=options)
         return self.at(found.x)
