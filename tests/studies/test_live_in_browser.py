@@ -264,6 +264,7 @@ def test_the_keyboard_reaches_everything_and_everything_has_a_name(driver, study
     shown(driver, study)
     by_id(driver, "pin").click()
     until(lambda: by_id(driver, "designs").is_displayed())
+    counted(driver, 256)  # what is told of them makes some of the elements anew
     wanted = {
         own.id: own
         for own in driver.find_elements("css selector", "button, input, select, summary")
