@@ -76,8 +76,8 @@ def browser() -> Any:
     return driver
 
 
-def until(true: Callable[[], Any], seconds: float = 20.0) -> Any:
-    """Wait until something is true, and return it."""
+def until(true: Callable[[], Any], seconds: float = 120.0) -> Any:
+    """Wait until something is true, on a busy machine that compiles too, and return it."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         if found := true():
