@@ -77,7 +77,7 @@ def test_two_runs_side_by_side(runs, tmp_path):
     said = tolalloc("compare", *runs).stdout
     assert "rankings" in said
     assert "zones" in said
-    assert [row["source"] for row in answer["rankings"]] == ["disc1.pitch", "pin.diameter"]
+    assert [row["dimension"] for row in answer["rankings"]] == ["disc1.pitch", "pin.diameter"]
 
 
 def test_two_runs_of_one_study_are_told_apart_by_their_folders_and_by_what_differs(tmp_path):

@@ -70,7 +70,7 @@ def test_what_a_user_writes_can_be_copied_and_pickled():
     [
         (ta.Study, {"limit": LIMITS}, "the nearest known is limits"),
         (ta.Study, {"name": "mine", "drawin": None}, "the nearest known is drawing"),
-        (ta.Ranking, {"grades": True}, "it has none"),
+        (ta.Ranking, {"grades": True}, "known is by"),
         (ta.Limit, {"max": 60.0}, "known are lower, show, upper"),
         (ta.Allocation, {"grade": True}, "the nearest known is grades"),
         (ta.Allocation, {"fixedfirst": True}, "the nearest known is fixed_first"),

@@ -29,14 +29,16 @@ def answers():
 
 def test_label_and_drawing_stand_beside_the_id(answers):
     ranking, allocation = answers
-    for frame in (ranking.to_frame(), allocation.tables["drawing"]):
-        found = frame.set_index("source")
-        at = list(frame.columns).index("source")
-        assert list(frame.columns[at : at + 3]) == ["source", "drawing", "label"]
-        assert found.loc["a", ["drawing", "label"]].tolist() == ["4711-B", "Hülse Ø55"]
-        assert found.loc["b", ["drawing", "label"]].tolist() == ["4711-B", ""]
-        assert found.loc["c", ["drawing", "label"]].tolist() == ["", ""]
-    dimensions = allocation.tables["dimensions"].set_index("dimension")
+    drawing, dimensions = allocation.tables["drawing"], allocation.tables["dimensions"].set_index("dimension")
+    for frame, named in ((drawing, "source"), (ranking.to_frame(), "dimension")):
+        at = list(frame.columns).index(named)
+        assert list(frame.columns[at : at + 3]) == [named, "drawing", "label"]
+    found, ranked = drawing.set_index("source"), ranking.to_frame().set_index("dimension")
+    assert found.loc["a", ["drawing", "label"]].tolist() == ["4711-B", "Hülse Ø55"]
+    assert found.loc["b", ["drawing", "label"]].tolist() == ["4711-B", ""]
+    assert ranked.loc["sleeves", ["drawing", "label"]].tolist() == ["4711-B", "Hülse Ø55"]
+    for own in (found, ranked):
+        assert own.loc["c", ["drawing", "label"]].tolist() == ["", ""]
     assert dimensions.loc["sleeves", ["drawing", "label"]].tolist() == ["4711-B", "Hülse Ø55"]
 
 

@@ -189,7 +189,7 @@ def test_a_function_of_arrays_has_the_shares_of_a_sum_to_a_hundredth_in_a_quick_
     )
     found = study.rank("quick").result.sobol.of(0)
     np.testing.assert_allclose(found.total, [4 / 6, 1 / 6, 1 / 6], atol=0.01)
-    assert found.blocks == QUICK_RANKING.of_fast_model(3).sobol.limit > 100 * QUICK_RANKING.sobol.limit
+    assert found.blocks == QUICK_RANKING.of_fast_model(3).sobol.limit > 50 * QUICK_RANKING.sobol.limit
     assert (found.total_interval[1] - found.total_interval[0] < 0.05).all()
     assert EFFORT.of_fast_model(3) is EFFORT  # numbers of a user stay
 
@@ -200,7 +200,7 @@ def largest_of_twelve(a, b, c, d, e, f, g, h, i, j, k, m):
 
 @pytest.mark.slow
 def test_a_quick_run_says_of_which_sources_too_few_blocks_show_what_they_do():
-    """max |n·x| of one number at a time: 64 blocks, a third of the sources hardly ever the largest."""
+    """max |n·x| of one number at a time: a third of the sources is hardly ever the largest, in 32 blocks of its own."""
     span = {"plus": 10.0, "minus": -10.0, "unit": "µm", "min": 1.0, "max": 90.0, "cost": 1.0}
     output = "largest [mm]"
     study = ta.Study(
@@ -212,14 +212,14 @@ def test_a_quick_run_says_of_which_sources_too_few_blocks_show_what_they_do():
     )
     answer = study.rank("quick")
     found = answer.result.sobol.of(0)
-    assert found.blocks == QUICK_RANKING.sobol.limit
-    assert says(answer.sentences, "ranking.unseen", blocks=64, fewest=5)
-    (said,) = (own for own in answer.sentences if "too few to say" in own)
-    named = said.rpartition(": ")[2].partition(".")[0].split(", ")
-    assert {"a", "b", "c"} <= set(named) and not {"k", "m"} & set(named)
+    assert says(answer.sentences, "ranking.unseen", blocks=QUICK_RANKING.sobol.start, fewest=5)
+    assert answer.result.sobol.small and says(answer.sentences, "ranking.others", count=4)
+    said = [own for own in answer.sentences if "too few to say" in own]
+    named = [name for own in said for name in own.rpartition(": ")[2].partition(".")[0].split(", ")]
+    assert {"b", "c"} <= set(named) and not {"k", "m"} & set(named)
     for low, high in (found.first_interval, found.total_interval, answer.result.sobol.overall.total_interval):
         assert low.min() >= 0.0 and high.max() <= 1.0
-    assert (found.total_interval[1, :3] > 0.03).all()
+    assert (found.total_interval[1, :3] > 0.02).all()
     table = answer.tables["ranking"]
     assert found.first.min() < 0.0 <= min(table["S1 low 5 % [-]"].min(), table["first index S1 [-]"].min())
     exact = of_the_largest(np.arange(1.0, 13.0))[1]

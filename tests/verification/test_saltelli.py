@@ -373,7 +373,7 @@ def test_blocks_double_until_the_order_is_stable_or_the_limit_is_reached():
     assert found.history[-1].probability >= 0.9 > found.history[-2].probability
     stopped = until_converged(gaps, "abcd", 3, start=64, limit=200)
     assert (stopped.stable, [step.blocks for step in stopped.history]) == (False, [64, 128])
-    assert converged(found) != converged(stopped)
+    assert converged(found, "y") != converged(stopped, "y")
     with pytest.raises(InputError, match="first number of blocks"):
         until_converged(gaps, "abcd", 3, start=64, limit=32)
 

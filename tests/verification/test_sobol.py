@@ -132,11 +132,12 @@ def independent_blocks(weights: np.ndarray, blocks: int, seed: int) -> SobolAnal
     return SobolAnalysis(
         outputs=OUTPUTS,
         ranked=OUTPUTS,
+        followed=OUTPUTS,
         sources=NAMES[:sources],
         indices=saltelli_indices(evaluation, sources, SeedTree(seed).child("resamples"), resamples=200),
         convergence=Convergence(history=(Step(blocks=blocks, first=(0,), probability=1.0),), probability=0.9),
         samples=evaluation.status.size,
-        blocks_of_others=blocks,
+        first_blocks=blocks,
     )
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
+from SALib.analyze.sobol import analyze
 from SALib.sample import sobol as salib
 
 from tests.builders import sizes
@@ -17,7 +18,7 @@ from tolalloc.models.model import Evaluation
 from tolalloc.sensitivity.effort import SobolEffort
 from tolalloc.sensitivity.ranking import before
 from tolalloc.sensitivity.saltelli import SAMPLES_AT_ONCE, SaltelliDesign, saltelli_indices
-from tolalloc.sensitivity.sobol import SobolAnalysis, sobol_indices
+from tolalloc.sensitivity.sobol import OTHERS, SobolAnalysis, sobol_indices
 
 FACTOR_GROUPS = ("a", "b", "b", "c", "a", "d")
 CORRELATED = Correlation(pairs=(Pair(one="a", other="c", correlation=-0.6),))
@@ -134,7 +135,9 @@ def test_outputs_that_do_not_count_are_asked_for_in_the_first_blocks_alone():
     weights, errors = np.array([[0.2, 1.0, 1.0, 1.0], [1.0, 0.99, 0.98, 0.1]]), sizes("abcd")
     both, second = Linear(weights, errors.columns), Renamed(weights[1:], errors.columns)
     effort = SobolEffort(start=16, limit=64, places=4, probability=0.999)
-    found = sobol_indices(Experiment.of(both, errors, SeedTree(2)), effort, ranked=("y1 [-]",), further=second)
+    found = sobol_indices(
+        Experiment.of(both, errors, SeedTree(2)), effort, ranked=("y1 [-]",), further=lambda _: second
+    )
     assert (sum(both.asked), sum(second.asked)) == (16 * 6, 48 * 6)
     whole = sobol_indices(Experiment.of(both, errors, SeedTree(2)), fixed(64), ranked=("y1 [-]",))
     first = sobol_indices(Experiment.of(both, errors, SeedTree(2)), fixed(16), ranked=("y1 [-]",))
@@ -143,6 +146,46 @@ def test_outputs_that_do_not_count_are_asked_for_in_the_first_blocks_alone():
         np.testing.assert_array_equal(found.of(output).first_resamples, own.of(output).first_resamples)
         assert found.of(output).blocks == own.of(output).blocks
     np.testing.assert_array_equal(found.overall.total, whole.overall.total)
+
+
+def test_further_blocks_tell_the_eight_largest_apart_and_take_the_rest_together():
+    """Of twelve parts of a sum each has the share of its weight squared, and so have the rest together."""
+    weights = np.array([2.0, 0.1, 1.8, 0.2, 1.6, 1.4, 0.15, 1.2, 1.0, 0.8, 0.05, 0.6])
+    errors = sizes("abcdefghijkl")
+    response = Linear(np.stack([weights, weights[::-1]]), errors.columns)
+    asked = Linear(weights[np.newaxis], errors.columns)
+    effort = SobolEffort(start=64, limit=512, places=8, probability=0.9999)
+    found = sobol_indices(Experiment.of(response, errors, SeedTree(3)), effort, further=lambda _: asked)
+    assert found.together is not None
+    assert found.small == {1, 3, 6, 10}
+    assert found.samples == 64 * 14 + 64 + 448 * 11 == effort.counted(12)
+    truth, own = weights**2 / (weights @ weights), found.of(0)
+    error = own.total_resamples.std(axis=0)
+    assert (np.abs(own.total - truth) <= 4 * error).all()
+    rest, at = truth[sorted(found.small)].sum(), found.together.sources.index(OTHERS)
+    assert abs(found.together.total[at] - rest) <= 4 * found.together.total_resamples.std(axis=0)[at]
+    # What 512 blocks of all twelve say of the eight, they say with fewer samples, to rounding.
+    whole = sobol_indices(Experiment.of(asked, errors, SeedTree(3)), fixed(512)).of(0)
+    largest = [at for at in range(12) if at not in found.small]
+    np.testing.assert_allclose(own.total_resamples[:, largest], whole.total_resamples[:, largest], rtol=1e-12)
+    first = sobol_indices(Experiment.of(response, errors, SeedTree(3)), fixed(64))
+    np.testing.assert_array_equal(own.total[sorted(found.small)], first.of(0).total[sorted(found.small)])
+    np.testing.assert_array_equal(found.of(1).total, first.of(1).total)
+    salib = found.solved.to_salib()
+    theirs = analyze(**salib.for_sobol, print_to_console=False, seed=1)
+    named = dict(zip(dict.fromkeys(salib.problem["groups"]), theirs["ST"], strict=True))
+    np.testing.assert_allclose([named[name] for name in found.together.sources], found.together.total, rtol=1e-12)
+    pair = next(pair for pair in own.neighbours if {pair.before, pair.after} == {1, 6} or pair.after in found.small)
+    assert pair.more_blocks in (0, None)
+
+
+def test_a_leading_output_that_does_not_vary_leaves_the_next_one_to_settle():
+    errors = sizes("abcd")
+    response = Linear(np.array([[0.0, 0.0, 0.0, 0.0], [1.0, 1.05, 0.3, 0.1]]), errors.columns)
+    found = sobol_indices(Experiment.of(response, errors, SeedTree(2)), SobolEffort(start=16, limit=64, places=4))
+    assert found.constant == ("y0 [-]",)
+    assert found.convergence.history[-1].first[:2] == (1, 0)
+    assert found.overall.drives == ("y1 [-]",) * 4
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from tolalloc.allocation.space.requirement import OwnLimit
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 TOTAL, LOW, HIGH = "total index ST [-]", "ST low 5 % [-]", "ST high 95 % [-]"
 _YIELD, _OF_ALL = "yield of {} [-]", "all limits"
-_RANKED = ("source", "rank [-]", TOTAL, LOW, HIGH)
+_RANKED = ("dimension", "rank [-]", TOTAL, LOW, HIGH)
 _LIMITS = ("limit", "lower limit")
 _REQUIRED, _LIMITED = ("limit", "shown for"), ("LSL", "USL")
 _ZONED = ("id", "unit", "plus [unit]", "minus [unit]", "cost [cost units]")
@@ -38,7 +39,7 @@ class FinishedRun:
     # Answers of all its questions in one, and circumstances, units in the names
     summary: dict[str, Any]
     manifest: dict[str, Any]
-    ranking: pd.DataFrame  # Sources, largest total index first
+    ranking: pd.DataFrame  # Dimensions, or sources, largest total index first
     zones: pd.DataFrame  # The allocated tolerance table, or the one that was ranked
 
     @property
@@ -172,7 +173,7 @@ def read_run(folder: Path) -> FinishedRun:
         folder=folder,
         summary=summary,
         manifest=manifest,
-        ranking=_read_table(folder / "tables" / f"{ranked}.csv", _RANKED),
+        ranking=_read_table(folder / "tables" / f"{ranked}.csv", _RANKED, {"source": _RANKED[0]}),
         zones=_read_table(folder / zones, _ZONED),
     )
 
@@ -194,14 +195,16 @@ def _read_json(path: Path) -> dict[str, Any]:
     return found
 
 
-def _read_table(path: Path, columns: tuple[str, ...]) -> pd.DataFrame:
+def _read_table(path: Path, columns: tuple[str, ...], called: Mapping[str, str] = MappingProxyType({})) -> pd.DataFrame:
+    """Return a table with these columns, some of which may be called otherwise in it."""
     import pandas as pd
 
     text = "".join(line for line in StringIO(_text(path, "a table in CSV")) if not line.startswith("#"))
     try:
-        found = pd.read_csv(StringIO(text)).rename(columns=heads_of(path).meant).rename(columns=_with_cost_units)
+        found = pd.read_csv(StringIO(text)).rename(columns=heads_of(path).meant)
     except ValueError as error:
         raise InputError(f"{path}: cannot be read as a table ({' '.join(str(error).split())}).") from None
+    found = found.rename(columns=_with_cost_units).rename(columns=called)
     _with(dict.fromkeys(found.columns), columns, path)
     return found
 

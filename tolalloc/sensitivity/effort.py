@@ -48,7 +48,16 @@ def _least(fewest: int) -> Rule:
     return whole(f"{fewest} or more, a whole number", fewest)
 
 
+LARGEST = 8
+"""Groups of columns that further blocks tell apart: as many as a first page names, more would halve the blocks [-]."""
+
+
 _IN_CHAINS = whole(f"a multiple of {_CHAIN}", 0, multiple=_CHAIN)
+
+
+def _power(number: int) -> int:
+    """Return the largest power of two up to a number, at least 1 [-]."""
+    return 1 << max(number.bit_length() - 1, 0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,11 +67,12 @@ class SobolEffort(NamedFields):
     Parameters
     ----------
     start
-        First number of Saltelli blocks, a power of two [-].
+        First number of Saltelli blocks, a power of two; they tell everything apart for all outputs [-].
     limit
-        Largest number of them; as the first one for a fixed number [-].
+        Largest number of them; as the first one for a fixed number. Those after the first are for the order of the
+        eight largest of one output [-].
     places
-        First places whose order must be stable in the ranking over all outputs [-].
+        First places whose order must be stable in the ranking of the leading output [-].
     probability
         Share of resamples that must have that order [-].
     resamples
@@ -80,6 +90,22 @@ class SobolEffort(NamedFields):
     probability: float = 0.9
     resamples: int = 400
     second_order: bool = False
+
+    def counted(self, groups: int) -> int:
+        """Return how many samples the largest number of blocks has of so many groups of columns [-].
+
+        n₁·(G + 2) of the first blocks and, where there are more than K + 1 groups, n₁ that exchange all but K = 8
+        together and (n − n₁)·(K + 3) of further blocks.
+
+        Examples
+        --------
+        >>> SobolEffort(start=32, limit=256).counted(48), SobolEffort(start=32, limit=256).counted(5)
+        (4096, 1792)
+        """
+        further = self.limit - self.start
+        parted = groups > LARGEST + 1 and further and not self.second_order
+        rest = self.start + further * (LARGEST + 3) if parted else further * (groups + 2)
+        return self.start * (groups + 2) + rest
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +146,7 @@ class RankingEffort(NamedFields):
 
     units: Annotated[int, _least(fewest_units())] = 16_384
     design: Annotated[SamplingDesign, a(SamplingDesign)] = SamplingDesign.MONTE_CARLO
-    sobol: Annotated[SobolEffort, a(SobolEffort)] = field(default_factory=lambda: SobolEffort(start=256, limit=1024))
+    sobol: Annotated[SobolEffort, a(SobolEffort)] = field(default_factory=lambda: SobolEffort(start=256, limit=2048))
     derivative_units: Annotated[int, _least(10)] = 1024
     inverse_units: Annotated[int, _least(1)] = 2048
     surrogate_units: Annotated[int, _least(validation.FEWEST_OF_FOLD * validation.FOLDS)] = 2048
@@ -142,15 +168,14 @@ class RankingEffort(NamedFields):
     def counted(self, sources: int) -> int:
         """Return about how many units a ranking of so many sources solves, the methods for rare failures left out [-].
 
-        Random units, Saltelli blocks of sources + 2 units, derivatives and surrogates with their trials, own count.
+        Random units, Saltelli blocks, derivatives and surrogates with their trials, own count.
 
         Examples
         --------
         >>> QUICK_RANKING.counted(48)
-        10112
+        11008
         """
-        blocks = self.sobol.limit * (sources + 2)
-        return self.units + blocks + 2 * self.derivative_units + 9 * self.surrogate_units
+        return self.units + self.sobol.counted(sources) + 2 * self.derivative_units + 9 * self.surrogate_units
 
     def within(self, units: float, sources: int) -> RankingEffort:
         """Return this effort scaled to about so many units in all, each number at least what its measure needs.
@@ -162,11 +187,13 @@ class RankingEffort(NamedFields):
         --------
         >>> effort = QUICK_RANKING.within(2 * QUICK_RANKING.counted(48), 48)
         >>> effort.units, effort.sobol.limit, effort.sobol.start
-        (4096, 128, 128)
+        (4096, 512, 64)
         """
         share = units / self.counted(sources)
-        wanted = min(int(share * self.sobol.limit), _MOST_SAMPLES // (sources + 2))
-        blocks = max(1 << max(wanted.bit_length() - 1, 0), _FEWEST_BLOCKS)
+        start, limit = (
+            max(_power(min(int(share * blocks), _MOST_SAMPLES // (sources + 2))), _FEWEST_BLOCKS)
+            for blocks in (self.sobol.start, self.sobol.limit)
+        )
 
         def scaled(number: int, fewest: int) -> int:
             return max(round(min(share, 1.0) * number), fewest)
@@ -174,7 +201,7 @@ class RankingEffort(NamedFields):
         return replace(
             self,
             units=min(max(round(share * self.units), fewest_units()), max(_MOST_UNITS, self.units)),
-            sobol=replace(self.sobol, start=blocks, limit=blocks),
+            sobol=replace(self.sobol, start=start, limit=limit),
             derivative_units=scaled(self.derivative_units, 10),
             inverse_units=scaled(self.inverse_units, 100),
             surrogate_units=scaled(self.surrogate_units, validation.FEWEST_OF_FOLD * validation.FOLDS),
@@ -207,13 +234,13 @@ class RankingEffort(NamedFields):
         if self not in (RankingEffort(), QUICK_RANKING):
             return self
         allowed = int(ARRAY_RATE * FAST_SECONDS[self == QUICK_RANKING]) // (sources + 2)
-        blocks = max(self.sobol.limit, 1 << max(allowed.bit_length() - 1, 0))
+        blocks = max(self.sobol.limit, _power(allowed))
         return replace(self, sobol=replace(self.sobol, start=blocks, limit=blocks))
 
 
 QUICK_RANKING = RankingEffort(
     units=2048,
-    sobol=SobolEffort(start=32, limit=64),
+    sobol=SobolEffort(start=32, limit=256),
     derivative_units=128,
     inverse_units=400,
     surrogate_units=512,

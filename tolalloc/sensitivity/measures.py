@@ -19,9 +19,9 @@ from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.derivatives import classical_estimate, local_derivatives
 from tolalloc.sensitivity.effort import RankingEffort
 from tolalloc.sensitivity.inverse import InverseSensitivity, fewest_units, inverse_sensitivity
-from tolalloc.sensitivity.result import RankingResult
+from tolalloc.sensitivity.result import BY_DIMENSION, BY_SOURCE, RankingResult
 from tolalloc.sensitivity.shapley import ShapleyEffects, shapley_effects
-from tolalloc.sensitivity.sobol import SobolAnalysis, SourceIndices, order_contribution, regrouped, sobol_indices
+from tolalloc.sensitivity.sobol import SobolAnalysis, order_contribution, sobol_indices
 from tolalloc.sensitivity.surrogate.control_variate import MOST_CONTROLLED, cheap_model
 from tolalloc.sensitivity.surrogate.regression import (
     Regression,
@@ -48,6 +48,7 @@ class Measures:
     effort: RankingEffort  # How much may be computed
     seeds: SeedTree  # Node of the seed tree
     largest_failed_share: float  # Share of units that may fail [-]
+    by: str = BY_DIMENSION  # What is ranked: dimensions of the drawing, or each source alone
 
     @property
     def leading(self) -> str:
@@ -88,23 +89,18 @@ class Measures:
     def sobol(self, waves: tuple[str, ...], cheap: Regression | None = None) -> SobolAnalysis:
         """Return the indices of all outputs and of waves of the model's spectra, with as many blocks as are needed.
 
-        What is uncertain of the model is among the sources. Blocks are added for the order of the sources of what is
-        limited, so that alone is asked for in those after the first number.
+        What is uncertain of the model is among what is ranked. Blocks are added for the order of what drives the
+        leading output, so that alone is asked for in those after the first number.
         """
-        limited = tuple(self.limits)
-        experiment, further = self._sobol_experiment("sobol", (*self.outputs, *waves)), self._with_uncertain(limited)
-        return sobol_indices(experiment, self.effort.sobol, ranked=limited, further=further, cheap=cheap)
-
-    def dimensions(self, analysis: SobolAnalysis, cheap: Regression | None = None) -> SourceIndices | None:
-        """Return the indices of the leading output by the dimensions of the drawing, from the blocks of an analysis.
-
-        All members of a dimension are exchanged together, as one number of the drawing limits them all. None where
-        every dimension has one member, or as many as are correlated with it.
-        """
-        groups = self._with_joint.dimension_of_column
-        if len(set(groups)) == len(self._with_joint.blocks):
-            return None
-        return regrouped(self._sobol_experiment("sobol", (self.leading,)), analysis, groups, cheap)
+        joint, outputs = self._with_joint, self._with_uncertain((*self.outputs, *waves))
+        return sobol_indices(
+            self.experiment("sobol", outputs, joint),
+            self.effort.sobol,
+            ranked=tuple(self.limits),
+            factor_groups=joint.block_of_column if self.by == BY_SOURCE else joint.dimension_of_column,
+            further=self._with_uncertain,
+            cheap=cheap,
+        )
 
     @property
     def _with_joint(self) -> ErrorModel:
@@ -113,9 +109,6 @@ class Measures:
 
     def _with_uncertain(self, outputs: tuple[str, ...]) -> Response:
         return self.model.with_uncertain(outputs) if self.model.uncertain else self.model.reading(outputs)
-
-    def _sobol_experiment(self, name: str, outputs: tuple[str, ...]) -> Experiment[Response]:
-        return self.experiment(name, self._with_uncertain(outputs), self._with_joint)
 
     def uncertain(self, sample: MonteCarlo) -> UncertainEffect | None:
         """Return what not knowing the model itself does to the leading output; none where all of it is known."""
@@ -200,7 +193,6 @@ def rank(asked: Measures, record: RunRecord) -> RankingResult:
         with record.stage("Sobol indices"):
             effect, cheap = measures.uncertain(sample), measures.cheap(sample)
             sobol = measures.sobol(tuple(name for names in spectra.values() for name in names), cheap)
-            dimensions = measures.dimensions(sobol, cheap)
         with record.stage("other measures"):
             derived = measures.derived(sample)
             shapley = measures.shapley()
@@ -223,7 +215,7 @@ def rank(asked: Measures, record: RunRecord) -> RankingResult:
         sample=sample,
         design=effort.design,
         sobol=sobol,
-        dimensions=dimensions,
+        by=asked.by,
         orders=order_contribution(sobol, spectra) if spectra else None,
         effect=effect,
         shapley=shapley,

@@ -28,7 +28,7 @@ class Neighbours:
     deviation: float
     probability: float  # Share of resamples in which they have this order [-]
     separated: bool  # Whether that share reaches 0.9
-    # Blocks that would have to be added to tell them apart, 0 if they are, none if they are equal [-]
+    # Blocks that would have to be added to tell them apart, 0 if they are, none if they are equal or have few [-]
     more_blocks: int | None
 
 
@@ -44,6 +44,7 @@ class SourceRanking:
     drives: tuple[str, ...] = ()  # Of a ranking over several outputs: the one for which each source has that index
     # Index that a source may have where too few blocks show it, else 0 [-]
     unseen: Float[np.ndarray, " source"] | float = 0.0
+    few: frozenset[int] = frozenset()  # Positions of sources that fewer blocks show [-]
 
     @property
     def total_interval(self) -> Float[np.ndarray, "2 source"]:
@@ -79,7 +80,8 @@ class SourceRanking:
             apart = self.total_resamples[:, leading] - self.total_resamples[:, following]
             difference, deviation = float(self.total[leading] - self.total[following]), float(apart.std(ddof=1))
             probability = float(((apart > 0).mean() + (apart >= 0).mean()) / 2)
-            separated = probability >= _CONFIDENCE
+            separated, known = probability >= _CONFIDENCE, not self.few & {leading, following}
+            more = _more_blocks(difference, deviation, self.blocks) if known else None
             found.append(
                 Neighbours(
                     before=leading,
@@ -88,7 +90,7 @@ class SourceRanking:
                     deviation=deviation,
                     probability=probability,
                     separated=separated,
-                    more_blocks=0 if separated else _more_blocks(difference, deviation, self.blocks),
+                    more_blocks=0 if separated else more,
                 )
             )
         return tuple(found)

@@ -13,6 +13,7 @@ from tolalloc.capability.monte_carlo import MonteCarlo, OneSided, ProcessUncerta
 from tolalloc.capability.yield_at_limit import YieldAtLimit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SamplingDesign
+from tolalloc.drawings.sources import Source
 from tolalloc.models.model import Model
 from tolalloc.sensitivity.derivatives import ClassicalEstimate, LocalDerivatives
 from tolalloc.sensitivity.inverse import InverseSensitivity
@@ -21,6 +22,9 @@ from tolalloc.sensitivity.sobol import OrderContribution, SalibArrays, SobolAnal
 from tolalloc.sensitivity.surrogate.validation import Choice
 from tolalloc.sensitivity.target import TargetSensitivity
 from tolalloc.sensitivity.uncertain import UncertainEffect
+
+BY_DIMENSION, BY_SOURCE = "dimension", "source"
+"""What a ranking may rank: dimensions of the drawing with all their places together, or every source alone."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,8 +56,7 @@ class RankingResult:
     sample: MonteCarlo
     design: SamplingDesign
     sobol: SobolAnalysis  # Indices of these outputs and of the waves of the model's spectra
-    # Indices of the leading output by the dimensions of the drawing; none where each dimension is one source
-    dimensions: SourceIndices | None
+    by: str  # What is ranked: dimensions of the drawing, or each source alone
     orders: OrderContribution | None  # What each source adds to each order; none for a model without spectra
     # What not knowing the model itself does to the leading output; none where all of it is known
     effect: UncertainEffect | None
@@ -74,6 +77,25 @@ class RankingResult:
     def indices(self) -> SourceIndices:
         """Sobol indices of the leading output."""
         return self.sobol.of(self.leading)
+
+    @cached_property
+    def members(self) -> dict[str, tuple[Source, ...]]:
+        """What is ranked → the sources of the drawing in it; none of what is uncertain of the model."""
+        found = dict[str, tuple[Source, ...]]()
+        for own in self.errors.active:
+            name = own.name if self.by == BY_SOURCE else own.dimension
+            found[name] = (*found.get(name, ()), own)
+        return {
+            joined: tuple(own for name in joined.split(" + ") for own in found.get(name, ()))
+            for joined in self.sobol.sources
+        }
+
+    @cached_property
+    def share_of_source(self) -> dict[str, float]:
+        """Source → its part of the sum of the leading output's total indices, a dimension's in equal parts [-]."""
+        shares = self.indices.total / self.indices.total.sum()
+        found = zip(self.indices.sources, shares.tolist(), strict=True)
+        return {own.name: share / len(self.members[name]) for name, share in found for own in self.members[name]}
 
     @cached_property
     def one_sided(self) -> OneSided:

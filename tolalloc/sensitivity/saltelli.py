@@ -14,7 +14,7 @@ moments and not indices.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -158,6 +158,12 @@ _ROUNDING = 64 * np.finfo(float).eps
 """Variance of a resample over its mean square below which it is rounding."""
 
 
+_OF_SOURCES = frozenset(
+    ("first", "total", "first_resamples", "total_resamples", "narrowed", "first_left_out", "total_left_out", "unseen")
+)
+"""Arrays of indices whose last axis is that of the sources."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class SaltelliIndices:
     """Indices of every output; those of an output that does not vary are NaN."""
@@ -191,13 +197,22 @@ class SaltelliIndices:
         """Positions of the two sources of every pair."""
         return tuple(combinations(range(self.first.shape[1]), 2)) if self.second.size else ()
 
-    def instead_of(self, other: SaltelliIndices, places: list[int]) -> SaltelliIndices:
-        """Return indices in which these stand at some places among the outputs, and those of other blocks elsewhere."""
-        joined = {}
-        for name, own in vars(self).items():
-            if isinstance(own, np.ndarray) and name != "weights":
-                joined[name] = getattr(other, name).copy()
-                joined[name][places] = own
+    def with_part(self, other: SaltelliIndices, outputs: list[int], sources: Mapping[int, int]) -> SaltelliIndices:
+        """Return these indices, but at some places among the outputs those of other blocks.
+
+        Of those sources alone that the other blocks tell apart: position here → position there.
+        """
+        joined: dict[str, Any] = {"blocks": other.blocks, "dropped": other.dropped}
+        here, there = list(sources), list(sources.values())
+        for name, theirs in vars(other).items():
+            if not isinstance(theirs, np.ndarray) or name == "weights":
+                continue
+            joined[name] = getattr(self, name).copy()
+            for own, place in enumerate(outputs):
+                if name in _OF_SOURCES:
+                    joined[name][place][..., here] = theirs[own][..., there]
+                else:
+                    joined[name][place] = theirs[own]
         return replace(self, **joined)
 
 

@@ -7,7 +7,7 @@ counted; ``conf`` takes the blocks of a Sobol' sequence for independent, so inte
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -18,7 +18,7 @@ from jaxtyping import Bool, Float
 from tolalloc.capability.experiment import Experiment
 from tolalloc.exceptions import ConstantOutputError, InputError, UnknownNameError
 from tolalloc.models.model import Evaluation, Response
-from tolalloc.sensitivity.effort import SobolEffort
+from tolalloc.sensitivity.effort import LARGEST, SobolEffort
 from tolalloc.sensitivity.ranking import (
     Convergence,
     Resampled,
@@ -106,17 +106,25 @@ class SobolAnalysis:
 
     outputs: tuple[str, ...]  # Names of the outputs with their units
     ranked: tuple[str, ...]  # Those among them that count in the ranking over all
-    sources: tuple[str, ...]  # Names of the sources, or of the blocks of dependent ones
+    followed: tuple[str, ...]  # Those among them that all blocks were asked for, the one whose order settled first
+    sources: tuple[str, ...]  # Names of the groups of columns: sources, blocks of dependent ones, or dimensions
     indices: SaltelliIndices  # Indices of all outputs
     convergence: Convergence  # How the order of the first places settled; one step for a fixed number of blocks
     samples: int  # Samples evaluated [-]
-    blocks_of_others: int  # Saltelli blocks used for outputs that do not count [-]
-    solved: SolvedDesign | None = None  # What the indices of the first output come from, where it is kept
+    first_blocks: int  # Saltelli blocks used for the other outputs, and for the groups that came out small [-]
+    together: SourceIndices | None = None  # Indices of the followed output with the small groups as one, `OTHERS`
+    solved: SolvedDesign | None = None  # What the indices of the followed output come from, where it is kept
 
     @property
     def blocks(self) -> int:
-        """Saltelli blocks used for the outputs that count [-]."""
+        """Saltelli blocks used for the followed output [-]."""
         return self.indices.blocks
+
+    @property
+    def small(self) -> frozenset[int]:
+        """Positions of the groups that further blocks took together [-]."""
+        known = self.together.sources if self.together else self.sources
+        return frozenset(at for at, name in enumerate(self.sources) if name not in known)
 
     @property
     def dropped(self) -> int:
@@ -149,13 +157,20 @@ class SobolAnalysis:
 
     def of(self, output: str | int) -> SourceIndices:
         """Return the indices of one output."""
-        at, counts = self.position(output), self.outputs[self.position(output)] in self.ranked
-        blocks = self.blocks if counts else self.blocks_of_others
-        return _indices_of(self.indices, at, self.outputs[at], self.sources, blocks, self.samples)
+        at = self.position(output)
+        followed = self.outputs[at] in self.followed
+        blocks, few = (self.blocks, self.small) if followed else (self.first_blocks, frozenset[int]())
+        return _indices_of(self.indices, at, self.outputs[at], self.sources, blocks, self.samples, few)
 
 
 def _indices_of(
-    found: SaltelliIndices, at: int, output: str, sources: tuple[str, ...], blocks: int, samples: int
+    found: SaltelliIndices,
+    at: int,
+    output: str,
+    sources: tuple[str, ...],
+    blocks: int,
+    samples: int,
+    few: frozenset[int] = frozenset(),
 ) -> SourceIndices:
     """Return the indices at one place, of an output from so many blocks of an analysis with so many samples [-]."""
     if not found.varies[at]:
@@ -173,6 +188,7 @@ def _indices_of(
         dropped=found.dropped,
         samples=samples,
         unseen=found.unseen[at],
+        few=few,
     )
 
 
@@ -293,6 +309,8 @@ def _of_waves(
     return np.asarray(shares)
 
 
+OTHERS = "all others"
+"""Name of the groups of columns that further blocks exchange together."""
 _HALF_STEP = 2.0**-31
 """Half the step of the scrambled points, which stands for a point of exactly 0: its normal deviate is infinite [-]."""
 
@@ -302,25 +320,28 @@ def sobol_indices(
     effort: SobolEffort,
     ranked: tuple[str, ...] = (),
     factor_groups: tuple[str, ...] = (),
-    further: Response | None = None,
+    further: Callable[[tuple[str, ...]], Response] | None = None,
     cheap: Regression | None = None,
 ) -> SobolAnalysis:
     """Return the indices of all outputs, with as many blocks as the order of the first places needs.
 
-    Sources that depend on each other have one index together: a share of each alone would be arbitrary.
+    Sources that depend on each other have one index together: a share of each alone would be arbitrary. The first
+    number of blocks tells all groups of columns apart and parts the eight largest of the first output that counts from
+    the rest; further blocks are for their order alone and exchange all others together.
 
     Parameters
     ----------
     effort
         Blocks, from a first number doubled up to a limit, and what stops them.
     ranked
-        Outputs that count in the ranking over all, which is the one that must become stable; all of them if empty.
+        Outputs that count in the ranking over all; all of them if empty. The order of the first one that varies must
+        become stable.
     factor_groups
         Name of what every column belongs to, such as its dimension of the drawing; independent of each other. The
         sources, or blocks of dependent ones, unless given.
     further
-        Response of the outputs that count, which is asked alone after the first number of blocks: no other output needs
-        a stable order. All outputs are asked for in all blocks unless it is given.
+        Response of some outputs by their names, asked after the first number of blocks for the one whose order must
+        become stable. All outputs are asked for in all blocks unless it is given.
     cheap
         Model of some of the outputs, learnt from units of other random numbers, as a control variate.
 
@@ -358,7 +379,7 @@ def sobol_indices(
         columns=errors.columns,
         replicates=min(REPLICATES, effort.start),
     )
-    blocks = _Blocks(experiment, design, effort, counted, further or experiment.response, cheap)
+    blocks = _Blocks(experiment, design, effort, counted, further or (lambda _: experiment.response), cheap)
     shared = {source.name: source.dimension for source in errors.sources}  # the tolerance that a source may share
     convergence = until_converged(
         blocks.resampled,
@@ -371,12 +392,14 @@ def sobol_indices(
     return SobolAnalysis(
         outputs=outputs,
         ranked=counted,
+        followed=blocks.followed.outputs,
         sources=design.names,
         indices=blocks.indices,
         convergence=convergence,
-        samples=blocks.answers.status.size,
-        blocks_of_others=blocks.steps[0 if further else -1].blocks,
-        solved=SolvedDesign(design=design, answers=replace(blocks.answers, values=blocks.answers.values[:, :1])),
+        samples=blocks.samples,
+        first_blocks=blocks.first.blocks,
+        together=blocks.together,
+        solved=SolvedDesign(design=blocks.design, answers=replace(blocks.answers, values=blocks.answers.values[:, :1])),
     )
 
 
@@ -389,41 +412,88 @@ _CHEAP_SAMPLES = 2**16
 class _Blocks:
     """Blocks that are solved when they are first asked for."""
 
+    first: SaltelliIndices  # Of all outputs and groups, from the first number of blocks
+    followed: Response  # What is asked of further blocks
+    answers: Evaluation  # Its outputs in all blocks of the design
+
     def __init__(
         self,
         experiment: Experiment[Response],
         design: SaltelliDesign,
         effort: SobolEffort,
         counted: tuple[str, ...],
-        further: Response,
+        further: Callable[[tuple[str, ...]], Response],
         cheap: Regression | None,
     ) -> None:
         self.experiment, self.design, self.effort, self.counted = experiment, design, effort, counted
         self.further, self.cheap = further, cheap
-        self.kept = [experiment.response.outputs.index(name) for name in further.outputs]
-        self.answers: Evaluation
-        self.steps = list[SaltelliIndices]()
+        self.names, self.outputs = design.names, experiment.response.outputs
+        self.last: SaltelliIndices | None = None  # Of the followed outputs and the groups of the present design
+        self.samples = 0
 
     def resampled(self, blocks: int) -> Resampled:
-        """Return the indices of the ranking over all outputs that count."""
-        if self.steps:
-            start = self.steps[-1].blocks + self.steps[-1].dropped
-            more = solved(self.experiment, self.further, self.design.chunks(start, blocks))
-            self.answers = Evaluation.joined([self.answers, more])
-            outputs = self.further.outputs
-            self.steps.append(self._indices(self.answers, outputs))
+        """Return the indices of the output whose order must become stable."""
+        if not self.samples:
+            self._begin(blocks)
         else:
-            first = solved(self.experiment, self.experiment.response, self.design.chunks(0, blocks))
-            self.answers = replace(first, values=first.values[:, self.kept])
-            outputs = self.experiment.response.outputs
-            self.steps.append(self._indices(first, outputs))
-        ranking = _overall_ranking(self.design.names, outputs, self.counted, self.steps[-1])
-        return ranking.total, ranking.total_resamples
+            if self.last is None:
+                self._part()
+            start = self.answers.status.size // self.design.samples_per_block
+            more = solved(self.experiment, self.followed, self.design.chunks(start, blocks))
+            self.samples += more.status.size
+            self.answers = Evaluation.joined([self.answers, more])
+            self.last = self._indices(self.answers, self.followed.outputs)
+        found, at = self.indices, self.outputs.index(self._leading)
+        return found.total[at], found.total_resamples[at]
 
     @property
     def indices(self) -> SaltelliIndices:
-        """Indices of all outputs, each from all blocks in which it was asked for."""
-        return self.steps[0] if len(self.steps) == 1 else self.steps[-1].instead_of(self.steps[0], self.kept)
+        """Indices of all outputs and groups, each from all blocks that tell it."""
+        if self.last is None:
+            return self.first
+        there = {self.names.index(name): at for at, name in enumerate(self.design.names) if name in self.names}
+        return self.first.with_part(self.last, self._places, there)
+
+    @property
+    def together(self) -> SourceIndices | None:
+        """Indices of the followed output with the small groups as one; none where all are told apart."""
+        if self.last is None or self.design.names == self.names:
+            return None
+        return _indices_of(self.last, 0, self._leading, self.design.names, self.last.blocks, self.samples)
+
+    @property
+    def _leading(self) -> str:
+        """The first output that counts and varies, of those that count in the ranking over all."""
+        varies = dict(zip(self.outputs, self.first.varies, strict=True))
+        found = next((name for name in self.counted if varies[name]), None)
+        if found is None:
+            raise ConstantOutputError(
+                "Sobol indices: every output is the same for all samples, so no source can be ranked."
+            )
+        return found
+
+    @property
+    def _places(self) -> list[int]:
+        return [self.outputs.index(name) for name in self.followed.outputs]
+
+    def _begin(self, blocks: int) -> None:
+        """Solve the first blocks, which tell all groups apart for all outputs."""
+        found = solved(self.experiment, self.experiment.response, self.design.chunks(0, blocks))
+        self.samples = found.status.size
+        self.first = self._indices(found, self.outputs)
+        self.followed = self.further((self._leading,))
+        self.answers = replace(found, values=found.values[:, self._places])
+
+    def _part(self) -> None:
+        """Part the largest groups from the rest, which is one group from here on."""
+        total = self.first.total[self.outputs.index(self._leading)]
+        if self.effort.second_order or total.size <= LARGEST + 1:
+            return
+        largest = {self.names[at] for at in np.argsort(-total, kind="stable")[:LARGEST]}
+        groups = tuple(own if own in largest else OTHERS for own in self.design.factor_groups)
+        before, self.design = self.design, replace(self.design, factor_groups=groups)
+        self.answers, added = _exchanged(self.experiment, self.followed, before, self.answers, self.design)
+        self.samples += added
 
     def _indices(self, answers: Evaluation, outputs: tuple[str, ...]) -> SaltelliIndices:
         blocks = answers.status.size // self.design.samples_per_block
@@ -498,19 +568,8 @@ def regrouped(
     assert analysis.solved is not None
     before, answers = analysis.solved.design, analysis.solved.answers
     design = replace(before, factor_groups=factor_groups, second_order=False)
-    blocks, size = answers.status.size // before.samples_per_block, before.samples_per_block
-    places = {columns: at + 1 for at, columns in enumerate(before.columns_of_names)}
-    new = tuple(
-        name for name, columns in zip(design.names, design.columns_of_names, strict=True) if columns not in places
-    )
-    values, status = (own.reshape(blocks, size) for own in (answers.values[:, 0], answers.status))
-    if new:
-        more = solved(experiment, experiment.response, design.chunks(0, blocks, only=new))
-        values = np.concatenate([values, more.values[:, 0].reshape(blocks, -1)], axis=1)
-        status = np.concatenate([status, more.status.reshape(blocks, -1)], axis=1)
-    added = iter(range(size, size + len(new)))
-    order = [0, *(places[own] if own in places else next(added) for own in design.columns_of_names), size - 1]
-    together = Evaluation(values=values[:, order].reshape(-1, 1), status=status[:, order].reshape(-1))
+    together, _ = _exchanged(experiment, experiment.response, before, answers, design)
+    blocks = together.status.size // design.samples_per_block
     found = saltelli_indices(
         together,
         len(design.names),
@@ -521,3 +580,31 @@ def regrouped(
         control=_control(experiment, cheap, design, blocks, analysis.outputs[:1]),
     )
     return _indices_of(found, 0, analysis.outputs[0], design.names, found.blocks, together.status.size)
+
+
+def _exchanged(
+    experiment: Experiment[Response],
+    response: Response,
+    before: SaltelliDesign,
+    answers: Evaluation,
+    after: SaltelliDesign,
+) -> tuple[Evaluation, int]:
+    """Return what a response says of the blocks of a design that are known of other groups, and the samples solved.
+
+    The samples A and B are the same for any groups, and so are those in which a group that is in both is exchanged:
+    only those of new groups are solved.
+    """
+    size = before.samples_per_block
+    blocks = answers.status.size // size
+    places = {columns: at + 1 for at, columns in enumerate(before.columns_of_names)}
+    named = dict(zip(after.names, after.columns_of_names, strict=True))
+    new = tuple(name for name, columns in named.items() if columns not in places)
+    values, status = answers.values.reshape(blocks, size, -1), answers.status.reshape(blocks, size)
+    if new:
+        more = solved(experiment, response, after.chunks(0, blocks, only=new))
+        values = np.concatenate([values, more.values.reshape(blocks, len(new), -1)], axis=1)
+        status = np.concatenate([status, more.status.reshape(blocks, -1)], axis=1)
+    added = iter(range(size, size + len(new)))
+    order = [0, *(places[own] if own in places else next(added) for own in named.values()), size - 1]
+    ordered = values[:, order].reshape(-1, answers.values.shape[1])
+    return Evaluation(values=ordered, status=status[:, order].reshape(-1)), blocks * len(new)

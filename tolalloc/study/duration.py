@@ -50,7 +50,7 @@ def durations(prepared: Prepared) -> tuple[Duration, ...]:
     found = []
     for question in prepared.study.asked:
         if isinstance(question, Ranking):
-            parts = _of_ranking(prepared)
+            parts = _of_ranking(question, prepared)
         elif isinstance(question, Allocation):
             parts = _of_allocation(question, prepared)
         else:
@@ -69,25 +69,25 @@ class _Workload:
     seconds: float  # What one takes [s]
 
 
-def _of_ranking(prepared: Prepared) -> tuple[_Workload, ...]:
+def _of_ranking(question: Ranking, prepared: Prepared) -> tuple[_Workload, ...]:
     """Return random units, Saltelli blocks and units of the leading output alone, each with what is asked of them."""
     model, errors, effort = prepared.model, prepared.errors, prepared.ranking_effort
     leading = prepared.requirements[0].output
     outputs = tuple(name for name in model.outputs if name in {*model.ranked, *prepared.study.limits})
     waves = tuple(name for names in model.spectra.values() for name in names)
-    limited = tuple(dict.fromkeys(own.output for own in prepared.requirements))
     whole, alone = _seconds(prepared, outputs), _seconds(prepared, (leading,))
-    of_all, of_limited = (_seconds(prepared, asked, uncertain=True) for asked in ((*outputs, *waves), limited))
-    sources, dimensions = len(errors.blocks) + len(model.uncertain), len({*errors.dimension_of_column})
+    of_all, of_leading = (_seconds(prepared, asked, uncertain=True) for asked in ((*outputs, *waves), (leading,)))
+    by_source = question.by == "source"
+    ranked = len(errors.blocks if by_source else {*errors.dimension_of_column}) + len(model.uncertain)
     inverse = max(effort.inverse_units, fewest_units(prepared.target))
-    trials = 2 * effort.derivative_units + (sources + 2) * inverse
-    block, (start, limit) = sources + 2, (effort.sobol.start, effort.sobol.limit)
+    trials = 2 * effort.derivative_units + (len(errors.blocks) + 2) * inverse
+    first = effort.sobol.start * (ranked + 2)
     most = trials + _TRIALS * effort.surrogate_units + 3 * effort.units
     return (
         _Workload(units=(effort.units, effort.units), seconds=whole),
-        _Workload(units=(start * block, start * block), seconds=of_all),
-        _Workload(units=(0, (limit - start) * block), seconds=of_limited),
-        _Workload(units=(0, limit * (dimensions + 3) + most), seconds=alone),
+        _Workload(units=(first, first), seconds=of_all),
+        _Workload(units=(0, effort.sobol.counted(ranked) - first), seconds=of_leading),
+        _Workload(units=(0, most), seconds=alone),
     )
 
 

@@ -200,7 +200,7 @@ class Prepared:
     @property
     def ranking_effort(self) -> RankingEffort:
         """How much a ranking may compute, more blocks for a model that answers for whole arrays."""
-        return self.study.effort.of_ranking(self.model, len(self.errors.blocks), self._sharing)
+        return self.study.effort.of_ranking(self.model, len({*self.errors.dimension_of_column}), self._sharing)
 
     @property
     def allocation_effort(self) -> AllocationEffort:

@@ -58,11 +58,19 @@ class Question(NamedFields, ABC):
 class Ranking(Question):
     """Which error drives which output, which order and the rejects, and how sure that is.
 
-    >>> Ranking().kind
-    'ranking'
+    Parameters
+    ----------
+    by
+        What is ranked: ``dimension``, each dimension of the drawing with all its places together, or ``source``, each
+        source alone.
+
+    >>> Ranking().by
+    'dimension'
     """
 
     kind: ClassVar[str] = "ranking"
+
+    by: Annotated[str, Rule("dimension or source", ("dimension", "source").__contains__)] = "dimension"
 
     def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[RankingResult]:  # noqa: ARG002
         """Return what drives the outputs at the zones of the drawing."""
@@ -77,6 +85,7 @@ class Ranking(Question):
             effort=prepared.ranking_effort,
             seeds=SeedTree(study.seed).child("rank"),
             largest_failed_share=study.largest_failed_share,
+            by=self.by,
         )
         result = rank(asked, record)
         return Answer(kind=self.kind, header=prepared.header_after(record), result=result)

@@ -140,8 +140,7 @@ def _found(answer: Any, settings: tuple[str, ...]) -> dict[str, Any]:
     first = next(iter(answer.figures.values()), None)
     drawn = {"figure": chart(first)} if first else {}
     if answer.kind == "ranking":
-        frame = answer.to_frame()
-        return {**drawn, "shares": dict(zip(frame["source"], frame["contribution [%]"].astype(float), strict=True))}
+        return {**drawn, "shares": {name: 100 * share for name, share in answer.result.share_of_source.items()}}
     result = answer.result
     zones = {own.name: own.zone / MICROMETRE for own in result.drawn_sources if own.zone > 0}
     chosen = {name: float(answer.summary[name]) for name in settings if answer.summary.get(name) is not None}

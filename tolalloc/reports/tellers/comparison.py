@@ -37,7 +37,7 @@ class ComparisonTeller(Teller[Comparison]):
     @cached_property
     def sentences(self) -> tuple[str, ...]:
         """The comparison in a few sentences."""
-        moved = list(self._ranking.loc[self._ranking["90 % intervals"] == "apart", "source"])
+        moved = list(self._ranking.loc[self._ranking["90 % intervals"] == "apart", "dimension"])
         kept = (self._kept(label, run) for label, run in zip(self._names, self.result.runs, strict=True))
         return (*kept, _say("moved", sources=", ".join(moved)) if moved else _say("unmoved"))
 
@@ -145,15 +145,15 @@ class ComparisonTeller(Teller[Comparison]):
 
     @cached_property
     def _ranking(self) -> pd.DataFrame:
-        """Every source with its rank and total index in both, and whether their intervals lie apart."""
+        """Every dimension with its rank and total index in both, and whether their intervals lie apart."""
         columns = ["rank [-]", TOTAL, LOW, HIGH]
-        first, second = (run.ranking.set_index("source")[columns] for run in self.result.runs)
+        first, second = (run.ranking.set_index("dimension")[columns] for run in self.result.runs)
         joint = first.add_suffix(" A").join(second.add_suffix(" B"), how="outer")
         apart = (joint[f"{LOW} A"] > joint[f"{HIGH} B"]) | (joint[f"{LOW} B"] > joint[f"{HIGH} A"])
         missing = joint[f"{TOTAL} A"].isna() | joint[f"{TOTAL} B"].isna()
         return pd.DataFrame(
             {
-                "source": joint.index,
+                "dimension": joint.index,
                 "rank A [-]": joint["rank [-] A"].to_numpy(),
                 "rank B [-]": joint["rank [-] B"].to_numpy(),
                 "total index A [-]": joint[f"{TOTAL} A"].to_numpy(),
@@ -181,10 +181,10 @@ class ComparisonTeller(Teller[Comparison]):
     @property
     def _figure(self) -> Figure:
         """The total indices of both with their intervals."""
-        names = list(self._ranking["source"])
+        names = list(self._ranking["dimension"])
         series = []
         for label, run in zip(self._names, self.result.runs, strict=True):
-            own = run.ranking.set_index("source")[[TOTAL, LOW, HIGH]].astype(float).reindex(names).fillna(0.0)
+            own = run.ranking.set_index("dimension")[[TOTAL, LOW, HIGH]].astype(float).reindex(names).fillna(0.0)
             total, low, high = (list(own[column]) for column in (TOTAL, LOW, HIGH))
             series.append(Series.bars(label, names, total, low, high))
         return Figure(name="rankings", title=_say("figure"), x_label="total index ST [-]", series=tuple(series))

@@ -23,7 +23,7 @@ from tolalloc.reports.wording import QUICK_RUN, alike, enumerated, number, quant
 from tolalloc.sensitivity.ranking import Convergence, Neighbours
 from tolalloc.sensitivity.result import RankingResult
 from tolalloc.sensitivity.saltelli import FEWEST_SHOWING
-from tolalloc.sensitivity.sobol import SourceIndices
+from tolalloc.sensitivity.sobol import OTHERS, SobolAnalysis, SourceIndices
 from tolalloc.sensitivity.surrogate.validation import Choice
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class RankingTeller(Teller[RankingResult]):
     """What is said of a ranking."""
 
     shown: ClassVar[tuple[str, ...]] = (
-        *("source", "contribution [%]", "total index ST [-]", "ST low 5 % [-]", "ST high 95 % [-]"),
+        *("dimension", "source", "contribution [%]", "total index ST [-]", "ST low 5 % [-]", "ST high 95 % [-]"),
     )
 
     @property
@@ -74,10 +74,11 @@ class RankingTeller(Teller[RankingResult]):
         """Who drives the leading output, each order and the units out of the limits."""
         found = self.result
         return (
-            *_drivers(found.dimensions or found.indices),
-            *_unseen(found.dimensions or found.indices),
+            *_drivers(found.indices),
+            *self._others(),
+            *_unseen(found.sobol, found.leading),
             *self._per_micrometre(),
-            converged(found.sobol.convergence),
+            converged(found.sobol.convergence, quantity(found.sobol.followed[0])),
             *self._orders(),
             *self._uncertain(),
             self._rejects(),
@@ -92,7 +93,7 @@ class RankingTeller(Teller[RankingResult]):
     @property
     def headline(self) -> tuple[str, ...]:
         """The first drivers, in one sentence."""
-        return (_named_drivers(self.result.dimensions or self.result.indices, self._output),)
+        return (_named_drivers(self.result.indices, self._output),)
 
     @cached_property
     def _portrait(self) -> Portrait[Any]:
@@ -140,14 +141,24 @@ class RankingTeller(Teller[RankingResult]):
             return f"{number(read, digits)}{self._sign}"
         return _say("value_beyond" if read > 0 else "value_inside", value=number(abs(read), digits), sign=self._sign)
 
+    def _others(self) -> Iterator[str]:
+        """Yield what all those do together that further blocks did not tell apart."""
+        sobol = self.result.sobol
+        if sobol.together is None:
+            return
+        at = sobol.together.sources.index(OTHERS)
+        low, high = sobol.together.total_interval[:, at]
+        total, count = min(sobol.together.total[at], 1.0), len(sobol.small)
+        yield _say("others", count=count, by=self.result.by, total=total, low=100 * low, high=high)
+
     def _per_micrometre(self) -> Iterator[str]:
         """Yield the order per micrometre, and why it is not that of the ranking, if a zone weighs in it."""
-        indices, lines = self.result.dimensions or self.result.indices, tables.ranked_lines(self.result)
-        ranked = [indices.sources[at] for at in indices.order if indices.sources[at] in lines]
+        indices, changes = self.result.indices, tables.per_micrometre(self.result)
+        ranked = [indices.sources[at] for at in indices.order if indices.sources[at] in changes]
         if not ranked:
             return
-        first = sorted(tables.per_micrometre(self.result).items(), key=lambda own: -own[1])
-        zones = {name: members[0].said(members[0].zone) for name, members in lines.items()}
+        first = sorted(changes.items(), key=lambda own: -own[1])
+        zones = {name: own[0].said(own[0].zone) for name, own in self.result.members.items() if own}
         names = ", ".join(
             _say("per_micrometre_name", source=name, change=change, sign=self._sign) for name, change in first[:_NAMED]
         )
@@ -326,7 +337,7 @@ class RankingTeller(Teller[RankingResult]):
     def _driver_sections(self) -> Iterator[Section]:
         """Yield which error drives what: the leading output, all requirements, each order."""
         result = self.result
-        pairs = tables.pairs_table(result.indices)
+        pairs = tables.pairs_table(result.indices, result.by)
         yield Section(
             heading=_say("drivers_heading", output=self._output),
             paragraphs=(_say("drivers", carried=_carried(result.sobol.narrowed(0))),),
@@ -337,11 +348,11 @@ class RankingTeller(Teller[RankingResult]):
                 ("convergence", tables.convergence_table(result)),
             ),
         )
-        if result.dimensions is not None:
+        if any(len(own) > 1 for own in result.members.values()):
             yield Section(
                 heading=_say("dimensions_heading", output=self._output),
                 paragraphs=(_say("dimensions"),),
-                tables=(("dimensions", tables.dimensions_table(result, result.dimensions)),),
+                tables=(("dimensions", tables.dimensions_table(result)),),
                 unfolded=True,
                 first=True,
                 folded=True,
@@ -353,10 +364,10 @@ class RankingTeller(Teller[RankingResult]):
                 tables=(("Shapley effects", tables.shapley_table(result.shapley)),),
             )
         names = ", ".join(quantity(name) for name in result.sobol.ranked)
-        blocks, others = result.sobol.blocks, result.sobol.blocks_of_others
+        blocks, others = result.sobol.blocks, result.sobol.first_blocks
         yield Section(
             heading=_say("overall_heading"),
-            paragraphs=(_say("overall", outputs=names, blocks=blocks, others=others),),
+            paragraphs=(_say("overall", outputs=names, blocks=blocks, others=others, leading=self._output),),
             figures=(figures.requirements_figure(result),),
             tables=(("all requirements", tables.overall_table(result)),),
             folded=True,
@@ -370,9 +381,8 @@ class RankingTeller(Teller[RankingResult]):
                 tables=(("orders", tables.orders_table(result)),),
                 folded=True,
             )
-        total = result.indices.total
-        shares = dict(zip(result.indices.sources, (total / total.sum()).tolist(), strict=True))
-        yield from self._portrait.moving(result.errors, result.sample.unit_at(0.5)[0], shares, "median unit")
+        unit = result.sample.unit_at(0.5)[0]
+        yield from self._portrait.moving(result.errors, unit, result.share_of_source, "median unit")
 
     def _limit_sections(self) -> tuple[Section, ...]:
         """Return what the limits do: yield, units beyond them, and how far each zone may open."""
@@ -441,7 +451,7 @@ class RankingTeller(Teller[RankingResult]):
             "yield target [-]": result.target,
             "seed": header.seed,
             "quick": header.quick,
-            "ranking": tables.ranked(result.indices),
+            "ranking": tables.ranked(result.indices, result.by),
             "Sobol blocks [-]": sobol.blocks,
             "Sobol blocks dropped [-]": sobol.dropped,
             "samples of the Sobol analysis [-]": sobol.samples,
@@ -496,11 +506,13 @@ def _drivers(sobol: SourceIndices) -> Iterator[str]:
         )
 
 
-def _unseen(sobol: SourceIndices) -> Iterator[str]:
-    """Yield of which sources too few blocks show enough to say how much they do."""
-    names = [sobol.sources[at] for at in np.flatnonzero(sobol.unseen > _SLIGHT)]
-    if names:
-        yield _say("unseen", blocks=sobol.blocks, fewest=FEWEST_SHOWING, names=", ".join(names))
+def _unseen(sobol: SobolAnalysis, output: str) -> Iterator[str]:
+    """Yield of which errors too few blocks show enough to say how much they do."""
+    found = sobol.of(output)
+    for blocks, few in ((sobol.blocks, False), (sobol.first_blocks, True)):
+        names = [found.sources[at] for at in np.flatnonzero(found.unseen > _SLIGHT) if (int(at) in found.few) is few]
+        if names:
+            yield _say("unseen", blocks=blocks, fewest=FEWEST_SHOWING, names=", ".join(names))
 
 
 def _named_drivers(sobol: SourceIndices, output: str) -> str:
@@ -521,11 +533,12 @@ def _before(pair: Neighbours, sources: Sequence[str]) -> str:
     return _say(key, next=sources[pair.after], probability=pair.probability)
 
 
-def converged(found: Convergence) -> str:
+def converged(found: Convergence, output: str) -> str:
     """Return whether the order of the first places is stable."""
     last = found.history[-1]
     return _say(
         "convergence",
+        output=output,
         count=len(last.first),
         verdict=_say("converged" if found.stable else "not_converged"),
         share=last.probability,

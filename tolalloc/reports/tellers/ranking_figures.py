@@ -31,7 +31,7 @@ def _output(result: RankingResult) -> str:
 
 def ranking_figure(result: RankingResult) -> Figure:
     """Return total and first-order indices of the leading output with their intervals."""
-    indices = result.dimensions or result.indices
+    indices = result.indices
     rows, changes = indices.order[:_DRIVERS], tables.per_micrometre(result)
     names, largest = [indices.sources[at] for at in rows], max(changes.values(), default=0.0) or 1.0
     bars = (
@@ -58,7 +58,7 @@ def ranking_figure(result: RankingResult) -> Figure:
 
 
 def requirements_figure(result: RankingResult) -> HeatMap:
-    """Return the total index of every source for every requirement."""
+    """Return the total index of everything that is ranked for every requirement."""
     sobol = result.sobol
     outputs = [name for name in result.outputs if name not in sobol.constant]
     rows = sobol.overall.order[:_SHOWN]
@@ -73,7 +73,7 @@ def requirements_figure(result: RankingResult) -> HeatMap:
 
 
 def orders_figure(result: RankingResult) -> HeatMap:
-    """Return the share of every source in the wave of every order."""
+    """Return the share of everything that is ranked in the wave of every order."""
     found, sign = result.orders, sign_of(tables.wave_unit(result))
     assert found is not None
     first = np.nan_to_num(found.first)

@@ -45,8 +45,8 @@ def _told(index: Float[np.ndarray, "*source"]) -> Float[np.ndarray, "*source"]:
     return np.asarray(np.clip(index, 0.0, 1.0))
 
 
-def sobol_table(sobol: SourceIndices) -> pd.DataFrame:
-    """Return the sources, largest total Sobol index first, with intervals and the confidence of every place."""
+def sobol_table(sobol: SourceIndices, named: str = "source") -> pd.DataFrame:
+    """Return what is ranked, largest total Sobol index first, with intervals and the confidence of every place."""
     share = sobol.total / sobol.total.sum() * 100
     first, total, rank = sobol.first_interval, sobol.total_interval, sobol.rank_interval
     among, following = sobol.among_first(min(3, len(sobol.sources))), {pair.before: pair for pair in sobol.neighbours}
@@ -55,7 +55,7 @@ def sobol_table(sobol: SourceIndices) -> pd.DataFrame:
         "ranking",
         {
             "rank [-]": place,
-            "source": sobol.sources,
+            named: sobol.sources,
             "contribution [%]": share,
             "cumulative [%]": lambda at: share[sobol.order[: place[at]]].sum(),
             "total index ST [-]": _told(sobol.total),
@@ -84,21 +84,31 @@ def _blocks(pair: Neighbours | None) -> str:
 
 def ranking_table(result: RankingResult) -> pd.DataFrame:
     """Return the ranking of the leading output, with the zone and the order per micrometre beside it."""
-    frame = sobol_table(result.indices)
-    zone = zone_unit(result.errors.active)
-    local, unit = result.local, unit_of(result.leading)
-    place = {local.sources[at]: rank for rank, at in enumerate(largest_first(local.per_micrometre), start=1)}
-    columns = {
-        f"zone [{zone}]": {source.name: zone_in(source, zone) for source in result.errors.active},
-        f"Sens [{unit}/µm]": dict(zip(local.sources, local.slope, strict=True)),
-        f"rms change per µm [{unit}/µm]": dict(zip(local.sources, local.per_micrometre, strict=True)),
-        "rank per µm [-]": place,
-        f"rms change by its zone [{unit}]": dict(zip(local.sources, local.by_zone, strict=True)),
+    frame = sobol_table(result.indices, result.by)
+    zone, unit = zone_unit(result.errors.active), unit_of(result.leading)
+    zones = {
+        name: span(min(known), max(known))
+        for name, own in result.members.items()
+        if (known := [zone_in(source, zone) for source in own])
     }
+    columns = {f"zone [{zone}]": zones, **_derivatives(result, f"rms change per µm [{unit}/µm]")}
     frame = frame.assign(
-        **{header: [own.get(name, np.nan) for name in frame["source"]] for header, own in columns.items()}
+        **{header: [own.get(name, np.nan) for name in frame[result.by]] for header, own in columns.items()}
     )
-    return _with_own_words(frame, {own.name: (own,) for own in result.errors.active})
+    return _with_own_words(frame, result.members)
+
+
+def _derivatives(result: RankingResult, per_micrometre: str) -> dict[str, dict[str, Any]]:
+    """Return Sens and the order per micrometre of what is ranked, under their heads, where it has any."""
+    unit, lines = unit_of(result.leading), {name: _line(result, own) for name, own in result.members.items()}
+    known = {name: own for name, own in lines.items() if own}
+    names, changes = list(known), [own.per_micrometre for own in known.values()]
+    return {
+        f"Sens [{unit}/µm]": {name: span(*own.slope) for name, own in known.items()},
+        per_micrometre: dict(zip(names, changes, strict=True)),
+        "rank per µm [-]": {names[at]: rank for rank, at in enumerate(largest_first(changes), start=1)},
+        f"rms change by its zone [{unit}]": {name: own.by_zone for name, own in known.items()},
+    }
 
 
 def _with_own_words(frame: pd.DataFrame, members: Mapping[str, Sequence[Source]]) -> pd.DataFrame:
@@ -111,13 +121,13 @@ def _with_own_words(frame: pd.DataFrame, members: Mapping[str, Sequence[Source]]
     return frame
 
 
-def ranked(sobol: SourceIndices) -> list[dict[str, Any]]:
+def ranked(sobol: SourceIndices, named: str) -> list[dict[str, Any]]:
     """Return the ranking for a program."""
     interval, among = sobol.total_interval, sobol.among_first(min(3, len(sobol.sources)))
     return of_positions(
         "ranking",
         {
-            "source": sobol.sources,
+            named: sobol.sources,
             "total index [-]": _told(sobol.total),
             "interval 90 % [-]": lambda at: interval[:, at].tolist(),
             "first index [-]": _told(sobol.first),
@@ -127,17 +137,12 @@ def ranked(sobol: SourceIndices) -> list[dict[str, Any]]:
     ).records()
 
 
-def dimensions_table(result: RankingResult, found: SourceIndices) -> pd.DataFrame:
+def dimensions_table(result: RankingResult) -> pd.DataFrame:
     """Return the dimensions of the drawing, largest total-effect index first, with what stands on the drawing."""
-    by_group: dict[str, list[Source]] = {}
-    for source in result.errors.active:
-        by_group.setdefault(source.dimension, []).append(source)
+    found, unit = result.indices, unit_of(result.leading)
     low, high = found.total_interval * 100
-    members = [[own for name in joined.split(" + ") for own in by_group.get(name, ())] for joined in found.sources]
-    lines = [_line_derivatives(result, own) for own in members]
-    per_micrometre = np.array([own.per_micrometre if own else np.nan for own in lines])
-    place = {at: rank for rank, at in enumerate(largest_first(np.nan_to_num(per_micrometre)), start=1) if lines[at]}
-    unit = unit_of(result.leading)
+    members = [result.members[name] for name in found.sources]
+    derivatives = _derivatives(result, f"rms change per µm in every place [{unit}/µm]")
     frame = of_positions(
         "dimensions",
         {
@@ -148,35 +153,21 @@ def dimensions_table(result: RankingResult, found: SourceIndices) -> pd.DataFram
             "low 5 % [%]": low,
             "high 95 % [%]": high,
             "alone (first-order index) [%]": _told(found.first) * 100,
-            f"Sens [{unit}/µm]": lambda at: span(*own.slope) if (own := lines[at]) else np.nan,
-            f"rms change per µm in every place [{unit}/µm]": per_micrometre,
-            "rank per µm [-]": lambda at: place.get(at, np.nan),
-            f"rms change by its zone [{unit}]": [own.by_zone if own else np.nan for own in lines],
+            **{header: [own.get(name, np.nan) for name in found.sources] for header, own in derivatives.items()},
         },
         found.order,
     ).frame()
-    return _with_own_words(frame, by_group)
-
-
-def ranked_lines(result: RankingResult) -> dict[str, list[Source]]:
-    """Return what the first page ranks, with its sources: dimensions, or sources where no two share one."""
-    found, known = dict[str, list[Source]](), set(result.local.sources)
-    for source in result.errors.active:
-        if source.name in known:
-            found.setdefault(source.dimension if result.dimensions else source.name, []).append(source)
-    return found
+    return _with_own_words(frame, result.members)
 
 
 def per_micrometre(result: RankingResult) -> dict[str, float]:
     """Return what a micrometre in every place of each of them does, root mean square [unit of the output per µm]."""
-    return {
-        name: result.local.of_line([own.name for own in members]).per_micrometre
-        for name, members in ranked_lines(result).items()
-    }
+    lines = {name: _line(result, own) for name, own in result.members.items()}
+    return {name: own.per_micrometre for name, own in lines.items() if own}
 
 
-def _line_derivatives(result: RankingResult, members: Sequence[Source]) -> LineDerivatives | None:
-    """Return what a micrometre of a dimension does; none of what is no length, or where places depend on each other."""
+def _line(result: RankingResult, members: Sequence[Source]) -> LineDerivatives | None:
+    """Return what a micrometre in every place does; none of what is no length, or where places depend on each other."""
     names = {own.name for own in members}
     dependent = any(len(block) > 1 and names & {*block} for block in result.errors.blocks)
     if not names or dependent or not names <= {*result.local.sources}:
@@ -184,13 +175,13 @@ def _line_derivatives(result: RankingResult, members: Sequence[Source]) -> LineD
     return result.local.of_line([own.name for own in members])
 
 
-def pairs_table(sobol: SourceIndices) -> Table[int]:
-    """Return what pairs of sources add only together, the largest first; empty unless second order was asked for."""
+def pairs_table(sobol: SourceIndices, named: str) -> Table[int]:
+    """Return what pairs add only together, the largest first; empty unless second order was asked for."""
     low, high = sobol.second_interval
     return of_positions(
         "pairs",
         {
-            "source": [sobol.sources[one] for one, _ in sobol.pairs],
+            named: [sobol.sources[one] for one, _ in sobol.pairs],
             "with": [sobol.sources[other] for _, other in sobol.pairs],
             "second index S2 [-]": _told(sobol.second),
             "S2 low 5 % [-]": low,
@@ -201,7 +192,7 @@ def pairs_table(sobol: SourceIndices) -> Table[int]:
 
 
 def overall_table(result: RankingResult) -> pd.DataFrame:
-    """Return one ranking over all outputs with a limit: the largest total index of each source and where it has it."""
+    """Return one ranking over all outputs with a limit: the largest total index of each and where it has it."""
     overall, sobol = result.sobol.overall, result.sobol
     interval, rank = overall.total_interval, overall.rank_interval
     varying = [output for output in result.outputs if output not in sobol.constant]
@@ -209,7 +200,7 @@ def overall_table(result: RankingResult) -> pd.DataFrame:
         "all requirements",
         {
             "rank [-]": {at: number for number, at in enumerate(overall.order, start=1)},
-            "source": overall.sources,
+            result.by: overall.sources,
             "largest ST where limited [-]": overall.total,
             "low 5 % [-]": interval[0],
             "high 95 % [-]": interval[1],
@@ -241,7 +232,7 @@ def wave_unit(result: RankingResult) -> str:
 
 
 def orders_table(result: RankingResult) -> pd.DataFrame:
-    """Return what each source adds to the wave of each order, alone and with others."""
+    """Return what each error adds to the wave of each order, alone and with others."""
     found = result.orders
     assert found is not None
     first, total = found.first_interval, found.total_interval
@@ -249,7 +240,7 @@ def orders_table(result: RankingResult) -> pd.DataFrame:
     columns: dict[str, list[Any]] = {
         "order of the output turn [-]": [found.orders[at] for at, _ in rows],
         f"standard deviation of the wave [{wave_unit(result)}]": [found.deviation[at] for at, _ in rows],
-        "source": [found.sources[source] for _, source in rows],
+        result.by: [found.sources[source] for _, source in rows],
     }
     for name, short, shares, ends in (
         ("share alone [-]", "alone", found.first, first),
@@ -413,20 +404,19 @@ def _reading(factor: float) -> str:
 
 
 def measures_table(result: RankingResult) -> pd.DataFrame:
-    """Return every measure of every source side by side, in the order of the total index."""
-    sobol, local, unit = result.indices, result.local, unit_of(result.leading)
-    columns = {
-        "total index ST [-]": (sobol.sources, sobol.total),
-        f"Sens [{unit}/µm]": (local.sources, local.slope),
+    """Return every measure of every source side by side, in the order of the ranking."""
+    sobol, unit = result.indices, unit_of(result.leading)
+    ranked = [(at, own) for at in sobol.order for own in result.members[sobol.sources[at]]]
+    of_source = {
+        f"Sens [{unit}/µm]": (result.local.sources, result.local.slope),
         f"alone at its limit [{unit}]": (result.classical.sources, result.classical.alone),
     }
     if result.shapley:
-        columns["Shapley effect [-]"] = (result.shapley.sources, result.shapley.effects[0])
-    named = dict.fromkeys(sobol.sources[at] for at in sobol.order)
-    names = list(named | dict.fromkeys(name for sources, _ in columns.values() for name in sources))
-    by_name = {header: dict(zip(sources, values, strict=True)) for header, (sources, values) in columns.items()}
-    aligned = {header: [own.get(name, np.nan) for name in names] for header, own in by_name.items()}
-    return of_positions("measures", {"source": names, **aligned}).frame()
+        of_source["Shapley effect [-]"] = (result.shapley.sources, result.shapley.effects[0])
+    named = {header: dict(zip(names, values, strict=True)) for header, (names, values) in of_source.items()}
+    columns = {header: [own.get(source.name, np.nan) for _, source in ranked] for header, own in named.items()}
+    index = {f"total index ST of its {result.by} [-]": [sobol.total[at] for at, _ in ranked]}
+    return of_positions("measures", {"source": [own.name for _, own in ranked], **index, **columns}).frame()
 
 
 def quantile_name(score: Score) -> str:

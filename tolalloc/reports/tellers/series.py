@@ -81,7 +81,7 @@ def _row(member: Member, cost_unit: str) -> dict[str, object]:
             row[header.replace("{cost}", cost_unit)] = float(member.found.summary[name])
     if member.found.yields and member.found.joint is not None:
         row["yield of all limits [-]"] = member.found.joint
-    first = str(member.found.ranking["source"].iloc[0]) if len(member.found.ranking) else ""
+    first = str(member.found.ranking["dimension"].iloc[0]) if len(member.found.ranking) else ""
     return {**row, "largest driver": first, "folder": member.folder.name}
 
 
