@@ -163,7 +163,7 @@ def test_the_ranking_has_the_order_by_hand_and_the_zones_are_the_next_table(gues
     if (folder / "tables" / "allocation dimensions.csv").exists():
         ranked = pd.read_csv(folder / "tables" / "dimensions.csv")["dimension"].tolist()
     else:
-        ranked = [own["source"] for own in summary_of(folder)["ranking"]["ranking"]]
+        ranked = [own["dimension"] for own in summary_of(folder)["ranking"]["ranking"]]
     assert tuple(ranked[: len(guest.order)]) == guest.order
     drawn = {own["source"]: own for own in summary_of(folder)["allocation"]["drawing"]}
     again = Prepared(study=load_study(guest.script).changed(folder / "allocation.csv")).errors.sources

@@ -247,7 +247,7 @@ def test_manifest_and_summary_say_what_was_done(run_folder):
 def test_an_identified_stiffness_is_a_source_of_the_ranking_alone(run_folder):
     name = "stiffness (identified)"
     ranked = pd.read_csv(run_folder / "tables" / "ranking.csv")
-    row = ranked[ranked["source"] == name].iloc[0]
+    row = ranked[ranked["dimension"] == name].iloc[0]
     summary = summary_of(run_folder)
     found = summary["ranking"]["identified stiffness"]
     assert found["source"] == name
@@ -274,7 +274,7 @@ def test_allocation_has_the_layout_of_the_tolerance_table(run_folder):
 
 @pytest.mark.slow
 def test_every_header_states_a_unit_where_there_is_one(run_folder):
-    words = {"source", "S1 reading"}
+    words = {"dimension", "S1 reading"}
     frame = pd.read_csv(run_folder / "tables" / "ranking.csv")
     assert all("[" in header or header in words for header in frame.columns)
     assert all("[" in header for header in pd.read_csv(run_folder / "tables" / "front.csv").columns)

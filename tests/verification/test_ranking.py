@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -13,6 +13,7 @@ from tests.verification.test_saltelli import of_the_largest
 from tolalloc.capability.indices import Limits
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.drawings.seeds import SeedTree
+from tolalloc.exceptions import InputError
 from tolalloc.models.model import Evaluation, Model, Response
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
@@ -224,3 +225,49 @@ def test_a_quick_run_says_of_which_sources_too_few_blocks_show_what_they_do():
     assert found.first.min() < 0.0 <= min(table["S1 low 5 % [-]"].min(), table["first index S1 [-]"].min())
     exact = of_the_largest(np.arange(1.0, 13.0))[1]
     assert ((found.total_interval[0] <= exact) & (exact <= found.total_interval[1])).sum() >= 10
+
+
+def both_limits(first: float, second: float) -> ta.Study:
+    span = {"plus": 10.0, "minus": -10.0, "unit": "µm", "min": 1.0, "max": 90.0, "cost": 1.0}
+    return ta.Study(
+        ta.model(lambda a, b, c: (2 * a + b, b - 3 * c), inputs=("a", "b", "c"), outputs=("sum [mm]", "gap [mm]")),
+        ta.Drawing.of_rows([{"id": name, **span} for name in "abc"]),
+        limits={"sum [mm]": ta.Limit(upper=first), "gap [mm]": ta.Limit(upper=second)},
+        questions=[ta.Ranking()],
+        name="both",
+    )
+
+
+def test_the_limit_that_most_units_miss_leads_and_the_first_one_has_a_line():
+    """σ of the sum is 7.5 µm, of the gap 10.5 µm: at 20 and 10 µm 0.4 and 17 % miss, at 15 and 20 µm 2.3 and 2.9 %."""
+    answer = both_limits(0.02, 0.01).rank("quick")
+    found = answer.result
+    assert (found.leading, found.first_limited) == ("gap [mm]", "sum [mm]")
+    assert answer.sentences[0].startswith("Gap decides: 1")
+    assert found.indices.order[0] == found.indices.sources.index("c")
+    assert any(own.startswith("Drivers of sum") and "a 80 %" in own for own in answer.sentences)
+    values = found.sample.evaluation.values
+    np.testing.assert_allclose(values[:, 0], found.sample.x @ [0.0, 1e3, -3e3], atol=1e-12)
+    assert answer.summary["limit [mm]"] == 0.01
+    alike = both_limits(0.015, 0.02).rank("quick")
+    assert (alike.result.leading, alike.result.first_limited) == ("sum [mm]", "sum [mm]")
+    assert not any("decides" in own for own in alike.sentences)
+
+
+def test_single_sources_are_ranked_where_they_are_asked_for():
+    span = {"plus": 10.0, "minus": -10.0, "unit": "µm", "min": 1.0, "max": 90.0, "cost": 1.0}
+    rows = [{"id": name, "group": "pins" if name in "ab" else "", **span} for name in "abc"]
+    study = ta.Study(
+        ta.model(lambda a, b, c: 2 * a + b + c, inputs=("a", "b", "c"), outputs=("sum [mm]",)),
+        ta.Drawing.of_rows(rows),
+        limits={"sum [mm]": ta.Limit(upper=0.06)},
+        name="sum",
+    )
+    lines, alone = (replace(study, questions=[ta.Ranking(by=by)]).rank("quick") for by in ("dimension", "source"))
+    assert lines.to_frame()["dimension"].tolist() == ["pins", "c"]
+    np.testing.assert_allclose(lines.result.indices.total, [5 / 6, 1 / 6], atol=0.01)
+    assert alone.to_frame()["source"].tolist() == ["a", "b", "c"]
+    np.testing.assert_allclose(alone.result.indices.total, [4 / 6, 1 / 6, 1 / 6], atol=0.01)
+    assert [*lines.result.share_of_source] == ["a", "b", "c"]
+    with pytest.raises(InputError, match="by is 'line'; allowed is dimension or source"):
+        ta.Ranking(by="line")

@@ -36,6 +36,9 @@ from tolalloc.sensitivity.uncertain import UncertainEffect, uncertain_effect
 _MOST_COLUMNS = 100
 """Columns beyond which all products of two are more than the samples can tell apart [-]."""
 
+_DECIDES = 0.01
+"""Share of all units that more must lie beyond another limit than beyond the first one until that leads [-]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Measures:
@@ -43,7 +46,8 @@ class Measures:
 
     model: Model  # What answers, observed
     errors: ErrorModel  # Sources of the drawing
-    limits: Mapping[str, Limits]  # Output → limits; the first one leads: measures of one output are of this one
+    # Output → limits; measures of one output are of the first one, unless most units miss another
+    limits: Mapping[str, Limits]
     target: float  # Share of units that must keep the limits [-]
     effort: RankingEffort  # How much may be computed
     seeds: SeedTree  # Node of the seed tree
@@ -79,6 +83,26 @@ class Measures:
         """Return random units with all outputs."""
         units = self.experiment("units", self.model.reading(self.outputs))
         return monte_carlo(units, self.effort.units, self.effort.design)
+
+    def led_by(self, sample: MonteCarlo) -> tuple[Measures, MonteCarlo]:
+        """Return the same with the limit first that decides, and a sample with its output first.
+
+        The first limit, unless beyond another lie more than twice as many units, and more than a hundredth of them all:
+        two that are missed alike must not change places with the seed. A limit that the model has of its own never
+        leads.
+        """
+        values, own = sample.evaluation.values, self.model.own_limits
+        beyond = {
+            output: limits.outside(values[:, self.outputs.index(output)])
+            for output, limits in self.limits.items()
+            if output == self.leading or output not in own
+        }
+        worst, first = max(beyond, key=lambda output: beyond[output]), beyond[self.leading]
+        if beyond[worst] <= 2 * first or beyond[worst] - first <= _DECIDES * len(values):
+            return self, sample
+        led = replace(self, limits={worst: self.limits[worst], **self.limits})
+        order = [self.outputs.index(name) for name in led.outputs]
+        return led, replace(sample, evaluation=replace(sample.evaluation, values=values[:, order]))
 
     def cheap(self, sample: MonteCarlo) -> Regression | None:
         """Return what carries most of a Sobol analysis, learnt from random units; none where the model is as cheap."""
@@ -189,7 +213,7 @@ def rank(asked: Measures, record: RunRecord) -> RankingResult:
     spectra, own = model.spectra, measures.experiment
     with one_blas_thread():
         with record.stage("random units", effort.units):
-            sample = measures.sample()
+            measures, sample = measures.led_by(measures.sample())
         with record.stage("Sobol indices"):
             effect, cheap = measures.uncertain(sample), measures.cheap(sample)
             sobol = measures.sobol(tuple(name for names in spectra.values() for name in names), cheap)
@@ -209,7 +233,8 @@ def rank(asked: Measures, record: RunRecord) -> RankingResult:
     return RankingResult(
         model=model,
         errors=asked.errors,
-        limits=asked.limits,
+        limits=measures.limits,
+        first_limited=asked.leading,
         target=asked.target,
         outputs=measures.outputs,
         sample=sample,

@@ -50,6 +50,7 @@ class RankingResult:
     model: Model  # What answered
     errors: ErrorModel  # Sources, their distributions and correlations
     limits: Mapping[str, Limits]  # Output → limits; the first one leads
+    first_limited: str  # Output that the study limits first
     target: float  # Share of units that must keep a limit [-]
     outputs: tuple[str, ...]  # Names of all outputs, in the order of the sample's columns, the leading one first
     # Random units with all these outputs, and how they are spread

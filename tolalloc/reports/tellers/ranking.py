@@ -74,8 +74,10 @@ class RankingTeller(Teller[RankingResult]):
         """Who drives the leading output, each order and the units out of the limits."""
         found = self.result
         return (
+            *self._led(),
             *_drivers(found.indices),
             *self._others(),
+            *self._of_other_limits(),
             *_unseen(found.sobol, found.leading),
             *self._per_micrometre(),
             converged(found.sobol.convergence, quantity(found.sobol.followed[0])),
@@ -93,7 +95,7 @@ class RankingTeller(Teller[RankingResult]):
     @property
     def headline(self) -> tuple[str, ...]:
         """The first drivers, in one sentence."""
-        return (_named_drivers(self.result.indices, self._output),)
+        return (*self._led(), _named_drivers(self.result.indices, self._output))
 
     @cached_property
     def _portrait(self) -> Portrait[Any]:
@@ -140,6 +142,21 @@ class RankingTeller(Teller[RankingResult]):
         if self.result.limits[self.result.leading].width is None:
             return f"{number(read, digits)}{self._sign}"
         return _say("value_beyond" if read > 0 else "value_inside", value=number(abs(read), digits), sign=self._sign)
+
+    def _led(self) -> Iterator[str]:
+        """Yield why another limit leads than the first one, if one does."""
+        first, leading = self.result.first_limited, self.result.leading
+        if first != leading:
+            miss, miss_first = (1 - self.result.yields[name].estimate for name in (leading, first))
+            gaps = {"simulated": self._portrait.simulated, "first": self._portrait.display_name(first)}
+            yield _say("led", output=self._output.capitalize(), miss=miss, miss_first=miss_first, **gaps)
+
+    def _of_other_limits(self) -> Iterator[str]:
+        """Yield what drives every other output that a study limits, in a line each."""
+        sobol, own = self.result.sobol, self.result.model.own_limits
+        for output in list(self.result.limits)[1:]:
+            if output not in sobol.constant and output not in own:
+                yield _named_drivers(sobol.of(output), self._portrait.display_name(output))
 
     def _others(self) -> Iterator[str]:
         """Yield what all those do together that further blocks did not tell apart."""
@@ -223,7 +240,7 @@ class RankingTeller(Teller[RankingResult]):
         found, at = self.result.reject, int(np.argmax(self.result.reject.excess))
         low, high = found.lift_interval[:, at]
         return _say(
-            "rejects",
+            "rejects" if low > 1.0 else "rejects_alike",
             where=self._the_limits if found.is_limit else _say("worst_share", value=self._turned(found.threshold)),
             outside=found.outside,
             units=found.units,
