@@ -271,3 +271,16 @@ def test_single_sources_are_ranked_where_they_are_asked_for():
     assert [*lines.result.share_of_source] == ["a", "b", "c"]
     with pytest.raises(InputError, match="by is 'line'; allowed is dimension or source"):
         ta.Ranking(by="line")
+
+
+def test_a_quick_run_counts_the_units_beyond_a_limit_and_says_that_rarer_ones_need_more():
+    study = both_limits(0.03, 0.06)
+    quick = study.rank("quick")
+    assert [own.method for own in quick.result.beyond.estimates] == ["Monte Carlo"]
+    assert any("rarer ones are a full run's question" in own for own in quick.sentences)
+    asked = study.rank(ta.Effort(ranking=replace(QUICK_RANKING, rare=True)))
+    assert len(asked.result.beyond.estimates) > 1
+    # σ is 7.5 µm: 30 µm are 4.02 σ away.
+    assert asked.result.beyond.estimate.probability == pytest.approx(2.9e-5, rel=0.5)
+    found = quick.result.beyond.interval
+    assert found.low <= 1 - 2.9e-5 <= found.high

@@ -257,7 +257,13 @@ class YieldAtLimit:
 
 
 def yield_at_limit(
-    limit_state: ResponseLimit, sample: MonteCarlo, *, samples: int = 4000, runs: int = 5, scaled: int = 2000
+    limit_state: ResponseLimit,
+    sample: MonteCarlo,
+    *,
+    samples: int = 4000,
+    runs: int = 5,
+    scaled: int = 2000,
+    rare: bool = True,
 ) -> YieldAtLimit:
     """Return the yield at a limit.
 
@@ -270,6 +276,8 @@ def yield_at_limit(
         Samples of each level of subset simulation and of each width of scaled-sigma sampling, multiples of 10 [-].
     runs
         Independent runs of either, two or more [-].
+    rare
+        Whether they are asked at all; else the random units say what they can.
 
     Notes
     -----
@@ -303,7 +311,13 @@ def yield_at_limit(
     within = sample.within(limit)
     plain = _random_units(sample, within)
     effort = {"samples": samples, "runs": runs, "scaled": scaled}
-    found = agreement(limit_state, plain, experiment.seeds, largest_failed_share=allowed, **effort)
+    if rare or plain.effective_samples >= FEWEST_BEYOND:
+        found = agreement(limit_state, plain, experiment.seeds, largest_failed_share=allowed, **effort)
+    else:
+        verdict = (
+            f"{within.rejected:,} of {within.units:,} random units lie there; rarer ones are a full run's question."
+        )
+        found = Agreement(estimate=plain, estimates=(plain,), verdict=verdict)
     counted = ShareInterval(estimate=within.estimate, low=within.low, high=within.high, confidence=CONFIDENCE)
     interval = counted if found.estimate.method == _RANDOM_UNITS else log_normal_interval(found.estimate, runs)
     return YieldAtLimit(

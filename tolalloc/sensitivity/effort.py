@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 from tolalloc.capability.experiment import FEWEST_RUNS
 from tolalloc.drawings.seeds import SamplingDesign
 from tolalloc.models.model import ARRAY_RATE
-from tolalloc.reading.named_fields import NamedFields, Rule, a, number, whole
+from tolalloc.reading.named_fields import NamedFields, Rule, a, flag, number, whole
 from tolalloc.sensitivity.surrogate import validation
 
 WORST_SHARE = 0.05
@@ -126,6 +126,8 @@ class RankingEffort(NamedFields):
         Units behind every trial zone; the yield target may ask for more [-].
     surrogate_units
         Units behind the surrogates [-].
+    rare
+        Whether methods for rare failures are asked where few random units lie beyond a limit.
     level_units
         Units of a level of the subset simulation, for limits that are rarely exceeded [-].
     level_runs
@@ -150,6 +152,7 @@ class RankingEffort(NamedFields):
     derivative_units: Annotated[int, _least(10)] = 1024
     inverse_units: Annotated[int, _least(1)] = 2048
     surrogate_units: Annotated[int, _least(validation.FEWEST_OF_FOLD * validation.FOLDS)] = 2048
+    rare: Annotated[bool, flag()] = True
     level_units: Annotated[int, _least(100), _IN_CHAINS] = 4000
     level_runs: Annotated[int, _least(FEWEST_RUNS)] = 5
     widened_units: Annotated[int, _least(100), _IN_CHAINS] = 2000
@@ -244,6 +247,7 @@ QUICK_RANKING = RankingEffort(
     derivative_units=128,
     inverse_units=400,
     surrogate_units=512,
+    rare=False,
     level_units=200,
     level_runs=3,
     widened_units=100,

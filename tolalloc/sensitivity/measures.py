@@ -172,6 +172,7 @@ class Measures:
             samples=self.effort.level_units,
             runs=self.effort.level_runs,
             scaled=self.effort.widened_units,
+            rare=self.effort.rare,
         )
 
     def inverse(self, choice: Choice) -> InverseSensitivity:
