@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,6 +11,7 @@ import pytest
 import tolalloc as ta
 from tests.builders import ZONE_OF_A_LENGTH, page_of, study_of_lengths
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_text
+from tolalloc.reports.columns import own_words
 
 ROWS = (
     {"id": "a", "label": "Hülse Ø55", "drawing": "4711-B", "group": "sleeves", **ZONE_OF_A_LENGTH},
@@ -63,3 +66,19 @@ def test_a_number_of_a_drawing_stays_a_text(tmp_path):
 def test_a_table_without_them_has_no_empty_columns():
     bare = [{name: value for name, value in row.items() if name not in ("label", "drawing")} for row in ROWS]
     assert not {"label", "drawing"} & {*study(bare).rank(effort="quick").to_frame().columns}
+
+
+def test_copies_of_one_line_have_the_first_and_the_last_own_id_or_none_that_its_name_says():
+    sources = ta.Drawing.of_rows([{"id": name, **ZONE_OF_A_LENGTH} for name in "abcd"]).sources
+
+    def of(ids: str, name: str) -> str:
+        known = [replace(own, own_id=said) for own, said in zip(sources, ids.split("|"), strict=False)]
+        return own_words(lambda _: known, lambda _: name)[0].value(0)
+
+    assert of("Exzenter 1/1|Exzenter 1/2|Exzenter 2/1|Exzenter 2/2", "Exzenter") == ""
+    assert of("Bolzen", "Bolzen") == ""
+    assert of("B-17", "Bolzen") == "B-17"
+    assert of("B-17|C-3|D-4", "Bolzen") == "B-17 … D-4"
+    assert of("B-17|C-3", "Bolzen") == "B-17, C-3"
+    assert of("|B-17", "Bolzen") == "B-17"
+    assert of("", "Bolzen") == ""

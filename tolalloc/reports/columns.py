@@ -109,6 +109,12 @@ def _framed(told: Sequence[tuple[Column[Row], list[Any]]], cost_unit: str) -> pd
     return pd.DataFrame({own.titled(cost_unit): cells for own, cells in told})
 
 
+_NUMBERS = " 0123456789/-_.#"
+"""What a name ends in that numbers the copies of a part."""
+_COPIES = 3
+"""Own ids of one row from which the first and the last alone are told [-]."""
+
+
 def plain(value: Any) -> Any:
     """Return a value as JSON knows it: numbers of Python, null for NaN and infinity.
 
@@ -128,11 +134,31 @@ def span(low: float, high: float) -> float | str:
     return low if high - low <= _SAME * max(abs(low), abs(high)) else f"{low:.4g}…{high:.4g}"
 
 
-def own_words(members: Callable[[Row], Sequence[Source]]) -> tuple[Column[Row], ...]:
-    """Return the columns of own id, drawing and label of a row's sources, which stand where a drawing states any."""
+def own_words(
+    members: Callable[[Row], Sequence[Source]], named: Callable[[Row], str] = lambda _: ""
+) -> tuple[Column[Row], ...]:
+    """Return the columns of own id, drawing and label of a row's sources, which stand where a drawing states any.
+
+    Own ids of several copies stand as the first and the last; those that say what the row is called, but for the
+    numbers of its copies, say nothing.
+    """
 
     def said(field: str) -> Callable[[Row], str]:
-        return lambda row: ", ".join(dict.fromkeys(filter(None, (getattr(own, field) for own in members(row)))))
+        return lambda row: ", ".join(_each(members(row), field))
 
-    headers = {"own_id": "own id", "drawing": "drawing", "label": "label"}
-    return tuple(Column(header, said(field), nothing="") for field, header in headers.items())
+    def own_id(row: Row) -> str:
+        found = _each(members(row), "own_id")
+        if {own.rstrip(_NUMBERS) for own in found} == {named(row).rstrip(_NUMBERS)}:
+            return ""
+        return ", ".join(found) if len(found) < _COPIES else f"{found[0]} … {found[-1]}"
+
+    return (
+        Column("own id", own_id, nothing=""),
+        Column("drawing", said("drawing"), nothing=""),
+        Column("label", said("label"), nothing=""),
+    )
+
+
+def _each(members: Sequence[Source], field: str) -> list[str]:
+    """Return what the members state in a field of theirs, what is alike once."""
+    return list(dict.fromkeys(filter(None, (getattr(own, field) for own in members))))

@@ -104,16 +104,21 @@ def dimensions_table(result: AllocationResult) -> Table[_Dimension]:
     """Return the drawing line by line: a dimension, or members of one that share a value where it has several."""
     parts, zone = _parts(result), zone_unit(result.space.errors.sources)
     (before, after), portrait = _processes(result), portrait_of(result.model)
+
+    def process_before(row: _Dimension) -> str:
+        name = row[1][0][0].name
+        return before[name] if before[name] != after[name] else ""
+
     columns: list[Column[_Dimension]] = [
         Column("dimension", lambda row: row[0], terminal=1),
-        *own_words(_after),
+        *own_words(_after, lambda row: row[0]),
         Column("places [-]", lambda row: len(row[1])),
         Column(f"write [{writing_unit(result.drawn_sources)}]", lambda row: portrait.frames(_after(row)), terminal=2),
         Column(f"zone before [{zone}]", lambda row: _zones((old for old, _ in row[1]), zone)),
         Column(f"zone [{zone}]", lambda row: _zones((new for _, new in row[1]), zone)),
         Column("change [%]", lambda row: _change(row[1][0])),
         Column("grade", lambda row: row[1][0][1].grade, nothing="", terminal=5),
-        Column("process before", lambda row: before[row[1][0][0].name], nothing="as today"),
+        Column("process before", process_before, nothing=""),
         Column("process", lambda row: after[row[1][0][0].name], nothing="as today", terminal=6),
         Column("index as drawn [%]", lambda row: parts.get(row[1][0][0].dimension, np.nan), terminal=3),
         Column("cost before [{cost}]", lambda row: np.sum([old.cost for old, _ in row[1]])),

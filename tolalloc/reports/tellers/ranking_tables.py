@@ -114,7 +114,7 @@ def _derivatives(result: RankingResult, per_micrometre: str) -> dict[str, dict[s
 def _with_own_words(frame: pd.DataFrame, members: Mapping[str, Sequence[Source]]) -> pd.DataFrame:
     """Return a table with own id, drawing and label of its rows behind their names, where the drawing states any."""
     named = next(own for own in ("source", "dimension") if own in frame)
-    words: tuple[Column[str], ...] = own_words(lambda name: members.get(name, ()))
+    words: tuple[Column[str], ...] = own_words(lambda name: members.get(name, ()), lambda name: name)
     for own in reversed(words):
         if any(said := [own.value(name) for name in frame[named]]):
             frame.insert(list(frame.columns).index(named) + 1, own.header, said)
