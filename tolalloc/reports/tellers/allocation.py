@@ -229,6 +229,7 @@ class AllocationTeller(Teller[AllocationResult]):
         result, header = self.result, self.header
         chosen, free, robustness = result.chosen, result.free, result.robustness
         portrait, examined = portrait_of(result.model), texts.examined(result)
+        limits = result.requirements[0].limits
         limit = "limit [arcsec]" if unit_of(result.leading) == "arcsec" else f"limit of {result.leading}"
         answered = {
             "study": header.name,
@@ -236,6 +237,7 @@ class AllocationTeller(Teller[AllocationResult]):
             portrait.kind: header.model,
             **header.conditions,
             limit: free.limit,
+            **({f"lower {limit}": limits.lower} if None not in (limits.lower, limits.upper) else {}),
             "yield target [-]": getattr(result.requirements[0].guarantee, "target", None),
             "seed": header.seed,
             "quick": header.quick,
