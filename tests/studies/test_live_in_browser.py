@@ -286,7 +286,7 @@ def test_the_keyboard_reaches_everything_and_everything_has_a_name(driver, study
         reached.setdefault(own.id, own.get_attribute("id") or own.accessible_name)
     assert wanted.keys() <= reached.keys()
     # as the eye goes: the head, the zones on the left, the unit on the right, the pinned designs below both
-    places = [list(reached.values()).index(name) for name in ("save", "search", "ask-ranking", "unit", "take design 1")]
+    places = [list(reached.values()).index(name) for name in ("save", "ask-ranking", "search", "unit", "take design 1")]
     assert places == sorted(places)
     cost = by_id(driver, "cost").text
     driver.find_element("css selector", "#zones input[type=range]").send_keys(Keys.ARROW_LEFT * 20)
@@ -413,3 +413,30 @@ def test_two_tabs_have_a_design_each(driver, study):
         driver.close()
         driver.switch_to.window(first)
     assert not errors(driver)
+
+
+@pytest.mark.parametrize(("wide", "high"), [(700, 500), (360, 800)])
+def test_on_a_low_or_narrow_screen_cost_and_yield_stay_in_a_line_and_no_focus_hides_behind_it(
+    driver, study, wide, high
+):
+    from selenium.webdriver import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    shown(driver, study)
+    size = {"width": wide, "height": high, "deviceScaleFactor": 1, "mobile": False}
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    try:
+        driver.execute_script("scrollTo(0, document.body.scrollHeight)")
+        bar = by_id(driver, "bar")
+        until(bar.is_displayed)
+        assert bar.size["height"] < 0.1 * high
+        until(lambda: bar.text.split("\n")[0] == f"cost {by_id(driver, 'cost').get_attribute('textContent')}")
+        for _ in range(12):
+            ActionChains(driver).key_down(Keys.SHIFT).send_keys(Keys.TAB).key_up(Keys.SHIFT).perform()
+            top, bottom = driver.execute_script(
+                "const bar = document.getElementById('bar'), own = document.activeElement.getBoundingClientRect();"
+                "return [own.top, bar.hidden ? 0 : bar.getBoundingClientRect().bottom]"
+            )
+            assert top >= bottom - 1
+    finally:
+        width(driver, 1400)

@@ -27,6 +27,11 @@ class Header:
     title_block: Mapping[str, str] = field(default_factory=dict)
 
     @property
+    def asked(self) -> str:
+        """Which model, in which study, once where both are called alike."""
+        return self.model if self.model == self.name else f"{self.model}: {self.name}"
+
+    @property
     def cost_unit(self) -> str:
         """What costs are counted in, for people; programs read ``cost units`` whatever it is."""
         return self.currency or COST_UNITS

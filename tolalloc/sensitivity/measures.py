@@ -16,6 +16,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.models.model import KeepsTables, Model, Response, ResponseWithDerivatives, derived
 from tolalloc.running.chunks import one_blas_thread
 from tolalloc.running.progress import RunRecord
+from tolalloc.sensitivity.centring import centring
 from tolalloc.sensitivity.derivatives import classical_estimate, local_derivatives
 from tolalloc.sensitivity.effort import RankingEffort
 from tolalloc.sensitivity.inverse import InverseSensitivity, fewest_units, inverse_sensitivity
@@ -222,6 +223,8 @@ def rank(asked: Measures, record: RunRecord) -> RankingResult:
             derived = measures.derived(sample)
             shapley = measures.shapley()
             local = local_derivatives(own("local", derived), effort.derivative_units)
+            leading = own("centring", measures.response)
+            centre = centring(leading, sample, measures.limits[measures.leading], local)
             classical = classical_estimate(own("classical", measures.response))
         with record.stage("units out of the limit"):
             reject, beyond = measures.reject(sample), measures.beyond(sample)
@@ -247,6 +250,7 @@ def rank(asked: Measures, record: RunRecord) -> RankingResult:
         shapley=shapley,
         classical=classical,
         local=local,
+        centring=centre,
         reject=reject,
         inverse=inverse,
         beyond=beyond,

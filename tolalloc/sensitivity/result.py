@@ -15,6 +15,7 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SamplingDesign
 from tolalloc.drawings.sources import Source
 from tolalloc.models.model import Model
+from tolalloc.sensitivity.centring import Centring
 from tolalloc.sensitivity.derivatives import ClassicalEstimate, LocalDerivatives
 from tolalloc.sensitivity.inverse import InverseSensitivity
 from tolalloc.sensitivity.shapley import ShapleyEffects
@@ -64,6 +65,7 @@ class RankingResult:
     shapley: ShapleyEffects | None  # Effects of correlated sources; none where all are independent
     classical: ClassicalEstimate  # What a hand calculation says
     local: LocalDerivatives  # Derivatives by each source
+    centring: Centring | None  # Nominal that would put the leading output into the middle of its limits
     reject: TargetSensitivity  # What drives the units out of the limits
     inverse: InverseSensitivity  # How far each zone may open alone
     beyond: YieldAtLimit  # Probability of a leading output beyond its limits

@@ -313,7 +313,7 @@ def _document(prepared: Prepared, answers: dict[str, Answer[Any]]) -> Document:
         return replace(
             first.document, manifest=known, title_block=study.title_block
         )  # a calculation has a summary of its own, not one beside others
-    title = first.title if len(answers) == 1 else f"{first.header.model}: {study.name}"
+    title = first.title if len(answers) == 1 else first.header.asked
     parts = [(kind, answer.document) for kind, answer in answers.items()]
     whole = joined(title, first.subtitle, parts, **known, seed=study.seed)
     return replace(whole, title_block=study.title_block)

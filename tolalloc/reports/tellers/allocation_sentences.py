@@ -73,7 +73,7 @@ def title(result: AllocationResult, header: Header) -> str:
         key = "title_missed"
     elif examined(result).fault:
         key = "title_fault"
-    return _say(key, model=header.model, name=header.name)
+    return _say(key, asked=header.asked)
 
 
 def verdict(result: AllocationResult) -> tuple[str, ...]:
@@ -279,9 +279,12 @@ def capability_change(result: AllocationResult) -> tuple[str, ...]:
             f"mean{after}": with_unit(f"{found.mean:.3g}", leading),
             f"sigma{after}": with_unit(f"{found.deviation_overall:.3g}", leading),
             f"ppk{after}": found.ppk,
+            f"pp{after}": found.pp,
             f"beyond{after}": 1 - design.achieved.estimate,
         }
-    return (_say("capability", **gaps),)
+    before, after = gaps.pop("pp_before"), gaps.pop("pp")
+    centred = "" if None in (before, after) else _say("pp", before=before, after=after)  # one limit has no middle
+    return (_say("capability", **gaps, pp=f"{centred} " if centred else ""),)
 
 
 def _solved(design: VerifiedDesign) -> tuple[str, ...]:

@@ -54,7 +54,7 @@ class DifferenceTeller(Teller[DifferenceResult]):
     @property
     def title(self) -> str:
         """What the answer is about."""
-        return _say("title", model=self.header.model, name=self.header.name)
+        return _say("title", asked=self.header.asked)
 
     @cached_property
     def sentences(self) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ from tolalloc.reports.tellers import ranking_figures as figures
 from tolalloc.reports.tellers import ranking_tables as tables
 from tolalloc.reports.tellers.check import few_parts, interval_gaps
 from tolalloc.reports.templates import Sentences
-from tolalloc.reports.wording import QUICK_RUN, alike, enumerated, number, quantity, sign_of
+from tolalloc.reports.wording import QUICK_RUN, alike, enumerated, number, quantity, sign_of, with_unit
 from tolalloc.sensitivity.ranking import Convergence, Neighbours
 from tolalloc.sensitivity.result import RankingResult
 from tolalloc.sensitivity.saltelli import FEWEST_SHOWING
@@ -60,7 +60,7 @@ class RankingTeller(Teller[RankingResult]):
     @property
     def title(self) -> str:
         """Which model, in which study."""
-        return _say("title", model=self.header.model, study=self.header.name)
+        return _say("title", asked=self.header.asked)
 
     @property
     def subtitle(self) -> str:
@@ -75,6 +75,7 @@ class RankingTeller(Teller[RankingResult]):
         found = self.result
         return (
             *self._led(),
+            *self._centre(),
             *_drivers(found.indices),
             *self._others(),
             *self._of_other_limits(),
@@ -95,7 +96,7 @@ class RankingTeller(Teller[RankingResult]):
     @property
     def headline(self) -> tuple[str, ...]:
         """The first drivers, in one sentence."""
-        return (*self._led(), _named_drivers(self.result.indices, self._output))
+        return (*self._led(), *self._centre(), _named_drivers(self.result.indices, self._output))
 
     @cached_property
     def _portrait(self) -> Portrait[Any]:
@@ -150,6 +151,27 @@ class RankingTeller(Teller[RankingResult]):
             miss, miss_first = (1 - self.result.yields[name].estimate for name in (leading, first))
             gaps = {"simulated": self._portrait.simulated, "first": self._portrait.display_name(first)}
             yield _say("led", output=self._output.capitalize(), miss=miss, miss_first=miss_first, **gaps)
+
+    def _centre(self) -> Iterator[str]:
+        """Yield what moving one nominal brings; nothing where the mean is in the middle."""
+        found = self.result.centring
+        if found is None:
+            return
+        moved = next(own for own in self.result.errors.active if own.name == found.source)
+        capability = next(own.capability for own in self.result.capabilities if own.output == self.result.leading)
+        yield _say(
+            "centre",
+            output=self._output,
+            off=f"{number(abs(found.off), '.3g')}{self._sign}",
+            side=_say("above" if found.off > 0 else "below"),
+            pp=capability.pp if capability else np.nan,
+            ppk=capability.ppk if capability else np.nan,
+            source=found.source,
+            shift=with_unit(f"{found.shift / moved.unit_length:+.2g}", f"[{moved.unit}]"),
+            now=found.now,
+            moved=found.moved,
+            simulated=self._portrait.simulated,
+        )
 
     def _of_other_limits(self) -> Iterator[str]:
         """Yield what drives every other output that a study limits, in a line each."""

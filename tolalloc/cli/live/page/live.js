@@ -388,6 +388,11 @@ async function begin() {
   const place = () => (narrow.matches ? at("zones-panel").before(at("pictures")) : at("zones-panel").after(at("pictures"))); // tabs go as the eye does
   narrow.addEventListener("change", place);
   place();
+  // Cost and yield, where the answer itself has scrolled away.
+  const mirror = () => at("bar").replaceChildren(...["cost", "yield"].map((name) => Object.assign(document.createElement("span"), { className: at(name).className, textContent: `${name} ${at(name).textContent}` })));
+  new MutationObserver(mirror).observe(at("numbers"), { subtree: true, childList: true, characterData: true });
+  new IntersectionObserver(([seen]) => (at("bar").hidden = seen.isIntersecting)).observe(at("answer"));
+  mirror();
   addEventListener("beforeunload", (event) => unsaved() && event.preventDefault());
   at("moving").addEventListener("toggle", () => judged && picture.follow());
   at("effect-close").addEventListener("click", () => {
