@@ -118,6 +118,10 @@ class RankingTeller(Teller[RankingResult]):
         """What follows a number of the leading output."""
         return sign_of(self._unit)
 
+    def _written(self, name: str) -> str:
+        """Return what a user's table calls a source, or its name."""
+        return next((own.own_id for own in self.result.errors.active if own.name == name and own.own_id), name)
+
     @property
     def _limits(self) -> str:
         """What a sentence calls the limits of the leading output."""
@@ -166,7 +170,7 @@ class RankingTeller(Teller[RankingResult]):
             side=_say("above" if found.off > 0 else "below"),
             pp=capability.pp if capability else np.nan,
             ppk=capability.ppk if capability else np.nan,
-            source=found.source,
+            source=self._written(found.source),
             shift=with_unit(f"{found.shift / moved.unit_length:+.2g}", f"[{moved.unit}]"),
             now=found.now,
             moved=found.moved,
@@ -267,7 +271,7 @@ class RankingTeller(Teller[RankingResult]):
             outside=found.outside,
             units=found.units,
             simulated=self._portrait.simulated,
-            source=found.sources[at],
+            source=self._written(found.sources[at]),
             lift=found.lift[at],
             low=low,
             high=high,
@@ -310,7 +314,7 @@ class RankingTeller(Teller[RankingResult]):
         if finite.size:
             at = finite[np.argmin(found.factor[finite])] if found.meets else finite[np.argmax(found.factor[finite])]
             key = "opening_least" if found.meets else "opening_easiest"
-            opening = _say(key, source=found.sources[at], factor=found.factor[at])
+            opening = _say(key, source=self._written(found.sources[at]), factor=found.factor[at])
         else:
             missing = "opening_any" if found.meets else "opening_none"
             opening = _say(missing if found.decided else "opening_undecided", units=found.units)
