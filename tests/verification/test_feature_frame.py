@@ -24,7 +24,7 @@ from tolalloc.reports.feature_frame import SYMBOLS, FeatureFrame, callout, callo
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.writer import html_table, write_csv
 from tolalloc.sensitivity.effort import QUICK_RANKING, SobolEffort
-from tolalloc.sensitivity.sobol import regrouped, sobol_indices
+from tolalloc.sensitivity.sobol import sobol_indices
 
 UM = 1e-6
 
@@ -58,26 +58,6 @@ def test_a_group_is_ranked_together():
     # Each twin alone does nothing and has a part in all of it: their indices do not add up to that of the group.
     np.testing.assert_allclose(alone.total, [0.5, 0.5, 0.5], atol=0.04)
     np.testing.assert_allclose(alone.first[:2], 0.0, atol=0.06)
-
-
-def test_other_groups_of_solved_blocks_have_the_same_indices_and_only_new_samples_are_solved():
-    errors, asked = ErrorModel(TWINS), []
-
-    class Counted(Product):
-        def __call__(self, x: np.ndarray) -> Evaluation:
-            asked.append(len(x))
-            return super().__call__(x)
-
-    experiment, effort = Experiment.of(Counted(), errors, SeedTree(1), 0.0), SobolEffort(start=256, limit=256)
-    alone, solved = sobol_indices(experiment, effort), sum(asked)
-    found = regrouped(experiment, alone, errors.dimension_of_column)
-    assert sum(asked) - solved == 256  # both twins exchanged; b is a source of its own
-    whole = sobol_indices(experiment, effort, factor_groups=errors.dimension_of_column).of(0)
-    for name in ("total", "first", "total_resamples", "first_resamples"):
-        np.testing.assert_array_equal(getattr(found, name), getattr(whole, name))
-    assert (found.sources, found.blocks, found.samples) == (whole.sources, whole.blocks, whole.samples)
-    same = regrouped(experiment, alone, errors.source_of_column)
-    np.testing.assert_array_equal(same.total, alone.of(0).total)
 
 
 def test_correlated_members_of_two_groups_are_one_dimension():

@@ -64,7 +64,7 @@ def as_it_stands(study):
         inside=None,
         locked_cost=study.space.locked_cost,
     )
-    names = [own.name for own in study.errors.active]
+    names = list({own.dimension: 1 for own in study.errors.active})
     nothing = dict.fromkeys(("trade", "fronts", "robustness", "prices", "loss", "fixed", "graded"))
     return AllocationResult(
         name="shop",
@@ -73,7 +73,6 @@ def as_it_stands(study):
         space=study.space,
         free=found,
         shares=SimpleNamespace(sources=names, total=np.ones(len(names))),
-        shares_of_dimensions=None,
         error=0.05,
         examination=study.model.at(design.settings).examined(study.space.units(design.design, SeedTree(2), 16)),
         statuses={},

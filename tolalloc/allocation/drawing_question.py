@@ -59,7 +59,7 @@ from tolalloc.models.model import Model, is_fast
 from tolalloc.running.chunks import one_blas_thread
 from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.effort import SobolEffort
-from tolalloc.sensitivity.sobol import SourceIndices, regrouped, sobol_indices
+from tolalloc.sensitivity.sobol import SourceIndices, sobol_indices
 from tolalloc.sensitivity.surrogate.control_variate import learnt
 
 _EXAMINED = 1000
@@ -383,22 +383,20 @@ class DrawingQuestion:
             return None
         return best_yield(lambda target: cost_at_yield(space, free, target), price, self.effort.yields)
 
-    def shares(
-        self, space: DesignSpace, design: Float[np.ndarray, " variable"]
-    ) -> tuple[SourceIndices, SourceIndices] | tuple[None, None]:
-        """Return the indices of the leading output at the zones and the settings of a design, none if it is constant.
+    def shares(self, space: DesignSpace, design: Float[np.ndarray, " variable"]) -> SourceIndices | None:
+        """Return the indices of the leading output by dimension of the drawing, at the zones and settings of a design.
 
-        By source, and by dimension of the drawing.
+        None if it is constant.
         """
         errors, blocks, leading = space.errors, self.effort.share_blocks, self.requirements[0].output
         response = self.model.at(space.settings_of(design)).reading((leading,))
         experiment = Experiment(response, errors, space.zones(design), self.seeds("shares"), self.largest_failed_share)
         cheap = learnt(experiment, blocks)
+        fixed, groups = SobolEffort(start=blocks, limit=blocks), errors.dimension_of_column
         try:
-            found = sobol_indices(experiment, SobolEffort(start=blocks, limit=blocks), cheap=cheap)
+            return sobol_indices(experiment, fixed, factor_groups=groups, cheap=cheap).of(leading)
         except ConstantOutputError:
-            return None, None
-        return found.of(leading), regrouped(experiment, found, errors.dimension_of_column, cheap)
+            return None
 
     def examined(self, design: VerifiedDesign) -> Mapping[str, float]:
         """Return what the model says of random units of a design."""
@@ -470,7 +468,7 @@ def allocate_drawing(
         proven = question.proven(free, record)
         with record.stage("shares of variance"):
             chosen = Candidates(fixed=fixed, free=free, graded=graded).drawn
-            shares, of_dimensions = question.shares(chosen.space, chosen.design)
+            shares = question.shares(chosen.space, chosen.design)
         with record.stage("units of the drawing"):
             examination = question.examined(chosen)
     statuses = {outcome: count - searched[outcome] for outcome, count in record.counts.items()}
@@ -483,7 +481,6 @@ def allocate_drawing(
         free=free,
         graded=graded,
         shares=shares,
-        shares_of_dimensions=of_dimensions,
         trade=trade,
         fronts=fronts,
         front_lacks=front_lacks,

@@ -97,10 +97,9 @@ class AllocationResult:
     fixed: ZoneAllocation | None
     free: ZoneAllocation  # The allocation of tolerances and settings together
     graded: GradedAllocation | None  # The same on ladders of zones, if the question asks for it
-    # Sobol indices of the leading output at the zones of the drawing, none where it is the same for all units
+    # Sobol indices of the leading output by the dimensions of the drawing, at its zones; none where it is the same for
+    # all units
     shares: SourceIndices | None
-    # The same of the dimensions of the drawing: all members of a group exchanged together
-    shares_of_dimensions: SourceIndices | None
     trade: SettingTrade | None  # Cost of the cheapest zones over the settings, if asked for
     fronts: Fronts | None  # What can be had at which cost, if asked for
     robustness: Robustness | None  # Answers under changed assumptions, if asked for

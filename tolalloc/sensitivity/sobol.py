@@ -538,50 +538,6 @@ def solved(
     return Evaluation.joined([response(experiment.deviations(own)) for own in standard])
 
 
-def regrouped(
-    experiment: Experiment[Response],
-    analysis: SobolAnalysis,
-    factor_groups: tuple[str, ...],
-    cheap: Regression | None = None,
-) -> SourceIndices:
-    """Return the indices of the first output of an analysis by other groups of the columns, from the same blocks.
-
-    The samples A and B are the same for any groups, and so are those in which columns are exchanged that are a group
-    here and there: only those of new groups are solved, and a group that is in both has the same indices in both, but
-    for what the cheap model's own indices err by.
-
-    Parameters
-    ----------
-    experiment
-        That of the analysis; its response may answer the first output alone.
-    analysis
-        Indices by independent groups of the columns, with their samples.
-    factor_groups
-        Name of what every column belongs to, independent of each other.
-    cheap
-        That of the analysis, if it had one.
-
-    References
-    ----------
-    As `sobol_indices`; a group of columns has the index of all that happens inside it: Saltelli et al. 2010.
-    """
-    assert analysis.solved is not None
-    before, answers = analysis.solved.design, analysis.solved.answers
-    design = replace(before, factor_groups=factor_groups, second_order=False)
-    together, _ = _exchanged(experiment, experiment.response, before, answers, design)
-    blocks = together.status.size // design.samples_per_block
-    found = saltelli_indices(
-        together,
-        len(design.names),
-        experiment.seeds.child("resamples"),
-        replicates=before.replicates,
-        largest_failed_share=experiment.largest_failed_share,
-        resamples=analysis.indices.total_resamples.shape[1],
-        control=_control(experiment, cheap, design, blocks, analysis.outputs[:1]),
-    )
-    return _indices_of(found, 0, analysis.outputs[0], design.names, found.blocks, together.status.size)
-
-
 def _exchanged(
     experiment: Experiment[Response],
     response: Response,

@@ -110,7 +110,7 @@ def _of_allocation(question: Allocation, prepared: Prepared) -> tuple[_Workload,
         sum(2 * len(own.columns) + 2 for own in doubted(model).uncertain) * effort.stiffness_units
         + prod(effort.setting_steps[:settings]) * 4 * effort.shared_units
     )
-    shares = effort.share_blocks * (len(errors.blocks) + len({*errors.dimension_of_column}) + 4)
+    shares = effort.share_blocks * (len({*errors.dimension_of_column}) + 2)
     shares += units_to_learn(errors, effort.share_blocks)
     confirmed = tuple(round(share * effort.confirmation_units) for share in _CONFIRMATIONS)
     least = effort.verification_units + confirmed[0]

@@ -124,7 +124,7 @@ class AllocationEffort(NamedFields):
     setting_steps: Annotated[tuple[int, ...], each("whole numbers, 1 or more", whole("", 1))] = (5, 6)
     price_nodes: Annotated[int, _least(1)] = 100
     stiffness_units: Annotated[int, _least(100)] = 2048
-    share_blocks: Annotated[int, whole("a power of two, 2 or more", 2, power_of_two=True)] = 256
+    share_blocks: Annotated[int, whole("a power of two, 2 or more", 2, power_of_two=True)] = 512
     yields: Annotated[
         tuple[float, ...], each("one share or more between 0 and 1", number("", above=0, below=1), fewest=1)
     ] = (0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.9973, 0.999)
@@ -192,7 +192,7 @@ QUICK_ALLOCATION = AllocationEffort(
     setting_steps=(2, 3),
     price_nodes=12,
     stiffness_units=1152,
-    share_blocks=32,
+    share_blocks=64,
     yields=(0.7, 0.8, 0.9, 0.95, 0.99, 0.9973),
     gain=0.05,
     error=0.5,

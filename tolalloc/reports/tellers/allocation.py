@@ -107,7 +107,7 @@ class AllocationTeller(Teller[AllocationResult]):
             ),
             Section(
                 heading=_say("heading_shares", output=leading),
-                tables=(("shares", sobol_table(result.shares)),) if result.shares else (),
+                tables=(("shares", sobol_table(result.shares, "dimension")),) if result.shares else (),
                 folded=True,
             ),
             self._requirements.behind_heading,

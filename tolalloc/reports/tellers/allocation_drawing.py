@@ -154,7 +154,7 @@ def _zones(members: Iterable[Source], unit: str) -> float | str:
 
 def _parts(result: AllocationResult) -> dict[str, float]:
     """Return the total index of every dimension, correlated ones under each of their names [%]."""
-    if (found := result.shares_of_dimensions) is None:
+    if (found := result.shares) is None:
         return {}
     return {
         name: float(total) * 100.0
@@ -176,12 +176,14 @@ def _by_source(result: AllocationResult, derivatives: Float[np.ndarray, " source
 
 
 def _shares(result: AllocationResult) -> dict[str, float]:
-    """Return the share of every source in the sum of the total indices [%]."""
+    """Return the part of every source in the sum of the total indices, that of a dimension in equal parts [%]."""
     if (found := result.shares) is None:
         return {}
-    return {
-        name: float(share) for name, share in zip(found.sources, found.total / found.total.sum() * 100, strict=True)
-    }
+    said = dict[str, float]()
+    for joined, share in zip(found.sources, found.total / found.total.sum() * 100, strict=True):
+        members = [own for name in joined.split(" + ") for own in result.dimensions.get(name, ())]
+        said |= {own.name: float(share) / len(members) for own in members}
+    return said
 
 
 def tolerances_frame(result: AllocationResult, cost_unit: str = COST_UNITS) -> pd.DataFrame:
