@@ -39,7 +39,7 @@ def test_a_stack_off_the_middle_says_which_nominal_moves_it_there():
     sigma = np.sqrt(0.1**2 + 0.06**2 + 0.1**2 + 0.05**2) / 3
     assert found.off == pytest.approx(0.06, abs=4 * sigma / np.sqrt(2048))
     assert abs(found.shift) == pytest.approx(found.off * 1e-3, rel=1e-6)
-    assert (found.shift < 0) is (found.source == "housing")  # all four slopes are 1 or −1
+    assert found.source == "housing" and found.shift < 0  # all four slopes are 1 or −1: the first of the table
     # four standard errors of 2,048 units
     assert found.now == pytest.approx(norm.cdf(0.02 / sigma) - norm.cdf(-0.14 / sigma), abs=0.045)
     assert found.moved == pytest.approx(2 * norm.cdf(0.08 / sigma) - 1, abs=0.035)

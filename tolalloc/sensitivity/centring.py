@@ -18,6 +18,8 @@ _OFF = 0.25
 """Distance of the mean from the middle of the limits over the standard deviation from which it is told [-]."""
 _GAIN = 1e-3
 """Share of units that moving a nominal must bring inside the limits until it is told [-]."""
+_ALIKE = 1e-6
+"""Relative difference of two derivatives up to which the first size of the table moves, and no last digit decides."""
 _UNITS = 4096
 """Units on which it is tried at most [-]."""
 
@@ -102,7 +104,8 @@ def _least_moved(experiment: Experiment[Response], local: LocalDerivatives) -> t
         for own, at in zip(errors.active, errors.columns_of_source, strict=False)
         if own.feature is Feature.SIZE and len(own.columns) == 1 and own.lever == 1.0 and not own.locked
     ]
-    if not free or not max(free)[0]:
+    steepest = max((own[0] for own in free), default=0.0)
+    if not steepest:
         return None
-    _, name, column = max(free, key=lambda own: own[0])
+    _, name, column = next(own for own in free if own[0] >= (1 - _ALIKE) * steepest)
     return name, column, float(slopes[name]) / MICROMETRE
