@@ -48,8 +48,8 @@ def test_a_study_is_ranked_allocated_and_drawn(folder, drive, tmp_path):
     )
     run = study.run(tmp_path / "run")
     assert run.answers["allocation"].result.met
-    ranked = run.answers["ranking"].result.sobol.sources
-    assert {"output.pin.position", "disc1.hole.position", "shaft.assembly"} <= set(ranked)
+    ranked = {own.name for line in run.answers["ranking"].result.members.values() for own in line}
+    assert {"output.pin.position", "disc1.hole.position", "shaft.assembly"} <= ranked
     page = page_of(tmp_path / "run")
     for wrong in ("planet", "crankshaft", "sun gear"):
         assert wrong not in page.split("<script")[0]
