@@ -395,7 +395,7 @@ def test_beta_trapezoid_and_rayleigh_are_ranked_and_allocated(tmp_path):
             (0.02**2 / (-2 * np.log(0.0027))) * (2 - np.pi / 2),
         ]
     )
-    ranking = study.rank(effort="quick").to_frame("ranking").set_index("source")["total index ST [-]"]
+    ranking = study.rank(effort="quick").to_frame("ranking").set_index("dimension")["total index ST [-]"]
     assert ranking[["a", "b", "c"]].to_numpy() == pytest.approx(variances / variances.sum(), abs=2e-3)
     found = study.allocate(effort="quick").result
     assert found.met and found.bound <= found.cost < 3.0

@@ -34,8 +34,8 @@ def test_they_are_read_and_written_back(tmp_path):
 @pytest.mark.slow
 def test_they_stand_beside_the_source_in_every_answer_and_in_the_next_table(tmp_path):
     asked = study_of_lengths(ta.drawing(table(tmp_path)))
-    ranking = asked.rank().to_frame().set_index("source")
-    assert ranking.loc["a", "own id"] == "4711-12"
+    ranking = asked.rank().to_frame().set_index("dimension")
+    assert ranking.loc["sleeves", "own id"] == "4711-12, 4711-13"
     allocation = asked.allocate()
     assert allocation.tables["drawing"].set_index("source").loc["b", "own id"] == "4711-13"
     assert allocation.tables["dimensions"].set_index("dimension").loc["sleeves", "own id"] == "4711-12, 4711-13"

@@ -82,3 +82,4 @@ def test_copies_of_one_line_have_the_first_and_the_last_own_id_or_none_that_its_
     assert of("B-17|C-3", "Bolzen") == "B-17, C-3"
     assert of("|B-17", "Bolzen") == "B-17"
     assert of("", "Bolzen") == ""
+    assert of("4711-12", "") == of("4711-12", "4711-13") == "4711-12"  # an id of numbers alone is no number of a copy

@@ -148,7 +148,8 @@ def own_words(
 
     def own_id(row: Row) -> str:
         found = _each(members(row), "own_id")
-        if {own.rstrip(_NUMBERS) for own in found} == {named(row).rstrip(_NUMBERS)}:
+        bare = named(row).rstrip(_NUMBERS)
+        if bare and {own.rstrip(_NUMBERS) for own in found} == {bare}:
             return ""
         return ", ".join(found) if len(found) < _COPIES else f"{found[0]} … {found[-1]}"
 
