@@ -150,7 +150,7 @@ def test_outputs_that_do_not_count_are_asked_for_in_the_first_blocks_alone():
 
 def test_further_blocks_tell_the_eight_largest_apart_and_take_the_rest_together():
     """Of twelve parts of a sum each has the share of its weight squared, and so have the rest together."""
-    weights = np.array([2.0, 0.1, 1.8, 0.2, 1.6, 1.4, 0.15, 1.2, 1.0, 0.8, 0.05, 0.6])
+    weights = np.array([2.0, 0.1, 1.8, 0.2, 1.6, 1.4, 0.1, 1.2, 1.0, 0.8, 0.05, 0.6])
     errors = sizes("abcdefghijkl")
     response = Linear(np.stack([weights, weights[::-1]]), errors.columns)
     asked = Linear(weights[np.newaxis], errors.columns)
@@ -175,8 +175,15 @@ def test_further_blocks_tell_the_eight_largest_apart_and_take_the_rest_together(
     theirs = analyze(**salib.for_sobol, print_to_console=False, seed=1)
     named = dict(zip(dict.fromkeys(salib.problem["groups"]), theirs["ST"], strict=True))
     np.testing.assert_allclose([named[name] for name in found.together.sources], found.together.total, rtol=1e-12)
-    pair = next(pair for pair in own.neighbours if {pair.before, pair.after} == {1, 6} or pair.after in found.small)
-    assert pair.more_blocks in (0, None)
+    (alike,) = [pair for pair in own.neighbours if {pair.before, pair.after} == {1, 6}]
+    assert not alike.separated and alike.more_blocks is None  # the first blocks show them, not those that are counted
+
+
+def test_blocks_go_on_where_the_first_ones_of_a_scrambling_all_failed():
+    """Blocks 0 and 8 of 16 are those of the first of eight scramblings."""
+    effort = SobolEffort(start=16, limit=64, places=4, probability=0.9999)
+    found = analysis([[1.0, 1.05, 0.3, 0.1]], effort, share=0.05, broken=(0, 8 * 6))
+    assert (found.blocks, found.dropped, len(found.convergence.history)) == (62, 2, 3)
 
 
 def test_a_leading_output_that_does_not_vary_leaves_the_next_one_to_settle():
@@ -186,6 +193,11 @@ def test_a_leading_output_that_does_not_vary_leaves_the_next_one_to_settle():
     assert found.constant == ("y0 [-]",)
     assert found.convergence.history[-1].first[:2] == (1, 0)
     assert found.overall.drives == ("y1 [-]",) * 4
+    many = Linear(np.stack([np.zeros(12), np.arange(1.0, 13.0)]), sizes("abcdefghijkl").columns)
+    parted = sobol_indices(
+        Experiment.of(many, sizes("abcdefghijkl"), SeedTree(2)), SobolEffort(start=16, limit=32, probability=0.9999)
+    )
+    assert parted.small == {0, 1, 2, 3} and parted.together is not None
 
 
 @dataclass(frozen=True)

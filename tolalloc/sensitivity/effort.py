@@ -48,6 +48,8 @@ def _least(fewest: int) -> Rule:
     return whole(f"{fewest} or more, a whole number", fewest)
 
 
+BY_DIMENSION, BY_SOURCE = "dimension", "source"
+"""What a ranking may rank: dimensions of the drawing with all their places together, or every source alone."""
 LARGEST = 8
 """Groups of columns that further blocks tell apart: as many as a first page names, more would halve the blocks [-]."""
 

@@ -18,9 +18,9 @@ from tolalloc.running.chunks import one_blas_thread
 from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.centring import centring
 from tolalloc.sensitivity.derivatives import classical_estimate, local_derivatives
-from tolalloc.sensitivity.effort import RankingEffort
+from tolalloc.sensitivity.effort import BY_DIMENSION, BY_SOURCE, RankingEffort
 from tolalloc.sensitivity.inverse import InverseSensitivity, fewest_units, inverse_sensitivity
-from tolalloc.sensitivity.result import BY_DIMENSION, BY_SOURCE, RankingResult
+from tolalloc.sensitivity.result import RankingResult
 from tolalloc.sensitivity.shapley import ShapleyEffects, shapley_effects
 from tolalloc.sensitivity.sobol import SobolAnalysis, order_contribution, sobol_indices
 from tolalloc.sensitivity.surrogate.control_variate import MOST_CONTROLLED, cheap_model

@@ -17,15 +17,13 @@ from tolalloc.drawings.sources import Source
 from tolalloc.models.model import Model
 from tolalloc.sensitivity.centring import Centring
 from tolalloc.sensitivity.derivatives import ClassicalEstimate, LocalDerivatives
+from tolalloc.sensitivity.effort import BY_SOURCE
 from tolalloc.sensitivity.inverse import InverseSensitivity
 from tolalloc.sensitivity.shapley import ShapleyEffects
 from tolalloc.sensitivity.sobol import OrderContribution, SalibArrays, SobolAnalysis, SourceIndices
 from tolalloc.sensitivity.surrogate.validation import Choice
 from tolalloc.sensitivity.target import TargetSensitivity
 from tolalloc.sensitivity.uncertain import UncertainEffect
-
-BY_DIMENSION, BY_SOURCE = "dimension", "source"
-"""What a ranking may rank: dimensions of the drawing with all their places together, or every source alone."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -207,6 +207,9 @@ class SaltelliIndices:
         for name, theirs in vars(other).items():
             if not isinstance(theirs, np.ndarray) or name == "weights":
                 continue
+            # Failed blocks may leave another number of scramblings; these arrays serve waves, which are not replaced.
+            if name.endswith("left_out") and theirs.shape[1] != getattr(self, name).shape[1]:
+                continue
             joined[name] = getattr(self, name).copy()
             for own, place in enumerate(outputs):
                 if name in _OF_SOURCES:

@@ -459,7 +459,8 @@ class _Blocks:
         """Indices of the followed output with the small groups as one; none where all are told apart."""
         if self.last is None or self.design.names == self.names:
             return None
-        return _indices_of(self.last, 0, self._leading, self.design.names, self.last.blocks, self.samples)
+        at = self.followed.outputs.index(self._leading)
+        return _indices_of(self.last, at, self._leading, self.design.names, self.last.blocks, self.samples)
 
     @property
     def _leading(self) -> str:

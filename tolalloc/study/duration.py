@@ -14,6 +14,7 @@ from tolalloc.allocation.search.settings_scan import units_of_scan
 from tolalloc.allocation.space.tail import tail_units
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
+from tolalloc.sensitivity.effort import BY_SOURCE
 from tolalloc.sensitivity.inverse import fewest_units
 from tolalloc.sensitivity.surrogate.control_variate import units_to_learn
 from tolalloc.study.questions import Allocation, Ranking
@@ -77,7 +78,7 @@ def _of_ranking(question: Ranking, prepared: Prepared) -> tuple[_Workload, ...]:
     waves = tuple(name for names in model.spectra.values() for name in names)
     whole, alone = _seconds(prepared, outputs), _seconds(prepared, (leading,))
     of_all, of_leading = (_seconds(prepared, asked, uncertain=True) for asked in ((*outputs, *waves), (leading,)))
-    by_source = question.by == "source"
+    by_source = question.by == BY_SOURCE
     ranked = len(errors.blocks if by_source else {*errors.dimension_of_column}) + len(model.uncertain)
     inverse = max(effort.inverse_units, fewest_units(prepared.target))
     trials = 2 * effort.derivative_units + (len(errors.blocks) + 2) * inverse

@@ -14,6 +14,7 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.reading.named_fields import NamedFields, Rule, a, flag, is_number, mapped, or_none, whole
 from tolalloc.reports.header import Header
+from tolalloc.sensitivity.effort import BY_DIMENSION, BY_SOURCE
 from tolalloc.study.answer import Answer
 from tolalloc.study.prepared import Prepared
 
@@ -70,7 +71,7 @@ class Ranking(Question):
 
     kind: ClassVar[str] = "ranking"
 
-    by: Annotated[str, Rule("dimension or source", ("dimension", "source").__contains__)] = "dimension"
+    by: Annotated[str, Rule(f"{BY_DIMENSION} or {BY_SOURCE}", (BY_DIMENSION, BY_SOURCE).__contains__)] = BY_DIMENSION
 
     def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[RankingResult]:  # noqa: ARG002
         """Return what drives the outputs at the zones of the drawing."""
