@@ -61,7 +61,7 @@ def test_a_study_is_ranked_allocated_and_drawn(folder, tmp_path):
     )
     run = study.run(tmp_path / "run")
     assert run.answers["allocation"].result.met
-    ranked = run.answers["ranking"].result.sobol.sources
+    ranked = [own.name for members in run.answers["ranking"].result.members.values() for own in members]
     assert {"pinion.eccentricity", "centre.eccentricity", "sun.eccentricity"} <= set(ranked)
     page = page_of(tmp_path / "run")
     assert "outer toothing of the centre gear" in page
