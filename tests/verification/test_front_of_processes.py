@@ -10,7 +10,7 @@ import pytest
 from tests.verification.test_process_choice import random_problem
 from tolalloc.allocation.cost.model import Exponential, PowerExponential, Process, Reciprocal, ReciprocalPower
 from tolalloc.allocation.cost.points import Points, Tabulated
-from tolalloc.allocation.search.lagrange_dual import by_form
+from tolalloc.allocation.search.lagrange_dual import LeastPriced
 from tolalloc.allocation.search.process_choice import allocate, front
 from tolalloc.allocation.space.problem import LeastInfeasible, Solution
 
@@ -44,7 +44,7 @@ def test_the_least_priced_cost_of_every_form_is_that_of_a_fine_grid_and_never_ab
         Process(name="p", cost=cost, minimum=1.0, maximum=8.0 - at, change=0.1 * at) for at, cost in enumerate(costs)
     ]
     linear = generator.uniform(0, 2, len(made)) * (np.arange(len(made)) != 1)  # one zone has no price
-    forms = by_form(made)
+    forms = LeastPriced.by_form(made)
     assert len(forms) == 5
     for alike in forms:
         squares = np.full(alike.places.size, square)

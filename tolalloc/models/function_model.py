@@ -334,6 +334,13 @@ class BoundFunction(Model):
         return slopes
 
     @cached_property
+    def _places(self) -> slice | list[int]:
+        """Where the inputs that vary stand among all."""
+        places = [self.source.inputs.index(name) for name in self.varied]
+        first, last = min(places, default=0), max(places, default=-1)
+        return slice(first, last + 1) if places == [*range(first, last + 1)] else places
+
+    @cached_property
     def _per_input(self) -> Float[np.ndarray, " input"]:
         """Input per metre, or per radian for an angle: lengths reach the function in the unit of their row."""
         return np.array(
@@ -399,10 +406,12 @@ class BoundFunction(Model):
 
     def _arguments(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample argument"]:
         """Return what the function takes: inputs [mm or in, angles rad], then settings [units of their names]."""
-        inputs = np.tile(self.offsets, (x.shape[0], 1))
-        inputs[:, [self.source.inputs.index(name) for name in self.varied]] += x
-        settings = np.tile(self.values, (x.shape[0], 1))
-        return np.concatenate([inputs * self._per_input, settings], axis=1)
+        count = len(self.source.inputs)
+        found = np.empty((x.shape[0], count + len(self.values)))
+        found[:, :count], found[:, count:] = self.offsets, self.values
+        found[:, self._places] += x
+        found[:, :count] *= self._per_input
+        return found
 
 
 def _is_range(value: object) -> bool:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import isfinite, log
+from math import isfinite
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -62,7 +63,7 @@ class Reciprocal(_FallingCost):
 
     def expression(self, zone: Expression, cvx: Any) -> Expression:
         """Return the cost as a convex expression."""
-        return self.fixed + self.factor * cvx.inv_pos(zone)
+        return self.fixed + cvx.multiply(self.factor, cvx.inv_pos(zone))
 
     def rescaled(self, unit: float) -> Reciprocal:
         """Return the same cost as a function of zone / unit."""
@@ -102,7 +103,7 @@ class ReciprocalPower(_FallingCost):
         -----
         Through the logarithm, as solvers take powers by a rational exponent that is only close to n.
         """
-        return self.fixed + cvx.exp(log(self.factor) - self.exponent * cvx.log(zone))
+        return self.fixed + cvx.exp(np.log(self.factor) - cvx.multiply(self.exponent, cvx.log(zone)))
 
     def rescaled(self, unit: float) -> ReciprocalPower:
         """Return the same cost as a function of zone / unit."""
@@ -135,7 +136,7 @@ class Exponential(_FallingCost):
 
     def expression(self, zone: Expression, cvx: Any) -> Expression:
         """Return the cost as a convex expression."""
-        return self.fixed + self.factor * cvx.exp(-zone / self.scale)
+        return self.fixed + cvx.multiply(self.factor, cvx.exp(-zone / self.scale))
 
     def rescaled(self, unit: float) -> Exponential:
         """Return the same cost as a function of zone / unit."""
@@ -170,7 +171,8 @@ class PowerExponential(_FallingCost):
 
     def expression(self, zone: Expression, cvx: Any) -> Expression:
         """Return the cost as a convex expression."""
-        return self.fixed + cvx.exp(log(self.factor) - self.exponent * cvx.log(zone) - zone / self.scale)
+        falling = cvx.multiply(self.exponent, cvx.log(zone)) + zone / self.scale
+        return self.fixed + cvx.exp(np.log(self.factor) - falling)
 
     def rescaled(self, unit: float) -> PowerExponential:
         """Return the same cost as a function of zone / unit."""
@@ -281,6 +283,30 @@ class Weighted:
     def rescaled(self, unit: float) -> Weighted:
         """Return the same cost as a function of zone / unit."""
         return Weighted(model=self.model.rescaled(unit), weight=self.weight)
+
+    @property
+    def alone(self) -> CostModel:
+        """The same as a closed form of its own, where the model is one: the parameters a and b times the number."""
+        if not isinstance(self.model, ClosedForm):
+            return self
+        return replace(self.model, fixed=self.weight * self.model.fixed, factor=self.weight * self.model.factor)
+
+
+def by_form(costs: Sequence[CostModel]) -> list[tuple[list[int], CostModel]]:
+    """Return where costs of one closed form stand, with all of them as one of columns, the others each for itself.
+
+    >>> [places for places, _ in by_form([Reciprocal(factor=1.0), Exponential(factor=1.0, scale=1.0)] * 2)]
+    [[0, 2], [1, 3]]
+    """
+    plain = [cost.alone if isinstance(cost, Weighted) else cost for cost in costs]
+    together: dict[object, list[int]] = defaultdict(list)
+    for at, cost in enumerate(plain):
+        together[type(cost) if isinstance(cost, ClosedForm) else at].append(at)
+    found = []
+    for places in together.values():
+        closed = [cost for cost in (plain[at] for at in places) if isinstance(cost, ClosedForm)]
+        found.append((places, stacked(closed) if closed else plain[places[0]]))
+    return found
 
 
 def made_together(models: Sequence[CostModel], ratios: Sequence[float]) -> CostModel:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.allocation.cost.model import Expression
+from tolalloc.allocation.cost.model import Expression, by_form
 from tolalloc.allocation.search.lagrange_dual import cost_bound, require_convex
 from tolalloc.allocation.space.problem import (
     AllocationProblem,
@@ -84,11 +84,17 @@ class ConvexProgram:
         ]
         for feature, process in zip(features, self._made, strict=True):
             require_convex(f"feature {feature.name}", process)
+        rescaled = [made.rescaled(unit).cost for made, unit in zip(self._made, self._units, strict=True)]
+        # Costs of one form as one column: an expression for every zone takes cvxpy a second for fifty.
         made = [
-            process.rescaled(unit).cost.expression(self._zones[at], cp)
-            for at, (process, unit) in enumerate(zip(self._made, self._units, strict=True))
+            cp.sum(
+                own.expression(
+                    cp.reshape(self._zones[at], (len(at), 1), order="F") if at[1:] else self._zones[at[0]], cp
+                )
+            )
+            for at, own in by_form(rescaled)
         ]
-        cost = cp.sum(cp.hstack(made)) / self._cost_scale + (losses / self._cost_scale) @ cp.square(self._zones)
+        cost = sum(made) / self._cost_scale + (losses / self._cost_scale) @ cp.square(self._zones)
         self._keeping = [self._zones >= self._bounds[0], self._zones <= self._bounds[1]]
         self._kept = [self._load(stack) <= stack[-1] for stack in self._stacks]
         around = [self._shared >= self._bounds[2], self._shared <= self._bounds[3]]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -10,21 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from tolalloc.allocation.cost.model import ClosedForm, CostModel, Process, Reciprocal, stacked
+from tolalloc.allocation.cost.model import CostModel, Process, Reciprocal, by_form
 from tolalloc.allocation.space.problem import AllocationProblem
 from tolalloc.exceptions import InputError
 
 _FRACTIONS = np.linspace(0.0, 1.0, 33)
 _ROUNDS = 4
 """Each narrows a zone to 1/32 of its range, so four leave a ratio of 1 + 1e-5 at most [-]."""
-
-
-def by_form(processes: Sequence[Process]) -> tuple[LeastPriced, ...]:
-    """Return processes with those of one closed form together, the others each for itself."""
-    together: dict[object, list[int]] = defaultdict(list)
-    for at, process in enumerate(processes):
-        together[type(process.cost) if isinstance(process.cost, ClosedForm) else at].append(at)
-    return tuple(LeastPriced.of(places, [processes[at] for at in places]) for places in together.values())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,17 +30,14 @@ class LeastPriced:
     high: Float[np.ndarray, " process"]
 
     @classmethod
-    def of(cls, places: Sequence[int], processes: Sequence[Process]) -> LeastPriced:
-        """Return processes of one closed form, or a single one of any convex cost."""
-        costs = [process.cost for process in processes]
-        closed = [cost for cost in costs if isinstance(cost, ClosedForm)]
-        return cls(
-            places=np.array(places),
-            cost=stacked(closed) if len(closed) == len(costs) else costs[0],
-            change=np.array([process.change for process in processes]),
-            low=np.array([process.minimum for process in processes]),
-            high=np.array([process.maximum for process in processes]),
-        )
+    def by_form(cls, processes: Sequence[Process]) -> tuple[LeastPriced, ...]:
+        """Return processes with those of one closed form together, the others each for itself."""
+        found = []
+        for places, cost in by_form([process.cost for process in processes]):
+            made = [processes[at] for at in places]
+            change, low, high = np.array([(own.change, own.minimum, own.maximum) for own in made]).T
+            found.append(cls(places=np.array(places), cost=cost, change=change, low=low, high=high))
+        return tuple(found)
 
     def found(
         self, linear: Float[np.ndarray, " process"], square: Float[np.ndarray, " process"]
@@ -159,7 +147,7 @@ class LagrangeDual:
         self._processes = tuple(process for feature in problem.features for process in feature.processes)
         for at, process in zip(self.feature, self._processes, strict=True):
             require_convex(f"feature {problem.features[at].name}", process)
-        self._alone = by_form(self._processes)
+        self._alone = LeastPriced.by_form(self._processes)
         self._worst_case = np.array([stack.worst_case for stack in problem.stacks]).reshape(-1, len(counts))
         self._root_sum_square = np.array([stack.root_sum_square for stack in problem.stacks]).reshape(-1, len(counts))
         self._slopes = np.array([stack.slopes for stack in problem.stacks]).reshape(

@@ -291,8 +291,32 @@ class DesignSample:
     @cached_property
     def exact(self) -> dict[str, SettingDerivatives]:
         """Outputs whose derivatives the model knows exactly, of the first units."""
-        model, first = self.at(self.design), self.x[: self.derivative_units]
-        return {output: model.derivatives(output, first) for output in self.outputs if output in model.exact}
+        first = np.arange(min(self.derivative_units, len(self.standard)))
+        return {output: self._derivatives(output, first) for output in self.outputs if output in self.model.exact}
+
+    @cached_property
+    def _whole(self) -> dict[str, Evaluation]:
+        """The same outputs of all units of a fast model without settings: one that is linear needs no derivatives."""
+        if self.space.settings or not is_fast(self.model):
+            return {}
+        asked = (output for output in self.outputs if output in self.model.exact)
+        return {output: self.model.reading((output,))(self.x) for output in asked}
+
+    @cached_property
+    def _linear(self) -> dict[str, LinearFunction]:
+        """Outputs that are linear in the deviations, as far as these units tell."""
+        found = {output: LinearFunction.through(self.x, self.values(output)) for output in self.outputs}
+        return {output: own for output, own in found.items() if own}
+
+    def _derivatives(self, output: str, rows: Int[np.ndarray, " few"]) -> SettingDerivatives:
+        if not (output in self._whole and output in self._linear):
+            return self.at(self.design).derivatives(output, self.x[rows])
+        whole, slopes = self._whole[output], self._linear[output].slopes
+        return SettingDerivatives(
+            evaluation=Evaluation(values=whole.values[rows], status=whole.status[rows]),
+            by_column=np.broadcast_to(slopes, (rows.size, slopes.size)),
+            by_setting=np.empty((rows.size, 0)),
+        )
 
     @cached_property
     def _rest(self) -> Evaluation:
@@ -311,6 +335,8 @@ class DesignSample:
 
     def evaluation(self, output: str) -> Evaluation:
         """Return one output of every unit."""
+        if output in self._whole:
+            return self._whole[output]
         if output in self.exact:
             first = self.exact[output].evaluation
             if self.derivative_units >= len(self.standard):
@@ -340,8 +366,7 @@ class DesignSample:
     def laws(self) -> dict[str, LinearLaw]:
         """Law of every output that is linear in the deviations, as far as these units tell."""
         errors, zones = self.space.errors, self.space.zones(self.design)
-        planes = {output: LinearFunction.through(self.x, self.values(output)) for output in self.outputs}
-        found = {output: LinearLaw.of(plane, errors, zones) for output, plane in planes.items() if plane}
+        found = {output: LinearLaw.of(plane, errors, zones) for output, plane in self._linear.items()}
         return {output: law for output, law in found.items() if law}
 
     @cached_property
@@ -436,7 +461,7 @@ class DesignSample:
             return np.asarray(self._slopes(self.exact[output], self.standard)[rows])
         model, standard = self.at(self.design), self.standard[rows]
         if output in (*model.exact, *model.differentiable):
-            return self._slopes(model.derivatives(output, self.x[rows]), standard)
+            return self._slopes(self._derivatives(output, rows), standard)
         return np.asarray(self._differences((output,), standard)[0])
 
     def worst(self, output: str, sense: Literal[1, -1]) -> tuple[float, Float[np.ndarray, " variable"]]:
