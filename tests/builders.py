@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import re
 import tomllib
@@ -18,7 +17,6 @@ import pytest
 
 import tolalloc as ta
 from tests.import_graph import PACKAGE
-from tolalloc.allocation.front.pareto_problem import SearchedDesigns
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.requirement import AtYield, Guarantee, Requirement, RootSumSquare
 from tolalloc.allocation.verify.verification import Verifier
@@ -352,11 +350,6 @@ def numbers_of(answer: object) -> list[float]:
     """Return every number of an answer for programs, in its order."""
     inner = answer.values() if isinstance(answer, dict) else answer if isinstance(answer, list) else ()
     return [answer] if isinstance(answer, int | float) else [number for one in inner for number in numbers_of(one)]
-
-
-def digest(found: SearchedDesigns) -> str:
-    """Return the digest of all designs of a search for a front and of their answers."""
-    return hashlib.sha256(found.designs.tobytes() + found.answers.values.tobytes()).hexdigest()
 
 
 def with_ovality(drawing: Drawing, amplitude: float) -> Drawing:

@@ -6,7 +6,6 @@ from tolalloc import numeric as numeric
 from tolalloc.allocation.cost.unit_price import QualityLoss as QualityLoss
 from tolalloc.allocation.cost.unit_price import UnitPrice as UnitPrice
 from tolalloc.allocation.space.effort import AllocationEffort as AllocationEffort
-from tolalloc.allocation.space.effort import FrontEffort as FrontEffort
 from tolalloc.allocation.space.effort import SearchEffort as SearchEffort
 from tolalloc.allocation.space.requirement import AtCpk as AtCpk
 from tolalloc.allocation.space.requirement import AtYield as AtYield

@@ -188,8 +188,15 @@ def along_front(designs: int) -> Work:
 def along_front_of_processes(designs: int) -> Work:
     """Return the proven front of so many designs of 30 features with competing processes as work."""
     problem = random_problem(SEED, features=30, processes=2, stacks=2)
-    budgets = problem.stacks[0].budget * np.linspace(0.8, 1.4, designs)
-    return lambda: process_choice.front(problem, 0, budgets)
+    rows = np.tile([stack.budget for stack in problem.stacks], (designs, 1))
+    rows[:, 0] *= np.linspace(0.8, 1.4, designs)
+
+    def work() -> None:
+        series = process_choice.BudgetSeries(problem)
+        for row in rows:
+            series.allocate(row)
+
+    return work
 
 
 def _reducer(**changes: int) -> Work:

@@ -22,7 +22,7 @@ PACKAGE = ROOT / "tolalloc"
 FILES = sorted(PACKAGE.rglob("*.py"))
 DOORS = {
     "SALib": ("sensitivity/",),
-    "pymoo": ("allocation/front/genetic.py",),
+    "pymoo": ("allocation/search/pattern_search.py",),
     "cvxpy": ("allocation/search/convex_program.py",),
     "sklearn": ("sensitivity/surrogate/", "reducers/surrogates.py"),
     "matplotlib": ("reports/",),

@@ -15,11 +15,9 @@ SMALL_EFFORT = """ta.Effort(
             derivative_units=10, inverse_units=1, surrogate_units=96, level_units=100, level_runs=2, widened_units=100,
             permutations=2),
         allocation=ta.AllocationEffort(
-            verification_units=256, confirmation_units=512, shared_units=16, graded_steps=2, exact_points=8,
+            verification_units=256, confirmation_units=512, shared_units=16, graded_steps=2, front_limits=(0.95, 1.1),
             setting_steps=(2, 2), price_nodes=4, stiffness_units=128, share_blocks=8,
-            yields=(0.9, 0.95), error=0.5,
-            search=ta.SearchEffort(steps=2, front=ta.FrontEffort(population=8, generations=4, population_on_kernel=8,
-                generations_on_kernel=2, designs=10, rounds=1, points=3))),
+            yields=(0.9, 0.95), error=0.5, front_steps=1, search=ta.SearchEffort(steps=2)),
         is_quick=True)"""
 
 
@@ -288,18 +286,15 @@ SHIPPED = "shipped_{}"
 """Name of the case of a shipped study, which is run quick."""
 
 
-FRONT = r'^ +"[\d.]+,[\d.]+,[\d.]*,[\d.]+,(yes)?",?$'
 WANDERING = {
     "choi2000_clutch": rf'"confirmation,|"answer found": |^ +"tolerances,|units: answer found|{PRICES}',
-    "liu2020_allocation": FRONT,
-    "liu2020_allocation_full": f"{FRONT}|{PRICES}",
-    "rv20e_allocation": FRONT,
+    "liu2020_allocation_full": PRICES,
     "rv20e_diagnosis": r"\d",
     "song2019_modification": r"genetic|^ +\d+\.\d+,?$",
     "zhang2025_assembly": r"^zhang2025's genetic algorithm|^ +\"[\d.]+,[\d.]+,2,",
 }
 """Study → lines that follow a random search: the whole of a search for causes, the amounts of an evolution, its excess
-over a certified cost, the designs of a front with the radial clearance, the worst prices."""
+over a certified cost, the worst prices."""
 AGREEMENT = dict.fromkeys(
     (
         *("liu2020_allocation", "liu2020_allocation_full", "rv20e_allocation", "choi2000_clutch"),

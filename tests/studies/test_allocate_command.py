@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import re
 import subprocess
-import time
 from pathlib import Path
 
 import pandas as pd
@@ -15,7 +13,7 @@ import pytest
 from openpyxl import load_workbook
 
 from tests.builders import FEW, few_sources, numbers_of, page_of, refusal, says, summary_of, telling, wording
-from tests.studies.command import ROOT, command, process, refused, tolalloc
+from tests.studies.command import ROOT, process, refused, tolalloc
 from tolalloc.allocation.cost.process_costs import load_process_costs
 from tolalloc.cli.run import allocate
 from tolalloc.drawings.tolerance_table import load_tolerance_table
@@ -31,14 +29,11 @@ housing.pitch,ground,reciprocal,,,,today
 housing.pitch,broached,reciprocal,0.8,5,{change},another machine
 """
 SMALL = """AllocationEffort(
-        verification_units=128, confirmation_units=512, shared_units=16, graded_steps=2, exact_points=8,
+        verification_units=128, confirmation_units=512, shared_units=16, graded_steps=2,
         setting_steps=(2, 2), price_nodes=4, stiffness_units=128, share_blocks=8,
-        yields=(0.9, 0.95),
-        search=SearchEffort(steps=2, front=FrontEffort(population=8, generations=4, population_on_kernel=8,
-            generations_on_kernel=2, designs=10, rounds=1, points=3)))"""
+        yields=(0.9, 0.95), front_limits=(0.95, 1.1), front_steps=1, search=SearchEffort(steps=2))"""
 STUDY = """import tolalloc as ta
 from tolalloc.allocation.space.effort import AllocationEffort
-from tolalloc.allocation.space.effort import FrontEffort
 from tolalloc.allocation.space.effort import SearchEffort
 
 MOST = ta.AtYield(target=0.95)
@@ -118,7 +113,7 @@ def test_the_report_is_complete(allocated):
     assert book.sheetnames[:3] == ["answer", "contents", "charts"]
     histogram, effects = book["charts"]._charts[:2]
     assert len(histogram.series) == 2 == len(effects.series)
-    for stage in ("tolerances alone", "with modification", "grades", "modification trade", "fronts", "robustness"):
+    for stage in ("tolerances alone", "with modification", "grades", "modification trade", "front", "robustness"):
         assert stage in said
     assert "units/s" in said
 
@@ -200,38 +195,6 @@ def test_every_header_of_the_tables_has_a_unit(allocated):
 
 
 @pytest.mark.slow
-def test_an_interrupted_run_goes_on_to_the_same_bits_with_other_threads(tmp_path):
-    script = script_with(tmp_path)
-    answers, kept = [], tmp_path / "kept.npz"
-    other = tmp_path / "other.npz"
-    whole = run_with_threads(1, script, "--json", "--fresh", "--out", tmp_path / "whole", "--checkpoint", other)
-    assert whole.returncode == 0, whole.stderr
-    with subprocess.Popen(
-        command("allocate", script, "--json", "--fresh", "--out", tmp_path / "cut", "--checkpoint", kept),
-        env={**os.environ, "NUMBA_NUM_THREADS": "2"},
-        cwd=ROOT,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    ) as process:
-        while not kept.exists() and process.poll() is None:
-            time.sleep(0.005)
-        process.kill()
-    assert kept.exists()
-    again = run_with_threads(2, script, "--json", "--fresh", "--out", tmp_path / "again", "--checkpoint", kept)
-    plain = run_with_threads(2, script, "--json", "--fresh", "--out", tmp_path / "plain")
-    for result in (whole, again, plain):
-        assert result.returncode == 0, result.stderr
-        answers.append(json.loads(result.stdout)["allocation"])
-    assert answers[0] == answers[1] == answers[2]
-    before = kept.read_bytes()
-    other = run(script, "--limit", 40, "--out", tmp_path / "limit", "--checkpoint", kept)
-    assert other.returncode == 2
-    assert "kept.npz: the checkpoint is of another problem" in other.stderr
-    assert "units/s" not in other.stderr  # said before anything long runs
-    assert kept.read_bytes() == before
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("texts", "blocking", "unit"),
     [
@@ -271,9 +234,6 @@ def test_a_limit_out_of_reach_has_an_answer_with_what_blocks_and_by_how_much(tmp
         ({"yield_target": 2.0}, ["target is 2.0", "a share from 0.5 to below 1"]),
         ({"limit": math.nan}, ["limit", "nan", "finite"]),
         ({"seed": -1}, ["seed is -1", "0 or a positive integer"]),
-        ({"checkpoint": Path("nowhere/kept.npz")}, ["no folder", "nowhere"]),
-        ({"checkpoint": ROOT / "README.md"}, ["README.md", "no complete checkpoint"]),
-        ({"checkpoint": ROOT / "docs"}, ["docs", "no complete checkpoint"]),
         ({"out": ROOT / "docs"}, ["docs", "not empty", "nothing is overwritten"]),
     ],
 )
@@ -318,8 +278,8 @@ def test_bad_fields_are_refused_in_one_sentence(tmp_path, texts, words):
         ("shared_units=0", ["effort.allocation.shared_units is 0", "2 or more"]),
         ("search=SearchEffort(steps=0)", ["search.steps is 0", "1 or more"]),
         ("search=SearchEffort(reach=1.0)", ["search.reach is 1.0", "above 1"]),
-        ("search=SearchEffort(front=FrontEffort(designs=0))", ["search.front.designs is 0", "10 or more"]),
-        ("search=SearchEffort(front=FrontEffort(population=1))", ["search.front.population is 1", "4 or more"]),
+        ("front_steps=0", ["front_steps is 0", "1 or more"]),
+        ("front_limits=(0.9, 3.0)", ["front_limits is (0.9, 3.0)", "between 0.5 and 2"]),
     ],
 )
 def test_an_effort_that_makes_no_sense_is_refused(tmp_path, effort, words):
@@ -359,7 +319,7 @@ def test_zones_that_cannot_be_had_are_refused(tmp_path, columns, options, words)
 
 def refused_here(options: dict[str, object], *words: str) -> None:
     """Nothing is made, and the reason is one sentence for every fault, with these words."""
-    defaults = {"limit": None, "yield_target": None, "grades": False, "seed": None, "checkpoint": None}
+    defaults = {"limit": None, "yield_target": None, "grades": False, "seed": None}
     with pytest.raises(TolallocError) as caught:
         allocate(**{**defaults, **options})
     said = str(caught.value)

@@ -40,13 +40,10 @@ EFFORT = """effort=ta.Effort(
         units=1024, sobol=SobolEffort(start=64, limit=64), derivative_units=64,
         inverse_units=926, surrogate_units=96, level_units=100, level_runs=2, widened_units=200, permutations=10),
     allocation=AllocationEffort(
-        verification_units=1152, confirmation_units=2304, shared_units=48, exact_points=8, share_blocks=8,
-        search=SearchEffort(steps=2, front=FrontEffort(
-            population=8, generations=4, population_on_kernel=8, generations_on_kernel=2, designs=10, rounds=1,
-            points=3))),
+        verification_units=1152, confirmation_units=2304, shared_units=48, share_blocks=8,
+        front_limits=(0.95, 1.1), front_steps=1, search=SearchEffort(steps=2)),
     is_quick=True), questions=[ta.Ranking(), ta.Allocation(fixed_first=False, what_if=False)]"""
 EFFORTS = """from tolalloc.allocation.space.effort import AllocationEffort
-from tolalloc.allocation.space.effort import FrontEffort
 from tolalloc.allocation.space.effort import SearchEffort
 from tolalloc.sensitivity.effort import RankingEffort
 from tolalloc.sensitivity.effort import SobolEffort

@@ -22,7 +22,7 @@ from tolalloc.cli.main import app
 
 PAGES = ("README.md", *sorted(str(path.relative_to(ROOT)) for path in (ROOT / "docs").rglob("*.md")))
 COMMANDS = get_command(app).commands
-WRITES = ("--out", "--write", "--profile", "--checkpoint")
+WRITES = ("--out", "--write", "--profile")
 """Options that name what a command makes."""
 MINUTES = ("run", "rank", "allocate", "series", "open", "diagnose", "simulate", "mount", "compare")
 """Commands that take minutes, wait for a person, or read what these have made."""

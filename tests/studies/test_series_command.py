@@ -182,10 +182,3 @@ def test_what_reads_a_file_is_run_again_and_says_why(tmp_path):
         "one is run again: whether the model of study one is the same as before is not known: io.open may look at"
     )
     assert [sentence in own for own in said] == [False, True, True]
-    run = tolalloc(
-        "run", path, "--only", "allocation", "--checkpoint", tmp_path / "kept.npz", "--out", tmp_path / "run"
-    )
-    assert run.returncode == 0 and "kept.npz is neither read nor written: whether the model" in " ".join(
-        run.stderr.split()
-    )
-    assert not (tmp_path / "kept.npz").exists()

@@ -191,7 +191,7 @@ def test_public_records_have_examples():
 class Own(ta.Question):
     kind = "own"
 
-    def answer(self, prepared, record, checkpoint):
+    def answer(self, prepared, record):
         return prepared
 
 

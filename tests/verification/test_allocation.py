@@ -14,7 +14,6 @@ from tests import builders
 from tolalloc import LOST_MOTION, PEAK_TO_PEAK
 from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.cost.model import Process, Reciprocal
-from tolalloc.allocation.front.pareto_front import exact_front
 from tolalloc.allocation.search.steering import Programs
 from tolalloc.allocation.search.zone_allocation import aimed, allocate, kept_stacks, scale_in_proportion
 from tolalloc.allocation.space.effort import SearchEffort
@@ -361,10 +360,12 @@ def test_the_bound_and_the_price_are_those_of_the_chosen_models(prepared):
     assert 0.1 < price < 10
     assert found.optimum.bound_prices.min() >= -1e-6
     assert found.optimum.cost <= found.inside.cost
-    shares = np.array([0.999, 1.0, 1.001])
-    stacks = kept_stacks(found.chosen, found.tried, margin=0.0)
-    front = exact_front(verifier.space, stacks, found.limit, shares)
-    assert front.cost[1] == pytest.approx(found.optimum.cost, rel=1e-6)
-    np.testing.assert_allclose(front.bound, front.cost, rtol=1e-6)
-    slope = (front.cost[0] - front.cost[2]) / (front.limits[2] - front.limits[0])
-    assert price == pytest.approx(slope, rel=0.01)
+    first, *others = kept_stacks(found.chosen, found.tried, margin=0.0)
+    change = 0.001 * found.limit
+    tight, asked, wide = (
+        process_choice.allocate(verifier.space.problem((replace(first, budget=first.budget + by), *others)))
+        for by in (-change, 0.0, change)
+    )
+    assert asked.cost == pytest.approx(found.optimum.cost, rel=1e-6)
+    assert asked.bound == pytest.approx(asked.cost, rel=1e-6)
+    assert price == pytest.approx((tight.cost - wide.cost) / (2 * change), rel=0.01)

@@ -41,12 +41,12 @@ from tolalloc.reports.tellers.allocation_workbook import cost_formula
 
 UM = 1e-6
 SEARCH = QUICK_ALLOCATION.search
-FRONT = replace(SEARCH.front, population=8, generations=2, population_on_kernel=4, designs=10, rounds=1, points=3)
 SMALL = replace(
     QUICK_ALLOCATION,
-    search=replace(SEARCH, steps=2, front=FRONT),
+    front_limits=(0.95, 1.1),
+    front_steps=1,
+    search=replace(SEARCH, steps=2),
     graded_steps=2,
-    exact_points=4,
     setting_steps=(1, 2),
     price_nodes=4,
     share_blocks=8,

@@ -19,22 +19,19 @@ from tolalloc.allocation.search.zone_allocation import ZoneAllocation
 from tolalloc.allocation.space.effort import QUICK_ALLOCATION
 from tolalloc.reports.document import Section
 from tolalloc.reports.header import Header
-from tolalloc.reports.tellers import allocation_figures as figures
 from tolalloc.reports.tellers import allocation_tables as tables
 from tolalloc.study.answer import Answer
 
 pytestmark = pytest.mark.slow  # one allocation of all limits, in a minute or two, is what all read
 
 TARGET = 0.95
-SEARCH = QUICK_ALLOCATION.search
-FRONT = replace(SEARCH.front, population=8, generations=2, population_on_kernel=4, designs=10, rounds=1, points=3)
 SMALL = replace(
     QUICK_ALLOCATION,
     verification_units=512,
     shared_units=16,
-    search=replace(SEARCH, front=FRONT),
+    front_limits=(0.95, 1.1),
+    front_steps=1,
     graded_steps=4,
-    exact_points=4,
     setting_steps=(1, 2),
     price_nodes=4,
     share_blocks=8,
@@ -67,7 +64,7 @@ def results(tmp_path_factory):
 
 def answer_of(results: AllocationResult, **changes) -> Answer[AllocationResult]:
     """Return the answer that a result is."""
-    header = Header(name="said", model=results.model.name, seed=1, quick=True, statuses=results.statuses)
+    header = Header(name="said", model=results.model.name, seed=1, quick=True)
     return Answer(kind="allocation", header=replace(header, **changes), result=results)
 
 
@@ -315,16 +312,18 @@ def test_a_trade_without_any_cost_is_said_in_words(results):
         assert "nan" not in " ".join(own.paragraphs)
 
 
-def test_the_front_says_how_sure_it_is_in_four_series_with_all_verified_designs(results):
-    front = figures.front_figure(results, results.fronts, "cost units")
-    assert says(front.title, "allocation.figure_front_others")
-    designs = results.candidates.designs("tolerances and modification")
-    assert len(front.series) == 4
-    assert list(front.series[-1].y) == [own.cost for own in designs.values()]
-    assert all(name in front.series[-1].label for name in designs)
-    assert (
-        front.series[0].label == f"cheapest by the local models (±{results.chosen.constraints[0].standard_error:.2g}″)"
-    )
+def test_the_front_is_verified_never_rises_and_has_the_drawing_on_it(results):
+    front = results.front
+    limits, cost = np.array([(own.limit, own.design.cost) for own in front.points]).T
+    assert (np.diff(limits) > 0).all() and (np.diff(cost) <= 0).all()
+    assert front.drawn in front.points and front.drawn.design is results.chosen
+    assert front.drawn.limit == results.requirements[0].limits.upper
+    assert all(own.design.met for own in front.points)
+    told = section(results, "front", output="peak-to-peak")
+    assert says(told.paragraphs, "allocation.front", units=SMALL.verification_units)
+    assert list(told.figures[0].series[0].y) == cost.tolist()
+    table = dict(told.tables)["front"]
+    assert table[""].tolist() == ["this drawing" if own is front.drawn else "" for own in front.points]
 
 
 def test_amounts_that_are_not_those_of_today_are_said_with_the_zones_on_the_first_page(results):

@@ -11,7 +11,7 @@ from tests.verification.test_process_choice import random_problem
 from tolalloc.allocation.cost.model import Exponential, PowerExponential, Process, Reciprocal, ReciprocalPower
 from tolalloc.allocation.cost.points import Points, Tabulated
 from tolalloc.allocation.search.lagrange_dual import LeastPriced
-from tolalloc.allocation.search.process_choice import allocate, front
+from tolalloc.allocation.search.process_choice import BudgetSeries, allocate
 from tolalloc.allocation.space.problem import LeastInfeasible, Solution
 
 
@@ -21,7 +21,9 @@ def test_it_is_that_of_single_searches(stacks):
     problem = random_problem(11, features=5, processes=3, stacks=stacks, worst_case=0.3 * (stacks - 1), tightness=0.5)
     first, *others = problem.stacks
     budgets = first.budget * np.array([0.01, 0.5, 0.6, 0.8, 1.0])
-    found = front(problem, 0, budgets)
+    rows, series = np.tile([own.budget for own in problem.stacks], (budgets.size, 1)), BudgetSeries(problem)
+    rows[:, 0] = budgets
+    found = [series.allocate(row) for row in rows]
     for budget, own in zip(budgets.tolist(), found, strict=True):
         alone = allocate(replace(problem, stacks=(replace(first, budget=budget), *others)))
         assert type(own) is type(alone)

@@ -7,8 +7,7 @@ import json
 import pytest
 
 import tolalloc as ta
-from tests.builders import page_of, says
-from tolalloc.allocation.drawing_question import DrawingQuestion
+from tests.builders import page_of
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.study.questions import Allocation
 
@@ -26,14 +25,14 @@ def gap(housing, shaft, ring):
     return housing - shaft - ring
 
 
-def study(front=False) -> ta.Study:
+def study() -> ta.Study:
     row = {"unit": "mm", "plus": 0.02, "minus": -0.02, "min": 0.005, "max": 0.2, "cost": 1}
     sizes = {"housing": 30.1, "shaft": 25.0, "ring": 5.0}
     return ta.Study(
         ta.model(gap, inputs=tuple(sizes), outputs=(GAP,)),
         ta.Drawing.of_rows([{"id": name, "nominal": size, **row} for name, size in sizes.items()]),
         limits={GAP: ta.Limit(upper=0.35, show=ta.AtYield(target=0.99))},
-        questions=[ta.Ranking(), ta.Allocation(front=front, what_if=False)],
+        questions=[ta.Ranking(), ta.Allocation(front=False, what_if=False)],
         name="narrow",
         effort=EFFORT,
     )
@@ -91,14 +90,3 @@ def test_nothing_stays_where_the_first_question_has_no_answer(tmp_path, monkeypa
     with pytest.raises(SolveError, match=r"^gap: no ranking\.$"):
         study().run(tmp_path / "run")
     assert not (tmp_path / "run").exists()
-
-
-@pytest.mark.slow
-def test_a_front_that_cannot_be_found_leaves_the_drawing(monkeypatch):
-    def fails(*_):
-        raise SolveError("Too many designs of the front failed.")
-
-    monkeypatch.setattr(DrawingQuestion, "fronts", fails)
-    answer = study(front=True).allocate()
-    assert answer.result.met and answer.result.fronts is None
-    assert says(answer.warnings, "allocation.front_lacks", why="Too many designs of the front failed.")

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice, YieldLadder, best_yield
-from tolalloc.allocation.front.pareto_front import Fronts, exact_front, searched_front
+from tolalloc.allocation.front.cost_front import CostFront, FrontSearch
 from tolalloc.allocation.front.uncertain_region import doubted
 from tolalloc.allocation.front.what_if import (
     QuantileResponse,
@@ -31,13 +30,13 @@ from tolalloc.allocation.search.steering import explained_by
 from tolalloc.allocation.search.zone_allocation import (
     ZoneAllocation,
     allocate,
-    kept_stacks,
     promised,
     require_groups,
     scale_in_proportion,
 )
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import AllocationEffort
+from tolalloc.allocation.space.joint_yield import JointRequirement
 from tolalloc.allocation.space.requirement import Requirement
 from tolalloc.allocation.verify.acceptance import (
     AS_GOOD_AS,
@@ -50,11 +49,11 @@ from tolalloc.allocation.verify.acceptance import (
 )
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, cheapest_met
 from tolalloc.capability.experiment import Experiment
+from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import KeptLimits
 from tolalloc.drawings.compensators import Compensator, assembly_cost, choice_label
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.exceptions import ConstantOutputError, FailedUnitsError, InputError, SolveError
-from tolalloc.models.checkpoint import CachedResponse, Checkpoint
+from tolalloc.exceptions import ConstantOutputError, FailedUnitsError, InputError
 from tolalloc.models.model import Model, is_fast
 from tolalloc.running.chunks import one_blas_thread
 from tolalloc.running.progress import RunRecord
@@ -66,8 +65,6 @@ _EXAMINED = 1000
 """Random units of the drawing that tell whether it can be built [-]."""
 _COUNTED = 2**15
 """Most random units whose failures a proven bound counts [-]."""
-_EXACT = (0.85, 1.25)
-"""Ends of the exact front over the limit asked for [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -351,24 +348,30 @@ class DrawingQuestion:
         quantile = replace(self.quantile(free.chosen.spread), space=self._at_ratios_of(free.chosen))
         return setting_trade(quantile, free, values)
 
-    def fronts(self, found: ZoneAllocation | GradedAllocation, checkpoint: Checkpoint | None) -> Fronts:
-        """Return what can be had at which cost, around the design that is drawn and on its ladders, if it has any."""
-        drawn, graded = found.chosen, found if isinstance(found, GradedAllocation) else None
-        space, ladders = (graded.space, graded.scales) if graded else (self._at_ratios_of(drawn), {})
-        effort = self.effort.search.front
+    def cost_front(self, found: Candidates) -> CostFront:
+        """Return what other limits of the leading output cost, around the drawing, on its ladders if it has any."""
+        drawn, graded = found.drawn, found.graded is not None and found.drawn is found.graded.chosen
+        space, limit = self._at_ratios_of(drawn), float(self.requirements[0].limits.upper or 0.0)
+        search = FrontSearch(
+            verifier_of=lambda upper: replace(
+                self.verifier(f"front {upper:.9g}", space), requirements=self._limited_to(upper)
+            ),
+            steps=self.effort.front_steps,
+            reach=self.effort.search.reach,
+            graded_steps=self.effort.front_steps * graded,
+        )
         # Where the limit is out of reach, the front lies around what is kept instead.
-        around = max(1.0, min(drawn.quantile_bound, float(drawn.sample.values.max())) / drawn.constraints[0].limit)
-        stacks, shares = kept_stacks(drawn, found.tried, margin=0.0), np.linspace(*_EXACT, self.effort.exact_points)
-        exact = exact_front(space, stacks, around * drawn.constraints[0].limit, shares)
-        # The searches begin with the same designs, and share what the kernel says of them.
-        kernel = CachedResponse(replace(self.quantile(drawn.spread), space=space), checkpoint)
-        further = [()] if not space.settings else [(), (space.settings[-1].name,)]
-        searched = [
-            searched_front(space, kernel, drawn, stacks, exact, self.seeds("front"), effort, ladders, own)
-            for own in further
-        ]
-        third = searched[1][0] if len(searched) > 1 else None
-        return Fronts(exact=exact, searched=searched[0][0], with_setting=third, score=searched[0][1])
+        kept = limit if drawn.met else max(limit, min(drawn.quantile_bound, float(drawn.sample.values.max())))
+        return search.around(drawn, kept, self.effort.front_limits)
+
+    def _limited_to(self, upper: float) -> tuple[Requirement, ...]:
+        """Return what must be kept with another limit of the leading output."""
+        leading, *others = self.requirements
+        alone = (replace(leading, limits=Limits(upper=upper)), *others)
+        last = others[-1] if others else None
+        if not isinstance(last, JointRequirement):
+            return alone
+        return (*alone[:-1], JointRequirement.of(alone[:-1], last.guarantee))
 
     def robustness(self, free: ZoneAllocation, graded: GradedAllocation | None) -> Robustness:
         """Return the answers under changed assumptions."""
@@ -404,9 +407,7 @@ class DrawingQuestion:
         return self.model.at(design.settings).examined(units)
 
 
-def allocate_drawing(
-    question: DrawingQuestion, record: RunRecord, name: str, digest: str = "", checkpoint: Path | None = None
-) -> AllocationResult:
+def allocate_drawing(question: DrawingQuestion, record: RunRecord, name: str) -> AllocationResult:
     """Return the cheapest drawing that keeps the requirements.
 
     Parameters
@@ -417,10 +418,6 @@ def allocate_drawing(
         Keeps statuses and times.
     name
         Name of the study.
-    digest
-        Of what was asked, so that a checkpoint of another question is not gone on from.
-    checkpoint
-        File that keeps the answers of the search for the front, so that an interrupted run goes on from them.
 
     Notes
     -----
@@ -429,9 +426,7 @@ def allocate_drawing(
     asked by `DrawingQuestion.accepted`); then what else can be had is asked around it (`tolalloc.allocation.front`).
     """
     question.require_answerable()
-    kept = Checkpoint(path=checkpoint, every=4, question=digest) if checkpoint else None
-    fixed = graded = trade = fronts = robust = None
-    front_lacks = ""
+    fixed = graded = trade = front = robust = None
     with one_blas_thread():
         if question.fixed_first and question.space.settings:
             with record.stage("tolerances alone"):
@@ -453,15 +448,9 @@ def allocate_drawing(
         if question.what_if:
             with record.stage("modification trade"):
                 trade = question.trade(free)
-        before = record.counts
         if question.front and question.limits_one_side_above:
-            with record.stage("fronts"):
-                try:
-                    fronts = question.fronts(graded or free, kept)
-                except SolveError as error:  # the drawing is verified, and is an answer without it
-                    front_lacks = str(error)
-        # What a checkpoint knew is not solved again: these units tell how the run went and not what was found.
-        searched = {outcome: count - before[outcome] for outcome, count in record.counts.items()}
+            with record.stage("front"):
+                front = question.cost_front(Candidates(fixed=fixed, free=free, graded=graded))
         if question.what_if:
             with record.stage("robustness"):
                 robust = question.robustness(free, graded)
@@ -471,7 +460,6 @@ def allocate_drawing(
             shares = question.shares(chosen.space, chosen.design)
         with record.stage("units of the drawing"):
             examination = question.examined(chosen)
-    statuses = {outcome: count - searched[outcome] for outcome, count in record.counts.items()}
     return AllocationResult(
         name=name,
         model=question.model,
@@ -482,14 +470,12 @@ def allocate_drawing(
         graded=graded,
         shares=shares,
         trade=trade,
-        fronts=fronts,
-        front_lacks=front_lacks,
+        front=front,
         robustness=robust,
         prices=question.prices(free),
         loss=question.quality_loss,
         error=question.effort.error,
         examination=examination,
-        statuses=statuses,
         proven=proven,
     )
 
@@ -533,16 +519,14 @@ class AssembledQuestion:
         return KeptLimits.of(response(units), response.outputs, limits)
 
 
-def allocate_assembled(
-    asked: AssembledQuestion, record: RunRecord, name: str, digest: str = "", checkpoint: Path | None = None
-) -> AllocationResult:
+def allocate_assembled(asked: AssembledQuestion, record: RunRecord, name: str) -> AllocationResult:
     """Return the cheapest drawing over all choices, zones and assembly together.
 
     Parameters
     ----------
     asked
         What is asked, with what may be chosen.
-    record, name, digest, checkpoint
+    record, name
         As of `allocate_drawing`.
 
     Notes
@@ -552,7 +536,7 @@ def allocate_assembled(
     the drawing is asked of it alone.
     """
     if len(asked.choices) == 1 and not asked.choices[0]:
-        return allocate_drawing(asked.question, record, name, digest, checkpoint)
+        return allocate_drawing(asked.question, record, name)
     tried, starts = list[AssemblyChoice](), list[Float[np.ndarray, " variable"] | None]()
     start = None
     for acting in asked.choices:
@@ -564,7 +548,7 @@ def allocate_assembled(
         start = found.chosen.design_in(asked.question.space)
     best = min(range(len(tried)), key=lambda at: (not tried[at].met, tried[at].cost if tried[at].met else at))
     drawn = replace(asked.of(asked.choices[best]), start=starts[best])
-    found = allocate_drawing(drawn, record, name, digest, checkpoint)
+    found = allocate_drawing(drawn, record, name)
     with record.stage("parts as they come"):
         kept = asked.as_they_come(found)
     return replace(found, assembled=AssembledDrawing(choices=tuple(tried), chosen=best, as_they_come=kept))

@@ -10,7 +10,7 @@ import numpy as np
 
 from tolalloc.allocation.cost.process_costs import today
 from tolalloc.allocation.cost.unit_price import QualityLoss, YieldLadder
-from tolalloc.allocation.front.pareto_front import Fronts
+from tolalloc.allocation.front.cost_front import CostFront
 from tolalloc.allocation.front.what_if import Robustness, SettingTrade
 from tolalloc.allocation.search.candidates import Candidates
 from tolalloc.allocation.search.discrete import GradedAllocation
@@ -101,16 +101,13 @@ class AllocationResult:
     # all units
     shares: SourceIndices | None
     trade: SettingTrade | None  # Cost of the cheapest zones over the settings, if asked for
-    fronts: Fronts | None  # What can be had at which cost, if asked for
+    front: CostFront | None  # What other limits of the leading output cost, if asked for
     robustness: Robustness | None  # Answers under changed assumptions, if asked for
     # Price of a good unit over yield targets, if the question states what becomes of the others
     prices: YieldLadder | None
     loss: QualityLoss | None  # What the leading output costs a user, if the question states it
     error: float  # Probability up to which the answer may call a design met that misses a limit [-]
     examination: Mapping[str, float]  # What the model counted of random units of the drawing, units in the names
-    # Outcome → number of units that were solved for the answer, without those that the front was searched with [-]
-    statuses: Mapping[str, int]
-    front_lacks: str = ""  # Why it could not be found although it was asked for; empty otherwise
     # What was compared of the ways to choose parts at assembly, if the question names any
     assembled: AssembledDrawing | None = None
     proven: ProvenBound | None = None  # What no drawing with free zones costs less than on the real model, if asked for

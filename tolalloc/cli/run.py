@@ -29,9 +29,6 @@ Out = Annotated[
     Path | None, typer.Option(help="Run folder, new or empty; the next one of runs/NAME, runs/NAME-2, … unless given.")
 ]
 Fresh = Annotated[bool, typer.Option("--fresh", help="Solve again what runs beside this one have solved and kept.")]
-Kept = Annotated[
-    Path | None, typer.Option(help="File that keeps the search for the front; an interrupted run goes on from it.")
-]
 
 Scheduler = Annotated[
     str,
@@ -52,7 +49,6 @@ def run(
     quick: Quick = False,
     seconds: Seconds = None,
     seed: Seed = None,
-    checkpoint: Kept = None,
     out: Out = None,
     fresh: Fresh = False,
     scheduler: Scheduler = "",
@@ -68,7 +64,6 @@ def run(
         study,
         kinds,
         _Place.of(out, study.name),
-        checkpoint,
         _Way(fresh, scheduler, paper if pdf else "", verbose, as_json),
     )
 
@@ -89,7 +84,7 @@ def rank(
     """Tell which error drives which output, which order and the rejects: short for run --only ranking."""
     study = _asked(script, quick, seconds, seed)
     place = _Place.of(out, f"{study.name}-rank")
-    _run(study, ("ranking",), place, None, _Way(fresh, scheduler, paper if pdf else "", verbose, as_json))
+    _run(study, ("ranking",), place, _Way(fresh, scheduler, paper if pdf else "", verbose, as_json))
 
 
 def allocate(
@@ -106,7 +101,6 @@ def allocate(
     quick: Quick = False,
     seconds: Seconds = None,
     seed: Seed = None,
-    checkpoint: Kept = None,
     out: Out = None,
     fresh: Fresh = False,
     scheduler: Scheduler = "",
@@ -124,7 +118,7 @@ def allocate(
         graded = replace(own, grades=True) if isinstance(own, Allocation) else own
         study = replace(study, questions=(*(q for q in study.questions if q.kind != "allocation"), graded))
     place = _Place.of(out, f"{study.name}-allocate")
-    _run(study, ("allocation",), place, checkpoint, _Way(fresh, scheduler, paper if pdf else "", verbose, as_json))
+    _run(study, ("allocation",), place, _Way(fresh, scheduler, paper if pdf else "", verbose, as_json))
 
 
 def _asked(script: Path, quick: bool, seconds: float | None, seed: int | None) -> Study:
@@ -206,7 +200,7 @@ class _Place:
                     say(sentence)
 
 
-def _run(study: Study, kinds: tuple[str, ...], place: _Place, checkpoint: Path | None, way: _Way) -> None:
+def _run(study: Study, kinds: tuple[str, ...], place: _Place, way: _Way) -> None:
     """Run some questions of a study, write its folder and say the answers."""
     from tolalloc.reports.pdf import require_printable, write_pdf
     from tolalloc.study.questions import questions_of
@@ -220,7 +214,7 @@ def _run(study: Study, kinds: tuple[str, ...], place: _Place, checkpoint: Path |
     announce_kernel(study.model)
     try:
         with solvers(way.scheduler) as solved_by, shown_progress() as progress:
-            found = run_study(study, folder, questions, progress, checkpoint, fresh=way.fresh, solved_by=solved_by)
+            found = run_study(study, folder, questions, progress, fresh=way.fresh, solved_by=solved_by)
     except KeyboardInterrupt:
         kept = cache_beside(folder).folder
         what = f"Solved units are kept in {kept}; the same command goes on from there."

@@ -144,7 +144,6 @@ GLOSSARY = {
     "independent verification sample": "Random units that no search has used, on which the drawing is judged.",
     "lift": "How much larger the deviations are among the units beyond a limit than among all units.",
     "lost motion": "How far the output turns while the torque goes from +3 % to −3 % of the rated torque.",
-    "NSGA-II": "A genetic search for designs that are each the cheapest for some limit.",
     "order": "Number of waves per turn of the output.",
     "peak-to-peak": "Largest minus smallest transmission error over one turn of the output.",
     "Ppk": "Distance of the mean from the nearer limit over three standard deviations of all units.",

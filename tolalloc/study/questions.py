@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from inspect import signature
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
 
 from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice
@@ -45,14 +44,8 @@ class Question(NamedFields, ABC):
         cls.called = f"question {getattr(cls, 'kind', cls.__name__)}"
 
     @abstractmethod
-    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any]:
-        """Return the answer.
-
-        Parameters
-        ----------
-        checkpoint
-            File that keeps an interrupted search, if one is wanted.
-        """
+    def answer(self, prepared: Prepared, record: RunRecord) -> Answer[Any]:
+        """Return the answer."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,7 +66,7 @@ class Ranking(Question):
 
     by: Annotated[str, Rule(f"{BY_DIMENSION} or {BY_SOURCE}", (BY_DIMENSION, BY_SOURCE).__contains__)] = BY_DIMENSION
 
-    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[RankingResult]:  # noqa: ARG002
+    def answer(self, prepared: Prepared, record: RunRecord) -> Answer[RankingResult]:
         """Return what drives the outputs at the zones of the drawing."""
         from tolalloc.sensitivity.measures import Measures, rank
 
@@ -114,7 +107,7 @@ class Difference(Question):
     zones: Annotated[Mapping[str, float], mapped(_ZONES, Rule("a number", is_number))]
     units: Annotated[int, whole("a whole number from 100 to 10,000,000", 100, 10_000_000)] = 1024
 
-    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any]:  # noqa: ARG002
+    def answer(self, prepared: Prepared, record: RunRecord) -> Answer[Any]:
         """Return both drawings on the same units."""
         from tolalloc.allocation.difference import difference
 
@@ -170,7 +163,7 @@ class Allocation(Question):
     quality_loss: Annotated[QualityLoss | None, or_none(a(QualityLoss, "QualityLoss(...) or None"))] = None
     boxes: Annotated[int, whole("a whole number from 0 to 10,000,000", 0, 10_000_000)] = 0
 
-    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any]:
+    def answer(self, prepared: Prepared, record: RunRecord) -> Answer[Any]:
         """Return the cheapest drawing."""
         from tolalloc.allocation.drawing_question import AssembledQuestion, DrawingQuestion, allocate_assembled
 
@@ -191,13 +184,8 @@ class Allocation(Question):
             boxes=self.boxes,
             place=prepared.place,
         )
-        if checkpoint and prepared.unknown:
-            record.progress.tell(f"The checkpoint {checkpoint} is neither read nor written: {prepared.unknown}.")
-            checkpoint = None
         asked = AssembledQuestion(question=question, choices=prepared.assemblies)
-        found = allocate_assembled(asked, record, study.name, prepared.header.digest, checkpoint)
-        answer = _answer(self.kind, prepared.header, record, found)
-        return replace(answer, header=replace(answer.header, statuses=found.statuses))
+        return _answer(self.kind, prepared.header, record, allocate_assembled(asked, record, study.name))
 
 
 @dataclass(frozen=True)
@@ -217,7 +205,7 @@ class Calculation(Question):
 
     build: Callable[..., Document]
 
-    def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any]:  # noqa: ARG002
+    def answer(self, prepared: Prepared, record: RunRecord) -> Answer[Any]:
         """Return what the function made."""
         study = prepared.study
         with record.stage(study.name):

@@ -149,7 +149,6 @@ class Study(Problem):
         question: Question | str,
         effort: Literal["quick", "full"] | Effort | None = None,
         progress: Progress | None = None,
-        checkpoint: Path | None = None,
     ) -> Answer[Any]:
         """Return the answer to one question, of this study or any other.
 
@@ -161,13 +160,11 @@ class Study(Problem):
             ``quick``, ``full`` or numbers; the study's own if none is given.
         progress
             Told how far the work has come; silent unless given.
-        checkpoint
-            File that keeps an interrupted search, if one is wanted.
         """
         if isinstance(question, str):
             question = questions_of((question,), tuple(self.questions), self.place)[0]
         prepared = Prepared(study=self.with_effort(effort))
-        return question.answer(prepared, _record(prepared, question, progress), checkpoint)
+        return question.answer(prepared, _record(prepared, question, progress))
 
     def rank(
         self, effort: Literal["quick", "full"] | Effort | None = None, progress: Progress | None = None
@@ -221,7 +218,6 @@ def run(
     folder: Path,
     questions: tuple[Question, ...] = (),
     progress: Progress | None = None,
-    checkpoint: Path | None = None,
     *,
     fresh: bool = False,
     solved_by: Mapper = map,
@@ -230,7 +226,7 @@ def run(
 
     On an error nothing stays behind, but for what earlier questions answered, whose report says what is missing.
 
-    Progress and checkpoint are as of `Study.ask`. Solved units are kept beside the folder, in `cache_beside`, and a
+    Progress is as of `Study.ask`. Solved units are kept beside the folder, in `cache_beside`, and a
     run that was stopped takes them from there, unless it is to begin afresh. All others are solved by a mapper: this
     process unless given.
 
@@ -243,7 +239,7 @@ def run(
     kept = replace(cache_beside(folder), solved_by=solved_by).pruned()
     prepared = Prepared(study=study, mapper=solved_by if fresh else kept)
     with claimed(folder) as beside:
-        answers, fault = _answers(prepared, asked, progress, checkpoint)
+        answers, fault = _answers(prepared, asked, progress)
         from tolalloc.reports.writer import write_document
 
         if progress:
@@ -262,7 +258,7 @@ def run(
 
 
 def _answers(
-    prepared: Prepared, asked: tuple[Question, ...], progress: Progress | None, checkpoint: Path | None
+    prepared: Prepared, asked: tuple[Question, ...], progress: Progress | None
 ) -> tuple[dict[str, Answer[Any]], TolallocError | None]:
     """Return the answer to every question, and what ended one if an earlier one is answered.
 
@@ -274,7 +270,7 @@ def _answers(
         if "limits" in question.reads:
             record.opening, opening = opening, None
         try:
-            answers[question.kind] = question.answer(prepared, record, checkpoint)
+            answers[question.kind] = question.answer(prepared, record)
         except (InputError, SolveError) as fault:
             if not answers:
                 raise

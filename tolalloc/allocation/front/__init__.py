@@ -1,1 +1,1 @@
-"""What else can be had at which cost: Pareto fronts, the worth of settings and yields, robustness."""
+"""What else can be had at which cost: the front, the worth of settings and yields, robustness."""

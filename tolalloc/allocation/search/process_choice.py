@@ -50,15 +50,6 @@ def allocate(problem: AllocationProblem, most_nodes: int = 500) -> Solution | Le
     return _BranchAndBound(problem).answer(most_nodes)
 
 
-def front(
-    problem: AllocationProblem, at: int, budgets: Float[np.ndarray, " point"], most_nodes: int = 500
-) -> tuple[Solution | LeastInfeasible, ...]:
-    """Return what `allocate` finds for every budget of the stack at a position."""
-    series, rows = BudgetSeries(problem), np.tile([stack.budget for stack in problem.stacks], (budgets.size, 1))
-    rows[:, at] = budgets
-    return tuple(series.allocate(row, most_nodes) for row in rows)
-
-
 class BudgetSeries:
     """Allocations of one problem at other budgets of its stacks.
 

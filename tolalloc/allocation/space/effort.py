@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from typing import Annotated, ClassVar
 
 from tolalloc.reading.named_fields import NamedFields, Rule, a, each, number, whole
-from tolalloc.sensitivity.surrogate import validation
 
 FEWEST_FOR_YIELD = 1152
 """Units of a design in the shortest run: 1,109 just show the usual yield, 99.73 %, with 95 % confidence [-]."""
@@ -20,36 +19,6 @@ def _least(fewest: int) -> Rule:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FrontEffort(NamedFields):
-    """How much the search for the front may spend.
-
-    Parameters
-    ----------
-    population, generations
-        Size of the search on the surrogate [-].
-    population_on_kernel, generations_on_kernel
-        The same where the surrogate does not earn its place and the kernel itself runs [-].
-    designs
-        Designs around the chosen one that the first surrogate learns from [-].
-    rounds
-        Searches, each followed by kernel runs along its front that improve the next surrogate [-].
-    points
-        Kernel runs along the front after each search [-].
-    """
-
-    called: ClassVar[str] = "effort of a front"
-    written_in: ClassVar[tuple[str, str]] = ("study", "effort.allocation.search.front.")
-
-    population: Annotated[int, _least(4)] = 80
-    generations: Annotated[int, _least(1)] = 100
-    population_on_kernel: Annotated[int, _least(4)] = 20
-    generations_on_kernel: Annotated[int, _least(1)] = 3
-    designs: Annotated[int, _least(validation.FEWEST_OF_FOLD * validation.FOLDS)] = 36
-    rounds: Annotated[int, _least(1)] = 2
-    points: Annotated[int, _least(2)] = 12
-
-
-@dataclass(frozen=True, kw_only=True)
 class SearchEffort(NamedFields):
     """How much the search may spend.
 
@@ -59,8 +28,6 @@ class SearchEffort(NamedFields):
         Largest number of verified steps of each search [-].
     reach
         Factor by which a scale may change in the first step; later ones reach less [-].
-    front
-        Effort of the Pareto front.
     """
 
     called: ClassVar[str] = "effort of a search"
@@ -68,7 +35,6 @@ class SearchEffort(NamedFields):
 
     steps: Annotated[int, _least(1)] = 8
     reach: Annotated[float, number("a number above 1", above=1)] = 2.5
-    front: Annotated[FrontEffort, a(FrontEffort)] = field(default_factory=FrontEffort)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,8 +54,10 @@ class AllocationEffort(NamedFields):
         Effort of the searches.
     graded_steps
         Largest number of verified choices of grades [-].
-    exact_points
-        Limits of the exact front of the local models [-].
+    front_limits
+        Limits of the leading output for which the cheapest drawing is looked for too, over the limit asked for [-].
+    front_steps
+        Largest number of verified steps, and of choices of grades, at each of them [-].
     setting_steps
         Values of each of the last settings for which the cheapest zones are looked for, one number for each [-].
     price_nodes
@@ -120,7 +88,10 @@ class AllocationEffort(NamedFields):
     shared_units: Annotated[int, _least(2)] = 256
     search: Annotated[SearchEffort, a(SearchEffort)] = field(default_factory=SearchEffort)
     graded_steps: Annotated[int, _least(1)] = 8
-    exact_points: Annotated[int, _least(2)] = 50
+    front_limits: Annotated[
+        tuple[float, ...], each("one number or more between 0.5 and 2", number("", least=0.5, most=2), fewest=1)
+    ] = (0.85, 0.9, 0.95, 1.05, 1.1, 1.2)
+    front_steps: Annotated[int, _least(1)] = 2
     setting_steps: Annotated[tuple[int, ...], each("whole numbers, 1 or more", whole("", 1))] = (5, 6)
     price_nodes: Annotated[int, _least(1)] = 100
     stiffness_units: Annotated[int, _least(100)] = 2048
@@ -183,12 +154,10 @@ QUICK_ALLOCATION = AllocationEffort(
     verification_units=2304,
     confirmation_units=4608,
     shared_units=48,
-    search=SearchEffort(
-        steps=4,
-        front=FrontEffort(population=40, generations=40, population_on_kernel=8, designs=16, rounds=1, points=6),
-    ),
+    search=SearchEffort(steps=4),
     graded_steps=3,
-    exact_points=20,
+    front_limits=(0.9, 0.95, 1.1, 1.2),
+    front_steps=1,
     setting_steps=(2, 3),
     price_nodes=12,
     stiffness_units=1152,

@@ -135,7 +135,7 @@ class Job:
 
 def _found(answer: Any, settings: tuple[str, ...]) -> dict[str, Any]:
     """Return what the page takes over of an answer: shares of the sources, or the zones of the cheapest drawing."""
-    from tolalloc.reports.figure import chart, numbers
+    from tolalloc.reports.figure import chart
 
     first = next(iter(answer.figures.values()), None)
     drawn = {"figure": chart(first)} if first else {}
@@ -145,9 +145,9 @@ def _found(answer: Any, settings: tuple[str, ...]) -> dict[str, Any]:
     zones = {own.name: own.zone / MICROMETRE for own in result.drawn_sources if own.zone > 0}
     chosen = {name: float(answer.summary[name]) for name in settings if answer.summary.get(name) is not None}
     found = {"met": bool(result.met), "cost": float(result.cost), "zones": zones, "settings": chosen}
-    if result.fronts:  # Cost against the leading output's limit, as far as the question asked for it
-        exact = result.fronts.exact
-        found["front"] = {"x": numbers(exact.limits), "y": numbers(exact.cost)}
+    if result.front:  # Cost against the leading output's limit, as far as the question asked for it
+        points = result.front.points
+        found["front"] = {"x": [own.limit for own in points], "y": [own.design.cost for own in points]}
     return {**drawn, **found}
 
 

@@ -95,6 +95,7 @@ class AllocationTeller(Teller[AllocationResult]):
         return (
             self._today,
             Section(heading=_say("heading_risks"), paragraphs=risks(result), first=True),
+            *self._front,
             self._dimensions,
             *assembly_section(result, unit),
             Section(
@@ -140,6 +141,21 @@ class AllocationTeller(Teller[AllocationResult]):
         )
 
     @property
+    def _front(self) -> tuple[Section, ...]:
+        """The first page: what other limits cost."""
+        result, unit, front = self.result, self.header.cost_unit, self.result.front
+        if front is None:
+            return ()
+        section = Section(
+            heading=_say("heading_front", output=short(result.leading)),
+            paragraphs=texts.front(result, front),
+            figures=(figures.front_figure(result, front, unit),),
+            tables=(("front", tables.front_frame(result, front, unit)),),
+            first=True,
+        )
+        return (section,)
+
+    @property
     def _dimensions(self) -> Section:
         """The first page: what to write, a line per dimension."""
         result = self.result
@@ -175,14 +191,12 @@ class AllocationTeller(Teller[AllocationResult]):
     @property
     def _optimality(self) -> Section:
         """How far from optimal the drawing can be."""
-        result, unit, fronts = self.result, self.header.cost_unit, self.result.fronts
+        result, unit = self.result, self.header.cost_unit
         return Section(
             heading=_say("heading_optimality"),
             paragraphs=(_say("bound"), _say("bounds_table")),
-            figures=(figures.front_figure(result, fronts, unit),) if fronts else (),
             tables=(
                 ("certificate", tables.certificate_frame(result, unit)),
-                *(tables.front_frames(result, fronts, unit) if fronts else ()),
                 ("bounds by process and table", tables.bounds_frame(result, unit)),
             ),
         )

@@ -5,15 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from tolalloc.allocation.front.pareto_front import Fronts
 from tolalloc.allocation.front.what_if import SettingTrade
 from tolalloc.allocation.result import AllocationResult
-from tolalloc.allocation.space.requirement import AtYield
 from tolalloc.reading.units import unit_of
 from tolalloc.reports.figure import Figure, HeatMap, Series
-from tolalloc.reports.tellers.allocation_sentences import designs
 from tolalloc.reports.templates import Sentences
-from tolalloc.reports.wording import number, quantity, short, with_unit
+from tolalloc.reports.wording import quantity, short, with_unit
 
 _say = Sentences("allocation")
 
@@ -39,31 +36,20 @@ def units_figure(result: AllocationResult) -> Figure:
     )
 
 
-def front_figure(result: AllocationResult, fronts: Fronts, cost_unit: str) -> Figure:
-    """Return cost against what is kept of the leading output."""
-    limit, leading, guarantee = result.free.limit, result.leading, result.requirements[0].guarantee
-    error = with_unit(f"{result.chosen.constraints[0].standard_error:.2g}", leading)
-    by = f" by {number(guarantee.target, '.2%')} of units" if isinstance(guarantee, AtYield) else ""
-    searched, exact = fronts.searched, fronts.exact
-    checked = ~np.isnan(searched.on_kernel)
-    others = _say("figure_front_others") if len(result.requirements) > 1 else ""
-    compared = designs(result)
+def front_figure(result: AllocationResult, front: CostFront, cost_unit: str) -> Figure:
+    """Return cost against the limit of the leading output."""
+    leading, points, drawn = result.leading, front.points, front.drawn
     return Figure(
         name="front",
-        title=_say("figure_front", limit=with_unit(f"{limit:g}", leading), others=others),
-        x_label=f"{short(leading)} kept{by} [{unit_of(leading)}]",
+        title=_say("figure_front"),
+        x_label=f"{short(leading)} limit [{unit_of(leading)}]",
         y_label=f"cost [{cost_unit}]",
         series=(
-            Series.line(f"cheapest by the local models (±{error})", exact.limits, exact.cost),
-            Series.line("NSGA-II, by its surrogate", searched.quantile, searched.cost),
-            Series.points("NSGA-II, solved with the full model", searched.on_kernel[checked], searched.cost[checked]),
-            Series.points(
-                _say("figure_front_designs", names=", ".join(compared)),
-                [design.quantile_bound for design in compared.values()],
-                [design.cost for design in compared.values()],
+            Series.line(
+                _say("figure_front_verified"), [own.limit for own in points], [own.design.cost for own in points]
             ),
+            Series.points(_say("front_here"), [drawn.limit], [drawn.design.cost]),
         ),
-        vertical=((limit, ""),),  # a label would stand among the legend's
     )
 
 

@@ -26,7 +26,6 @@ from tolalloc.reports.tellers.allocation_assembly import assembly_cost_sentences
 from tolalloc.reports.tellers.check import MORE_PARTS, few_parts, interval_gaps
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import QUICK_RUN, enumerated, number, quantity, short, with_unit
-from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
 
 _NOTHING = 1e-3
 """Price of a whole limit, over the cost, below which it costs nothing [-]."""
@@ -504,15 +503,19 @@ def warnings(result: AllocationResult, header: Header) -> tuple[str, ...]:
     found += [f"{own.sentence}." for own in result.space.settings if own.out_of_bounds]
     fault = examined(result).fault or ""
     found += [own for own in portrait_of(result.model).cautions(chosen.settings) if own not in fault]
-    if result.front_lacks:
-        found.append(_say("front_lacks", why=result.front_lacks))
-    if result.fronts and not result.fronts.score.q2 >= NEEDED_Q2:
-        found.append(_say("surrogate"))
-    if result.fronts and (lost := result.fronts.searched.failed):
-        found.append(_say("front_failed_one" if lost == 1 else "front_failed_many", count=lost))
     if failed := header.failed:
         found.append(_say("failed_one" if failed == 1 else "failed_many", count=failed))
     return tuple(found)
+
+
+def front(result: AllocationResult, found: CostFront) -> tuple[str, ...]:
+    """Return how the costs of other limits were found."""
+    units = next((own.design.joint.units for own in found.points if own is not found.drawn), 0)
+    said = [_say("front", units=units)] if units else []
+    if found.missed:
+        missed = ", ".join(with_unit(f"{own:.4g}", result.leading) for own in found.missed)
+        said.append(_say("front_missed", limits=missed))
+    return tuple(said)
 
 
 def assumptions(result: AllocationResult, header: Header) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from tolalloc.allocation.cost.unit_price import YieldLadder
-from tolalloc.allocation.front.pareto_front import Front, Fronts
+from tolalloc.allocation.front.cost_front import CostFront
 from tolalloc.allocation.front.uncertain_region import UncertainRegion
 from tolalloc.allocation.front.what_if import Robustness, SettingTrade
 from tolalloc.allocation.result import AllocationResult, limit_price, solver_noise, unit_quantile
@@ -233,34 +233,18 @@ def bounds_frame(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     )
 
 
-def front_frames(result: AllocationResult, fronts: Fronts, cost_unit: str) -> tuple[tuple[str, pd.DataFrame], ...]:
-    """Return the exact front with its bound, and the searched ones with what the real model says of them."""
-    unit, cost = unit_of(result.leading), f"cost [{cost_unit}]"
-    kept = f"{short(result.leading)} kept, told [{unit}]"
-    groups, searched, names = len(result.drawn.groups), fronts.searched, result.drawn.shared.names
-    exact = pd.DataFrame(
+def front_frame(result: AllocationResult, front: CostFront, cost_unit: str) -> pd.DataFrame:
+    """Return what limits of the leading output cost, with the settings of each drawing."""
+    unit, points = unit_of(result.leading), front.points
+    settings = zip(result.space.shared.names, np.array([own.design.settings for own in points]).T, strict=True)
+    return pd.DataFrame(
         {
-            f"{short(result.leading)} limit [{unit}]": fronts.exact.limits,
-            cost: fronts.exact.cost,
-            f"proven for the local model [{cost_unit}]": fronts.exact.bound,
+            f"{short(result.leading)} limit [{unit}]": [own.limit for own in points],
+            f"cost [{cost_unit}]": [own.design.cost for own in points],
+            **dict(settings),
+            "": [_say("front_here") if own.limit == front.drawn.limit else "" for own in points],
         }
     )
-    found = pd.DataFrame({kept: searched.quantile, f"on the kernel [{unit}]": searched.on_kernel, cost: searched.cost})
-    for at, name in enumerate(names):
-        found[name] = searched.designs[:, groups + at]
-    found["knee"] = _knees(searched)
-    tables = (("front", exact), ("searched front", found))
-    front = fronts.with_setting
-    if front is None:
-        return tables
-    third = pd.DataFrame({cost: front.cost, kept: front.quantile, f"on the kernel [{unit}]": front.on_kernel})
-    third[names[-1]], third["knee"] = front.further[:, 0], _knees(front)
-    return (*tables, ("front with clearance", third))
-
-
-def _knees(front: Front) -> list[str]:
-    """Return where the knee of a front stands."""
-    return ["yes" if at == front.knee else "" for at in range(front.cost.size)]
 
 
 def trade_frame(trade: SettingTrade, cost_unit: str) -> pd.DataFrame:

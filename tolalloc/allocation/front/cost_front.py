@@ -1,0 +1,92 @@
+"""What a limit costs: the cheapest drawings that are verified to keep other limits of the leading output."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from tolalloc.allocation.search.discrete import allocate_grades
+from tolalloc.allocation.search.zone_allocation import step_to_optimum
+from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, cheapest_met
+from tolalloc.exceptions import FailedUnitsError, SolveError
+
+
+@dataclass(frozen=True, kw_only=True)
+class PricedLimit:
+    """A limit of the leading output, and the cheapest drawing known to keep it with all other limits."""
+
+    limit: float  # [unit of the output]
+    design: VerifiedDesign
+
+
+@dataclass(frozen=True, kw_only=True)
+class CostFront:
+    """Cost against the limit of the leading output."""
+
+    points: tuple[PricedLimit, ...]  # The tightest limit first; what the drawing keeps is one of them
+    drawn: PricedLimit  # The drawing, at the limit asked for or, where it misses that, at what it keeps
+    missed: tuple[float, ...]  # Limits that no design was verified to keep [unit of the output]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrontSearch:
+    """Looks for the cheapest drawings at other limits, one from the other."""
+
+    verifier_of: Callable[[float], Verifier]  # Limit → verifies designs that must keep it, on units of its own
+    steps: int  # Verified steps at every limit [-]
+    reach: float  # Factor by which a scale may change in the first step [-]
+    graded_steps: int  # Verified choices of grades at every limit; 0 where zones are free [-]
+
+    def around(self, drawn: VerifiedDesign, limit: float, shares: Sequence[float]) -> CostFront:
+        """Return the front around a drawing.
+
+        Parameters
+        ----------
+        drawn
+            The drawing.
+        limit
+            What it keeps [unit of the output].
+        shares
+            Other limits over that one [-].
+
+        Notes
+        -----
+        Away from the drawing each search begins at the design of the limit before, and ends after a step or two. What
+        keeps a limit keeps every wider one, so cost never rises with the limit. A design for a tighter limit that
+        seems cheaper than the drawing does so by what the units of a search err, and does not count.
+        """
+        own, found, missed = PricedLimit(limit=limit, design=drawn), list[PricedLimit](), list[float]()
+        tighter = sorted((by for by in shares if by < 1), reverse=True)
+        for side, floor in ((tighter, drawn.cost), (sorted(by for by in shares if by > 1), 0.0)):
+            start = drawn
+            for share in side:
+                best = self._cheapest(share * limit, start, floor * (1 - _SAME))
+                if best is None:
+                    missed.append(share * limit)
+                    continue
+                start = best
+                found.append(PricedLimit(limit=share * limit, design=best))
+        points = list[PricedLimit]()
+        for point in sorted((own, *found), key=lambda one: one.limit):
+            known = [one.design for one in (*points[-1:], point)]
+            points.append(replace(point, design=min(known, key=lambda one: one.cost)))
+        return CostFront(points=tuple(points), drawn=own, missed=tuple(sorted(missed)))
+
+    def _cheapest(self, limit: float, start: VerifiedDesign, floor: float) -> VerifiedDesign | None:
+        """Return the cheapest design of a cost or more that units show to keep a limit, none where none was found."""
+        verifier = self.verifier_of(limit)
+        space = verifier.space
+        try:
+            first = verifier.verify(start.design_in(space), "as for the limit before").evenly_divided()
+            tried = (first, *step_to_optimum(verifier, first, self.steps, self.reach))
+            if self.graded_steps:
+                best = cheapest_met(tried)
+                tried = (allocate_grades(verifier.dividing_as(best), best, self.graded_steps).chosen,)
+        except (FailedUnitsError, SolveError):
+            return None
+        kept = [own for own in tried if own.met and own.cost >= floor]
+        return min(kept, key=lambda one: one.cost, default=None)
+
+
+_SAME = 1e-9
+"""Relative difference of costs that is rounding [-]."""
