@@ -104,15 +104,6 @@ class Drawing:
         ------
         InputError, UnknownNameError
             The row, field and value that are not allowed.
-
-        Examples
-        --------
-        A hub of 55.29 ± 0.1 mm is one source with one column, in metres:
-
-        >>> zone = {"plus": 0.1, "minus": -0.1, "unit": "mm", "min": 0.02, "max": 0.5, "cost": 3.0}
-        >>> hub = Drawing.of_rows([{"id": "hub", "nominal": 55.29, **zone}])
-        >>> hub.errors.columns, hub.sources[0].zone
-        (('hub',), 0.0002)
         """
         listed = list(rows) if isinstance(rows, Iterable) and not isinstance(rows, str | Mapping) else [rows]
         if not all(isinstance(row, Mapping) and "id" in row for row in listed):
@@ -147,11 +138,6 @@ class Drawing:
         """Return the drawing at the zones of another tolerance table, with the same correlations and process costs.
 
         Its settings stay as well, but those that the table states.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            The file, row, field and value that are not allowed.
         """
         read = load_drawing(found_from_here(table))
         changed = self.with_sources(read.sources, str(table))
@@ -175,9 +161,8 @@ class Drawing:
     def to_csv(self, path: str | Path) -> Path:
         """Write the tolerance table, which `load_drawing` reads again, into a new file, and return its path.
 
-        Heads of an office's are written again, and what they mean into a TOML file beside the table. The settings that
-        belong to it stand below its rows. Process costs are not in the table: whoever reads it gives them again by
-        ``costs=``. Nor are correlations.
+        Heads of an office's are written again, and what they mean into a TOML file beside the table; its settings stand
+        below its rows. Process costs (``costs=``) and correlations are not in it.
 
         Raises
         ------
@@ -232,12 +217,6 @@ def load_drawing(
     ------
     InputError, UnknownNameError
         The file, row, field and value that are not allowed.
-
-    Examples
-    --------
-    >>> drawing = load_drawing("rv20e_drawing")
-    >>> len(drawing.sources), f"{1e6 * drawing.sources[0].zone:.1f} µm", drawing.settings["flank clearance [µm]"]
-    (50, '4.0 µm', 3.5)
     """
     sources = load_tolerance_table(beside(folder, table), beside(folder, processes), sheet, columns)
     correlation = load_correlations(beside(folder, correlations), sources) if correlations else Correlation()

@@ -175,10 +175,7 @@ class ErrorModel:
         return self.marginal_values(self.dependent(uniform))
 
     def dependent(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
-        """Return uniform numbers as the sources depend on each other from independent ones in (0, 1) [-].
-
-        By their correlation, and then by parts that are sorted into classes and mated.
-        """
+        """Return uniform numbers as sources depend on each other, by correlation and then by mated classes [-]."""
         found = self.mixed(uniform, self._factor)
         for own in self.compensators:
             own.sorted(found, self._known)
@@ -189,8 +186,6 @@ class ErrorModel:
     ) -> Float[np.ndarray, "*sample column"]:
         """Return independent uniform numbers in (0, 1) made dependent by F, with F·Fᵀ the `source_correlation` [-].
 
-        Notes
-        -----
         A source that depends on no other keeps its numbers. The sums run source by source, so that no bit of a sample
         depends on how many samples stand beside it, as it would in a library's product of matrices.
         """
@@ -225,8 +220,7 @@ class ErrorModel:
     ) -> Float[np.ndarray, "sample column"]:
         """Return the derivatives of the columns by the zones of their sources, with what is chosen in force [-].
 
-        They are the standard values, unless parts are turned or in classes of equal width: then the deviations as
-        arranged, over the zones.
+        Unless deviations are arranged they are the standard values, else the deviations as arranged over the zones.
         """
         if not any(own.arranges for own in self.compensators):
             return standard
@@ -258,8 +252,6 @@ class ErrorModel:
     ) -> Float[np.ndarray, "sample column"]:
         """Return the columns [m, angles rad] that are as probable as independent standard normal numbers.
 
-        Notes
-        -----
         Beyond 8.2 standard deviations the uniform numbers reach 1 as closely as they can, and the deviations stay.
         """
         return self.deviations(self.standard_values(np.clip(ndtr(numbers), ABOVE_ZERO, BELOW_ONE)), zones)

@@ -108,11 +108,7 @@ def _known_unit(text: str) -> str:
 
 
 def usual_unit(text: str) -> str:
-    """Return the unit of a row in its one spelling.
-
-    >>> usual_unit("inch"), usual_unit("um"), usual_unit("mm")
-    ('in', 'µm', 'mm')
-    """
+    """Return the unit of a row in its one spelling."""
     unit = usual_signs(text.strip())
     return _CALLED.get(unit, unit)
 
@@ -573,15 +569,8 @@ def headers_in(
 ) -> dict[str, str]:
     """Return field → header of its column, in a table whose costs are in cost units or a currency.
 
-    Parameters
-    ----------
-    cost_unit
-        What costs are in.
-    sources
-        The rows: nominal sizes are in inches where all of them are, and state no unit where some are; like places are
-        counted where one does.
-    called
-        Head as the user's table writes it → field.
+    Nominal sizes are in inches where all sources are, and state no unit where some are; like places are counted where
+    one source does. What the user's table calls a field comes first.
     """
     lengths = {own.length_name for own in sources} or {"mm"}
     said = {COST_UNITS: cost_unit, "mm": lengths.pop() if len(lengths) == 1 else ""}

@@ -100,11 +100,7 @@ number of a radius, a grade would be one of a feature half as large."""
 
 
 def _size_step(nominal: float) -> int:
-    """Return the position of the size step of a nominal size [m]; one outside 0 to 500 mm is an InputError.
-
-    >>> SIZE_STEPS[_size_step(0.052)]
-    80
-    """
+    """Return the position of the size step of a nominal size [m]; one outside 0 to 500 mm is an InputError."""
     size = nominal / MILLIMETRE
     if not 0 < size <= SIZE_STEPS[-1] * (1 + _ROUNDING):
         raise InputError.at("ISO 286-1", "nominal [mm]", size, f"a number above 0 and up to {SIZE_STEPS[-1]}")
@@ -137,11 +133,7 @@ def grade_zones(nominal: float) -> dict[str, float]:
 
 
 def is_fit(text: str) -> bool:
-    """Return whether a cell is written as a fit of ISO 286, a letter and a grade.
-
-    >>> is_fit("h5"), is_fit("IT6"), is_fit("0.05")
-    (True, True, False)
-    """
+    """Return whether a cell is written as a fit of ISO 286, a letter and a grade."""
     return _FIT.fullmatch(text) is not None
 
 
@@ -222,19 +214,10 @@ class Ladder:
 
 
 def group_ladder(sources: Sequence[Source]) -> Ladder:
-    """Return the common ladder of sources that share one tolerance.
+    """Return the common ladder of sources that share one tolerance, none of them locked.
 
-    Parameters
-    ----------
-    sources
-        Sources of one group, none of them locked.
-
-    Notes
-    -----
-    A drawing that gives a group one tolerance gives all its members the same zone, whatever the ratios of their zones
-    in the tolerance table. So a step is one zone for all of them, and costs what the members cost at that zone
-    together. Grades serve a group whose members are sizes of one size step; otherwise one grade would mean several
-    zones.
+    A step is one zone for all of them, whatever the ratios of their zones in the table, and costs what they cost at it
+    together. Grades serve members that are sizes of one size step; otherwise one grade would mean several zones.
     """
     place = f"group {sources[0].dimension}" if len(sources) > 1 else f"source {sources[0].name}"
     locked = [source.name for source in sources if source.locked]

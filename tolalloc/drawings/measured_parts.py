@@ -113,9 +113,8 @@ class MeasuredParts:
     At another zone the parts are assumed to deviate in proportion to it. The path stays out of the text of a record, so
     that a digest of the same parts in another folder is the same.
 
-    The process is assumed to be normal, of a position on each axis, with the mean and the standard deviation of the
-    parts, unless the parts refute that with an error of 1 % (Anderson & Darling 1954); then they are smoothed. What so
-    few parts leave open of mean and standard deviation is `tolalloc.capability.monte_carlo.ProcessUncertainty`.
+    The process is assumed to be normal, of a position on each axis, with the parts' mean and standard deviation, unless
+    the parts refute that with an error of 1 % (Anderson & Darling 1954); then they are smoothed.
 
     References
     ----------
@@ -292,11 +291,7 @@ class MadeTo:
 
 
 def named_file(text: str) -> tuple[str, str]:
-    """Return the file that a table names, and the characteristic of a Q-DAS file behind a colon.
-
-    >>> named_file("cmm/parts.dfq:Ø 5/8"), named_file("parts.csv")
-    (('cmm/parts.dfq', 'Ø 5/8'), ('parts.csv', ''))
-    """
+    """Return the file that a table names, and the characteristic of a Q-DAS file behind a colon."""
     found = _AQDEF.fullmatch(text)
     return (found[1], (found[2] or "").strip()) if found else (text, "")
 

@@ -79,12 +79,6 @@ class Sorting(Compensator):
     ----------
     Mease, Nair, Sudjianto, Selective assembly in manufacturing: statistical issues and optimal binning strategies,
     Technometrics 46 (2004) 165–175.
-
-    Examples
-    --------
-    >>> sorting = Sorting("pin.diameter", "housing.groove.radius", classes=4)
-    >>> round(sorting.leftover, 4)
-    0.0975
     """
 
     called: ClassVar[str] = "sorting"
@@ -137,13 +131,7 @@ class Sorting(Compensator):
         return self.width is not None
 
     def resolved(self, sources: Sequence[Source], place: str) -> Sorting:
-        """Return the same with the names that the table itself uses.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            No such source, or one that cannot be sorted so.
-        """
+        """Return the same with the names that the table itself uses."""
         parts = one_source("parts", self.parts, sources, place)
         mates = one_source("mates", self.mates, sources, place)
         for name, own in (("parts", parts), ("mates", mates)):
@@ -297,13 +285,7 @@ class Sorting(Compensator):
         return np.asarray((source.standard_values(numbers)[:, vector] * source.zone + source.middles[0]) * source.lever)
 
     def sectors(self, source: str) -> Float[np.ndarray, " end"]:
-        """Return where the sectors of one of its sources begin and end, counted from the x axis [°]; of none, nothing.
-
-        Examples
-        --------
-        >>> Sorting("disc1.runout", "disc2.runout", classes=4, by="direction").sectors("disc1.runout").tolist()
-        [0.0, 90.0, 180.0, 270.0, 360.0]
-        """
+        """Return where the sectors of one of its sources begin and end, from the x axis on; of none, nothing [°]."""
         if 1 not in self.measured:
             return np.empty(0)
         turned = 180.0 if self.opposite and source == self.mates else 0.0

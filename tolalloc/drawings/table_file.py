@@ -223,11 +223,7 @@ def _marked(run: Any) -> str:
 
 
 def _plain(cell: str) -> str:
-    """Return a cell with the keyboard's blanks and accents, and its minus where a number has a true one.
-
-    >>> _plain("\u22120.05"), _plain("10\u221220 mm"), _plain("hub\u00a0seat\u200b ")
-    ('-0.05', '10−20 mm', 'hub seat')
-    """
+    """Return a cell with the keyboard's blanks and accents, and its minus where a number has a true one."""
     cell = normalize("NFC", _UNSEEN.sub("", _BLANKS.sub(" ", cell))).strip()
     negative = "-" + cell[1:].lstrip()
     is_number = _TRUE_MINUS.fullmatch(cell) or (cell[:1] == "\u2212" and WITH_UNIT.fullmatch(negative))
@@ -269,13 +265,7 @@ def read_table_file(path: Path, heads: Heads = _ANY, sheet: str = "") -> tuple[N
 
 
 def _with_units(path: Path, rows: tuple[NumberedRow, ...], heads: Heads) -> tuple[NumberedRow, ...]:
-    """Return a table whose first row states the units of its columns with these in its heads.
-
-    Raises
-    ------
-    InputError
-        A head states another unit than the cell below it.
-    """
+    """Return a table whose first row states the units of its columns with these in its heads."""
     if len(rows) < 2 or not heads.known:
         return rows
     (first, header), (number, cells), *others = rows
@@ -362,13 +352,7 @@ def _under_headers(path: Path, rows: Sequence[tuple[str, ...]], hint: str) -> li
 
 
 def _with_points(path: Path, number: int, cells: Sequence[str], kinds: Sequence[str]) -> NumberedRow:
-    """Return a row of a workbook whose numbers, where they were kept as text, have decimal points.
-
-    Raises
-    ------
-    InputError
-        A number kept as text whose sign may separate thousands, or what a spreadsheet made a date of.
-    """
+    """Return a row of a workbook whose numbers, where they were kept as text, have decimal points."""
     found = list[str]()
     for cell, kind in zip(cells, (*kinds, *["number"] * len(cells)), strict=False):
         if isinstance(cell, AmbiguousText) and kind == "number":
@@ -508,11 +492,6 @@ def require_units(path: Path, stated: Sequence[tuple[str, str]], units: Mapping[
     """Raise if the header of a column states another unit than the one it has, empty where it has none.
 
     A currency is a cost unit like any other, three letters as in EUR or its sign; it is one for the whole file.
-
-    Raises
-    ------
-    InputError
-        The column and its unit.
     """
     for name, unit in stated:
         known = units.get(name, "")
@@ -525,13 +504,7 @@ def require_units(path: Path, stated: Sequence[tuple[str, str]], units: Mapping[
 
 
 def stated_currency(path: Path, stated: Sequence[tuple[str, str]], units: Mapping[str, str]) -> str:
-    """Return the currency that the headers of costs state, empty where they state none.
-
-    Raises
-    ------
-    InputError
-        A column that states another one than those before it.
-    """
+    """Return the currency that headers of costs state, empty where none does; a second one is an InputError."""
     first = ""
     for name, unit in stated:
         own = currency_in(unit) if units.get(name, "").startswith(COST_UNITS) else ""
@@ -542,13 +515,7 @@ def stated_currency(path: Path, stated: Sequence[tuple[str, str]], units: Mappin
 
 
 def require_columns(path: Path | str, headers: tuple[str, ...], kind: type[Record]) -> None:
-    """Raise unless a record knows each column, each is there once, and none that it needs is missing.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        The column.
-    """
+    """Raise unless a record knows each column, each is there once, and none that it needs is missing."""
     for at, name in enumerate(headers, start=1):
         if not name:
             raise InputError(f"{path}: the header of column {at} is empty; allowed is the name of a column.")
@@ -563,13 +530,7 @@ def require_columns(path: Path | str, headers: tuple[str, ...], kind: type[Recor
 
 
 def typed_cells(kind: type[Record], row: Mapping[str, object], place: str) -> dict[str, object]:
-    """Return the cells of a row that are not empty, text as the type that its field asks for.
-
-    Raises
-    ------
-    InputError
-        The field and value that are not allowed.
-    """
+    """Return the cells of a row that are not empty, text as the type that its field asks for."""
     stated = {name: cell.strip() if isinstance(cell, str) else cell for name, cell in row.items()}
     typed, faults = dict[str, object](), Faults()
     for name, cell in stated.items():
@@ -582,13 +543,7 @@ def typed_cells(kind: type[Record], row: Mapping[str, object], place: str) -> di
 
 
 def plain_number(text: str) -> float:
-    """Return the number that a cell shows; what else Python takes for a number is a slip in a table.
-
-    Raises
-    ------
-    ValueError
-        The text is no number, or one with ``_`` or with digits of another script.
-    """
+    """Return the number that a cell shows; with ``_`` or digits of another script it is a ValueError."""
     if "_" in text or not text.isascii():
         raise ValueError(f"{text!r} is no plain number")
     return float(text)
@@ -603,11 +558,7 @@ def number_at(place: str, field: str, text: str, allowed: str = "a number with a
 
 
 def usual_word(text: str) -> str:
-    """Return a word as the fields have it.
-
-    >>> usual_word("Maß"), usual_word("Rundlauf"), usual_word("size")
-    ('size', 'runout', 'size')
-    """
+    """Return a word as the fields have it."""
     return office_words("cells").get(text.strip().lower(), text)
 
 

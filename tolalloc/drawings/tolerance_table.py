@@ -157,14 +157,7 @@ def load_process_capabilities(name: str | Path) -> ProcessCapabilities:
 def with_process(cells: Mapping[str, object], capabilities: ProcessCapabilities, place: str) -> dict[str, object]:
     """Return the cells of a row of a tolerance table, completed by the capability of the process that it names.
 
-    Raises
-    ------
-    UnknownNameError
-        The library has no such process for the row's feature, and the row does not state Cp either.
-
-    Notes
-    -----
-    A process may be known to a process cost table alone. Its row states Cp, so nothing has to be looked up.
+    A process may be known to a process cost table alone: its row states Cp, so nothing has to be looked up.
     """
     process, feature = cells.get("process"), cells.get("feature", Feature.SIZE)
     if process is None:
@@ -182,15 +175,7 @@ def with_process(cells: Mapping[str, object], capabilities: ProcessCapabilities,
 
 
 def doubts(sources: Sequence[Source], table: str) -> tuple[str, ...]:
-    """Return what is allowed in a table but hardly meant, a sentence a row.
-
-    Parameters
-    ----------
-    sources
-        All rows, in metres.
-    table
-        What the table is called, for messages.
-    """
+    """Return what is allowed in a table but hardly meant, a sentence a row."""
     costs = np.array([source.cost for source in sources if source.zone > 0 and source.cost > 0])
     middle = float(np.median(costs)) if costs.size >= _FEWEST else 0.0
     found = []
@@ -297,22 +282,12 @@ def heads_of(path: Path, columns: Mapping[str, str] = MappingProxyType({})) -> H
 
 
 def heads_file(table: Path) -> Path:
-    """Return the file beside a tolerance table that says what its heads mean, whether it is there or not.
-
-    >>> heads_file(Path("shop/zones.xlsx")).name, heads_file(Path("mine.tolerances.csv")).name
-    ('zones.toml', 'mine.tolerances.toml')
-    """
+    """Return the file beside a tolerance table that says what its heads mean, whether it is there or not."""
     return table.with_suffix(".toml")
 
 
 def heads_beside(table: Path) -> Mapping[str, str]:
-    """Return what the file beside a tolerance table says, nothing where there is none or it is of another kind.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        The field and value that are not allowed.
-    """
+    """Return what the file beside a tolerance table says, nothing where there is none or it is of another kind."""
     path = heads_file(table)
     content = read_toml(path) if is_file(path) else {}
     if not get_close_matches("columns", content):
@@ -327,13 +302,7 @@ def heads_text(called: Mapping[str, str]) -> str:
 
 
 def own_heads(path: Path, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the heads of columns of the user's own.
-
-    Raises
-    ------
-    InputError
-        All that are nearly the name of a column, each with the nearest.
-    """
+    """Return the heads of the user's own columns; those nearly the name of a column are an InputError."""
     spelt = {name.lower(): name for name in ToleranceRow.model_fields}
     own = [name for name in names if name and name not in ToleranceRow.model_fields]
     near = {name: get_close_matches(name.lower(), spelt, n=1, cutoff=_NEAR) for name in own}
@@ -404,13 +373,7 @@ def _says_both(plus: str) -> bool:
 
 
 def _both_ways(row: dict[str, str], place: str) -> dict[str, str]:
-    """Return a row with both deviations of one cell that says both, where it states no other.
-
-    Raises
-    ------
-    InputError
-        A fit of what has no nominal size, or is no size or a radius.
-    """
+    """Return a row with both deviations of one cell that says both, where it states no other."""
     plus = row.get("plus", "")
     if not _says_both(plus) or row.get("minus"):
         return row
@@ -440,13 +403,7 @@ def _unit_of_heads(stated: Sequence[tuple[str, str]]) -> str:
 
 
 def _without_units(row: dict[str, str], place: str) -> dict[str, str]:
-    """Return a row whose numbers stand without the units behind them, which must be those of their columns.
-
-    Raises
-    ------
-    InputError
-        A number in another unit.
-    """
+    """Return a row whose numbers stand without the units behind them, which must be those of their columns."""
     found, unit = dict(row), usual_unit(row["unit"])
     for name, cell in row.items():
         own = {"unit": unit, "mm": INCHES if unit == INCHES else "mm"}.get(COLUMNS[name].unit, "")
@@ -461,7 +418,7 @@ def _without_units(row: dict[str, str], place: str) -> dict[str, str]:
 def _require_units(path: Path, stated: Sequence[tuple[str, str]], rows: Sequence[tuple[int, dict[str, str]]]) -> None:
     """Raise unless headers state the units of `COLUMNS`; that of zones may also be the one unit of all rows.
 
-    A nominal size may be stated in inches where all rows are in inches, and in mm where none is.
+    A nominal size may be in inches where all rows are, and in mm where none is.
     """
     units = {name: column.unit for name, column in COLUMNS.items()}
     for column, unit in stated:
@@ -488,11 +445,6 @@ def sources_of_rows(
     """Return the sources of numbered rows, whose cells are text or already of the type of their field.
 
     The place is what messages name; files of measured parts are looked for in the folder.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        The row, field and value that are not allowed.
     """
     # The shipped library is read where a row names a process of it.
     is_asked = capabilities != _SHIPPED or any(row.get("process") for _, row in rows)
@@ -540,8 +492,7 @@ def _require_filled(row: Mapping[str, object], where: str) -> None:
 def table_rows(sources: Sequence[Source], folder: Path | None = None) -> list[list[str | int | float]]:
     """Return the cells of the sources in the order of `COLUMNS`, the user's own behind them.
 
-    Files of measured parts are named from the folder that the table is written to; without one in such a way that they
-    are found from everywhere.
+    Files of measured parts are named from the folder of the table, or so that they are found from everywhere.
     """
     own = own_heads_of(sources)
     columns = [COLUMNS[name] for name in headers_in(COST_UNITS, sources)]
@@ -600,13 +551,7 @@ def table_text(
 
 
 def require_small_zones(sources: Sequence[Source], largest: float, place: str | Path) -> None:
-    """Raise unless all zones, those that may be asked for and measured parts are as small as a model believes [m].
-
-    Raises
-    ------
-    InputError
-        The source with a larger one.
-    """
+    """Raise unless all zones, those that may be asked for and measured parts are as small as a model believes [m]."""
     limit, farthest = largest / MICROMETRE, _MEASURED * largest / MICROMETRE
     for source in sources:
         if source.measured and (own := max(map(abs, source.measured.values)) / MICROMETRE) > farthest:

@@ -1,9 +1,8 @@
 """Answers that are never asked for twice, in memory and in a checkpoint.
 
-A search that draws its random numbers from the seed tree is a function of the answers it gets. So a checkpoint holds
-the answers alone: a resumed search runs again from its first generation, reads what is known, and goes on with the
-same bits as if it had never stopped, random state included. Nothing in the file is ever executed, and a file from
-another version of a library can make a search slower but not wrong.
+A search that draws its random numbers from the seed tree is a function of the answers it gets: one that is resumed
+runs again from its first generation, reads what is known, and goes on with the same bits. Nothing in the file is ever
+executed, and one from another version of a library can make a search slower but not wrong.
 """
 
 from __future__ import annotations
@@ -82,12 +81,7 @@ class CachedAnswers:
     identity
         Text that tells this problem from others.
     checkpoint
-        Where the answers are kept beyond this process.
-
-    Raises
-    ------
-    InputError
-        The checkpoint is of another problem, is damaged, or is no checkpoint.
+        Where the answers are kept beyond this process; one of another problem is refused.
     """
 
     def __init__(
@@ -104,10 +98,8 @@ class CachedAnswers:
             self._read(checkpoint)
 
     def __call__(self, designs: Float[np.ndarray, "design gene"]) -> Float[np.ndarray, "design number"]:
-        """Return the numbers of every design; only new designs are asked for, in pieces as the checkpoint wants them.
+        """Return the numbers of every design; only new ones are asked for, in pieces as the checkpoint wants them.
 
-        Notes
-        -----
         A piece ends where the file is written, so a resumed search asks for designs in the same company as before.
         """
         keys = [design.tobytes() for design in designs]

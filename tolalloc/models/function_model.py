@@ -55,13 +55,7 @@ class SimulatedUnit:
         return self.path.stem
 
     def __call__(self, *values: float) -> list[float]:
-        """Return the variables at the end of a simulation with these parameters.
-
-        Raises
-        ------
-        ValueError
-            The simulation has no end.
-        """
+        """Return the variables at the end of a simulation with these parameters; one without an end is a ValueError."""
         start = {name: float(value) for name, value in zip(self.parameters, values, strict=True)}
         try:
             found = self.engine.simulate_fmu(
@@ -75,13 +69,7 @@ class SimulatedUnit:
 
 
 def simulated(path: str, parameters: tuple[str, ...], variables: tuple[str, ...], stop_time: float) -> SimulatedUnit:
-    """Return a unit as a function.
-
-    Raises
-    ------
-    InputError
-        The library is missing, or there is no such file.
-    """
+    """Return a unit as a function."""
     try:
         import fmpy
     except ImportError:
@@ -154,13 +142,7 @@ class FunctionModel:
                     raise InputError.at(f"{place} of {output}", name, slopes.get(name), allowed)
 
     def set_to(self, settings: Mapping[str, float]) -> FunctionModel:
-        """Return the function with other values of its settings [units of their names].
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            A setting that it does not have, or a value outside its bounds.
-        """
+        """Return the function with other values of its settings [units of their names]."""
         require_settings(f"model {self.name}", self.settings, settings)
         changed = (replace(own, value=settings.get(own.name, own.value)) for own in self.settings)
         return replace(self, settings=tuple(changed))
@@ -175,13 +157,7 @@ class FunctionModel:
         return replace(self, neglected=(*self.neglected, *patterns))
 
     def bound(self, errors: ErrorModel, place: str) -> BoundFunction:
-        """Return the model at the sources of a drawing.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            A source that is no input, or an input without a row.
-        """
+        """Return the model at the sources of a drawing, which must be inputs and give all that are not left out."""
         lengths = {column: LENGTHS[own.length_name] for own in errors.sources for column in own.columns}
         for column in (*errors.columns, *errors.fixed):
             if column not in self.inputs:
@@ -424,13 +400,6 @@ def model(
     """Return a model of your own: any function of the dimensions on a drawing.
 
     The parameters are those of `FunctionModel`; the name is the function's unless given.
-
-    Examples
-    --------
-    >>> import tolalloc as ta
-    >>> gap = ta.model(lambda housing, shaft: housing - shaft, inputs=("housing", "shaft"), outputs=("gap [mm]",))
-    >>> gap.outputs
-    ('gap [mm]',)
     """
     for field_name, names in (("inputs", inputs), ("outputs", outputs)):
         if isinstance(names, str):

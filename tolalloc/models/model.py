@@ -280,11 +280,9 @@ class _Exact:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The model's columns."""
         return self.model.columns
 
     def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
-        """Return the output of every sample and its derivatives."""
         return self.model.derivatives(self.output, x)
 
 
@@ -292,13 +290,6 @@ class _Exact:
 class DifferencedResponse:
     """One output of a response that knows no derivatives.
 
-    Raises
-    ------
-    InputError, UnknownNameError
-        A step that is not above zero, or an output that the response does not have.
-
-    Notes
-    -----
     A sample with derivatives costs one answer and two for every column. The truncation falls with the square of the
     step; across a kink a difference is a mean of both sides.
     """
@@ -357,10 +348,7 @@ class HasCopies(Protocol):
     def shared_lines(self, stated: Mapping[str, Hashable]) -> Mapping[str, str]:
         """Return the line of the drawing, part and feature, of every source that is one of several copies.
 
-        Parameters
-        ----------
-        stated
-            Source → what the table states of it; copies of which it states different things have lines of their own.
+        Copies of which the table states different things, by source, have lines of their own.
         """
 
 
@@ -380,19 +368,7 @@ class ModelSource(Protocol):
         """Return the same that takes as exact what a drawing leaves out of the sources that patterns name, too."""
 
     def bound(self, errors: ErrorModel, place: str) -> Model:
-        """Return the model at the sources of a drawing; nothing is solved.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            A source that the model does not have, or an input that nobody gives.
-        """
+        """Return the model at the sources of a drawing, none unknown and none wanting; nothing is solved."""
 
     def set_to(self, settings: Mapping[str, float]) -> ModelSource:
-        """Return the same at other values of its settings and operating conditions [units of their names].
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            A setting that it does not have, or a value outside its bounds.
-        """
+        """Return the same at other values of its settings and operating conditions [units of their names]."""

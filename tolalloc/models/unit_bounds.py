@@ -76,12 +76,7 @@ def least_by_slopes(
 ) -> tuple[Float[np.ndarray, "unit variable"], Float[np.ndarray, "unit variable"]]:
     """Return from where every unit is best bounded in a box, and by how much every variable may lower it from there.
 
-    Parameters
-    ----------
-    slopes
-        Least and largest derivative by every variable, valid all over the box.
-    lower, upper
-        Ends of the box.
+    The slopes are the least and largest derivative by every variable, valid all over the box.
 
     Notes
     -----

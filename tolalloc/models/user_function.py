@@ -159,13 +159,7 @@ class UserFunction:
             raise
 
     def _in_order(self, found: Any) -> Any:
-        """Return what the function returned in the order of its outputs, where it says them by name.
-
-        Raises
-        ------
-        InputError
-            Other names than those of the outputs, with or without their units.
-        """
+        """Return what the function returned in the order of its outputs, where it says them by name."""
         said = _named_values(found)
         if not said or not self.names:
             return found
@@ -181,10 +175,7 @@ class UserFunction:
     def _numbers(self, found: Any) -> Float[np.ndarray, "..."]:
         """Return what the function returned as numbers of its own, NaN where that is no answer.
 
-        Raises
-        ------
-        InputError
-            Text, times, or numbers of 32 bits and less, whose rounding differences would take for a slope.
+        Refused are text, times, and numbers of 32 bits and less, whose rounding differences would take for a slope.
         """
         if isinstance(found, list | tuple):
             return np.array([self._numbers(one) for one in found])
