@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.drawings.compensators import Compensator, Standing
-from tolalloc.drawings.correlation import CorrelatedSource, Correlation
+from tolalloc.drawings.correlation import CorrelatedSource, Correlation, symmetric_root
 from tolalloc.drawings.distributions import ABOVE_ZERO, BELOW_ONE, ndtr, ndtri
 from tolalloc.drawings.sources import Source
 from tolalloc.exceptions import InputError, UnknownNameError
@@ -150,9 +150,8 @@ class ErrorModel:
 
     @cached_property
     def _factor(self) -> Float[np.ndarray, "source source"]:
-        """Symmetric root of the correlation; Cholesky's does not exist where sources are fully correlated [-]."""
-        values, vectors = np.linalg.eigh(self.source_correlation)
-        return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
+        """Root of the correlation [-]."""
+        return symmetric_root(self.source_correlation)
 
     @cached_property
     def columns_of_source(self) -> tuple[slice, ...]:

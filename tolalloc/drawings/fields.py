@@ -68,21 +68,9 @@ class TableColumn:
     # What stands there, as ``docs/first-study.md`` explains it, and what the header says behind the name
     meaning: str
     unit: str = ""
-    attribute: str = ""  # Field of the source that is this cell; empty where several cells make it together
-    # What a number of the cell is multiplied by for the source, if by anything [SI unit per unit]
-    scale: float | None = None
+    # Field of the source that is this cell, as the column is called unless given; none where `write` alone is
+    attribute: str = ""
     write: Callable[[Source], Cell] | None = None  # Returns the cell of a source, where it is not its attribute
-
-    def read(self, cell: Cell) -> Cell:
-        """Return the attribute of the source for a cell."""
-        return cell * self.scale if self.scale and isinstance(cell, float) else cell
-
-    def cell(self, source: Source) -> Cell:
-        """Return the cell of a source."""
-        if self.write:
-            return self.write(source)
-        value: Cell = getattr(source, self.attribute)
-        return value / self.scale if self.scale and isinstance(value, float) else value
 
 
 def _alternatives(words: Iterable[str]) -> str:
@@ -164,13 +152,12 @@ class ToleranceRow(Record):
             write=lambda source: source.own_id or source.name,
         ),
     ]
-    part: Annotated[str, TableColumn("part that carries it; the id unless given", attribute="part")] = ""
+    part: Annotated[str, TableColumn("part that carries it; the id unless given")] = ""
     feature: Annotated[
         Feature,
         TableColumn(
             "`size` (± zone), `position` (Ø zone of an axis), `pitch` (total cumulative deviation) or `runout` (full "
             "indicator reading); size unless given",
-            attribute="feature",
         ),
     ] = Feature.SIZE
     nominal: Annotated[
@@ -193,14 +180,11 @@ class ToleranceRow(Record):
     unit: Annotated[
         str,
         AfterValidator(_known_unit),
-        TableColumn("µm, mm, in or % (of the nominal size), for plus, minus, min and max", attribute="unit"),
+        TableColumn("µm, mm, in or % (of the nominal size), for plus, minus, min and max"),
     ]
     distribution: Annotated[
         Distribution,
-        TableColumn(
-            f"{_alternatives(f'`{kind}`' for kind in Distribution)}; normal unless given",
-            attribute="distribution",
-        ),
+        TableColumn(f"{_alternatives(f'`{kind}`' for kind in Distribution)}; normal unless given"),
     ] = Distribution.NORMAL
     Cp: Annotated[float, Field(ge=0.1, le=10), TableColumn("capability; 1 unless given", "-", "cp")] = 1.0
     shift: Annotated[
@@ -244,9 +228,7 @@ class ToleranceRow(Record):
     ] = None
     sorted: Annotated[
         bool,
-        TableColumn(
-            "yes: parts outside the zone are sorted out before assembly (a truncated distribution)", attribute="sorted"
-        ),
+        TableColumn("yes: parts outside the zone are sorted out before assembly (a truncated distribution)"),
     ] = False
     process: Annotated[
         str,
@@ -254,7 +236,6 @@ class ToleranceRow(Record):
             "how the feature is made today: row of a process capability library (`ta.drawing(processes=)`), which then "
             "gives Cp, shift, distribution, shape and sorting unless the row states them, and of the process cost "
             "table; with Cp stated, the library need not know it",
-            attribute="process",
         ),
     ] = ""
     group: Annotated[
@@ -263,10 +244,9 @@ class ToleranceRow(Record):
             "rows of one group keep the ratios of their zones: both discs of one drawing. Unless given, rows of one "
             "feature on identical parts of a reducer form a group if zone, limits and price are the same; any other "
             "row stands alone",
-            attribute="group",
         ),
     ] = ""
-    locked: Annotated[bool, TableColumn("yes: allocation leaves the zone as it is", attribute="locked")] = False
+    locked: Annotated[bool, TableColumn("yes: allocation leaves the zone as it is")] = False
     min: Annotated[
         float,
         Field(ge=0),
@@ -291,7 +271,7 @@ class ToleranceRow(Record):
             write=lambda source: round(source.cost, 12),
         ),
     ]
-    grade: Annotated[str, TableColumn("carried through", attribute="grade")] = ""
+    grade: Annotated[str, TableColumn("carried through")] = ""
     step: Annotated[
         float,
         Field(ge=0, le=LARGEST_ZONE),
@@ -344,14 +324,10 @@ class ToleranceRow(Record):
     drawing: Annotated[
         str,
         TableColumn(
-            "number and revision of the drawing that states the zone; shown beside the id in tables of reports",
-            attribute="drawing",
+            "number and revision of the drawing that states the zone; shown beside the id in tables of reports"
         ),
     ] = ""
-    label: Annotated[
-        str,
-        TableColumn("your own word for it, as the drawing has it; shown beside the id as well", attribute="label"),
-    ] = ""
+    label: Annotated[str, TableColumn("your own word for it, as the drawing has it; shown beside the id as well")] = ""
     source: Annotated[
         str,
         TableColumn(
@@ -371,7 +347,7 @@ class ToleranceRow(Record):
             write=lambda source: source.places or None,
         ),
     ] = 0
-    note: Annotated[str, TableColumn("carried through", attribute="note")] = ""
+    note: Annotated[str, TableColumn("carried through")] = ""
 
     @property
     def name(self) -> str:
@@ -524,8 +500,8 @@ class ToleranceRow(Record):
         middle = (self.plus + self.minus) / 2 * factor if self.feature is Feature.SIZE else 0.0
         spectrum, teeth = parsed_spectrum(self.spectrum)
         shapes = parsed_shapes(self.shape)
-        plain = {name: column for name, column in COLUMNS.items() if column.attribute}
-        stated: dict[str, Any] = {column.attribute: column.read(getattr(self, name)) for name, column in plain.items()}
+        plain = {name: own for name, own in COLUMNS.items() if own.attribute or not own.write}
+        stated: dict[str, Any] = {own.attribute or name: getattr(self, name) for name, own in plain.items()}
         return Source(
             **stated | {"part": self.part or self.name},
             name=self.name,
@@ -550,9 +526,8 @@ class ToleranceRow(Record):
         if not self.measured:
             return None
         zone = (self.measured_zone or self.zone) * (self.micrometres * MICROMETRE)
-        made_to = MadeTo(
-            feature=self.feature, zone=zone, middle=middle, nominal=self.nominal * LENGTHS[self.length_unit]
-        )
+        nominal = self.nominal * LENGTHS[self.length_unit]
+        made_to = MadeTo(feature=self.feature, zone=zone, middle=middle, nominal=nominal)
         file, characteristic = named_file(self.measured)
         return load_measured_parts((folder / file).resolve(), made_to, characteristic)
 
@@ -562,6 +537,12 @@ COLUMNS = {
     for name, field in ToleranceRow.model_fields.items()
 }
 """Field → what a table knows of it."""
+
+
+def cell_of(source: Source, name: str) -> Cell:
+    """Return what a source writes into the column of a field."""
+    own = COLUMNS[name]
+    return own.write(source) if own.write else getattr(source, own.attribute or name)
 
 
 def headers_in(

@@ -69,8 +69,7 @@ class FittedDistribution:
     distribution: Distribution
     shape: float  # Shape, 0 for a normal distribution [-]
     scale: float  # σ of the normal, median of the lognormal, scale of the Weibull distribution [m]
-    log_likelihood: float  # Logarithm of the likelihood, with densities per µm [-]
-    aic: float  # Akaike's information criterion; the smaller the better [-]
+    aic: float  # Akaike's information criterion, with densities per µm; the smaller the better [-]
     distance: float  # Kolmogorov and Smirnov's largest distance from the measured shares [-]
 
 
@@ -268,13 +267,11 @@ def _fitted(
     lengths = values / MICROMETRE
     start = {"floc": 0.0} if starts_at_zero else {}
     found: Sequence[float] = family.fit(lengths, **start)
-    log_likelihood = float(family.logpdf(lengths, *found).sum())
     return FittedDistribution(
         distribution=distribution,
         shape=float(found[0]) if len(found) > 2 else 0.0,
         scale=float(found[-1]) * MICROMETRE,
-        log_likelihood=log_likelihood,
-        aic=2.0 * (len(found) - len(start)) - 2.0 * log_likelihood,
+        aic=2.0 * (len(found) - len(start)) - 2.0 * float(family.logpdf(lengths, *found).sum()),
         distance=float(stats.kstest(lengths, family.cdf, args=found).statistic),
     )
 

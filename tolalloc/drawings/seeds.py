@@ -50,7 +50,15 @@ class SamplingDesign(StrEnum):
 
 @dataclass(frozen=True)
 class SeedTree:
-    """A place in the tree of random numbers: who draws there draws the same, whoever draws elsewhere, and when."""
+    """A place in the tree of random numbers: who draws there draws the same, whoever draws elsewhere, and when.
+
+    Parameters
+    ----------
+    seed
+        Seed of the study, where 0 is a seed like every other [-].
+    path
+        Names from the root to this place.
+    """
 
     seed: int
     path: tuple[str, ...] = ()

@@ -14,14 +14,7 @@ from math import degrees
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawings.distributions import (
-    NORMAL,
-    RAYLEIGH,
-    Batch,
-    Distribution,
-    Marginal,
-    Mixture,
-)
+from tolalloc.drawings.distributions import NORMAL, RAYLEIGH, Batch, Distribution, Marginal, Mixture
 from tolalloc.drawings.measured_parts import MeasuredParts
 from tolalloc.drawings.zones import Feature, Spectrum, Systematic, ZoneMapping
 from tolalloc.reading.units import INCH, MICROMETRE, MILLIMETRE
@@ -357,8 +350,7 @@ class Source:
         """What the zone became, where it became anything else."""
         mean, deviation = (number * self.zone for number in self.zone_mapping.moments)
         if self.feature is Feature.SIZE:
-            is_off = abs(mean) > _ROUNDING * self.zone
-            off = self.said(mean, "+.3g") if is_off else self.said(0.0)
+            off = self.said(mean, "+.3g") if abs(mean) > _ROUNDING * self.zone else self.said(0.0)
             spread = f"{self._kind}, mean {off} off the middle, σ = {self.said(deviation)}"
         elif self.feature is Feature.POSITION:
             spread = f"radius {self._kind}, mean {self.said(mean)}, σ = {self.said(deviation)}, any phase"

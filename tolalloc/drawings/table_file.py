@@ -15,7 +15,6 @@ from datetime import date, time, timedelta
 from enum import StrEnum
 from io import BytesIO, StringIO
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Literal, TypeVar, get_args, get_origin
 from unicodedata import normalize
 from zipfile import ZipFile
@@ -64,13 +63,9 @@ Row = TypeVar("Row", bound=Record)
 class DateText(str):
     """Date or time of a workbook, into which a spreadsheet turns numbers: kept in a note, refused elsewhere."""
 
-    __slots__ = ()
-
 
 class AmbiguousText(str):
     """Text that is another number where its sign separates thousands: no matter in a note, refused as a number."""
-
-    __slots__ = ()
 
 
 def is_workbook(path: Path) -> bool:
@@ -460,9 +455,7 @@ def read_text_table(path: Path) -> TextTable:
     )
 
 
-def read_rows(
-    path: Path, kind: type[Row], named_by: str, units: Mapping[str, str] = MappingProxyType({})
-) -> tuple[tuple[str, Row], ...]:
+def read_rows(path: Path, kind: type[Row], named_by: str, units: Mapping[str, str]) -> tuple[tuple[str, Row], ...]:
     """Return the rows of a CSV file, each behind the place that messages name: file, row, and the field `named_by`.
 
     The headers are the fields of the record, with or without a unit in brackets. Numbers are never converted, so a

@@ -23,6 +23,7 @@ from tolalloc.drawings.fields import (
     UNITS,
     Cell,
     ToleranceRow,
+    cell_of,
     headers_in,
     shapes_text,
     usual_unit,
@@ -178,12 +179,11 @@ def doubts(sources: Sequence[Source], table: str) -> tuple[str, ...]:
     """Return what is allowed in a table but hardly meant, a sentence a row."""
     costs = np.array([source.cost for source in sources if source.zone > 0 and source.cost > 0])
     middle = float(np.median(costs)) if costs.size >= _FEWEST else 0.0
-    found = []
-    for source in sources:
-        if reasons := _reasons(source, middle):
-            said = "; ".join(reasons)
-            found.append(f"{table}, {source.own_id or source.name}: {said}. Is it meant?")
-    return tuple(found)
+    return tuple(
+        f"{table}, {source.own_id or source.name}: {'; '.join(reasons)}. Is it meant?"
+        for source in sources
+        if (reasons := _reasons(source, middle))
+    )
 
 
 def _reasons(source: Source, middle_cost: float) -> list[str]:
@@ -495,10 +495,10 @@ def table_rows(sources: Sequence[Source], folder: Path | None = None) -> list[li
     Files of measured parts are named from the folder of the table, or so that they are found from everywhere.
     """
     own = own_heads_of(sources)
-    columns = [COLUMNS[name] for name in headers_in(COST_UNITS, sources)]
+    names = headers_in(COST_UNITS, sources)
     return [
         [
-            *(_written(column.cell(source), folder) for column in columns),
+            *(_written(cell_of(source, name), folder) for name in names),
             *(dict(source.own_cells).get(head, "") for head in own),
         ]
         for source, _ in by_row(sources)
