@@ -224,9 +224,8 @@ class _Fitting(Compensator):
             copies = {own.each for own in others} - {1}
             if len(others) not in (1, len(parts)) or (copies and copies != {own.each for own in parts}):
                 allowed = "one source for all parts or one for each of them, with as many like features or one"
-                raise InputError.at(
-                    f"{place}, {self.called}", "against", " and ".join(own.name for own in others), allowed
-                )
+                names = " and ".join(own.name for own in others)
+                raise InputError.at(f"{place}, {self.called}", "against", names, allowed)
             against[_together(others)] = weight
         return replace(self, part=_together(parts), against=against)  # type: ignore[type-var]
 

@@ -439,10 +439,7 @@ def _aqdef_text(path: Path) -> str:
 def _read_field(key: str, at: int, content: str, found: dict[int, _Characteristic], common: dict[str, str]) -> None:
     """Take a field of a characteristic, or of all of them."""
     if key.startswith("K2"):
-        if at:
-            found.setdefault(at, _Characteristic()).fields[key] = content
-        else:
-            common[key] = content
+        (found.setdefault(at, _Characteristic()).fields if at else common)[key] = content
     elif key == "K0001" and at:
         found.setdefault(at, _Characteristic()).values.append((content, _VALID))
     elif key == "K0002":

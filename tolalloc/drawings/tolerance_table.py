@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from io import StringIO
@@ -195,58 +195,52 @@ def _reasons(source: Source, middle_cost: float) -> list[str]:
     return [*_of_size(source), *_of_zone(source), *_of_process(source, middle_cost), *of_parts]
 
 
-def _of_size(source: Source) -> list[str]:
-    """Return what is doubted of the nominal size and of where the zone lies beside it."""
-    found, zone, nominal = [], source.zone, source.nominal
+def _of_size(source: Source) -> Iterator[str]:
+    """Yield what is doubted of the nominal size and of where the zone lies beside it."""
+    zone, nominal = source.zone, source.nominal
     if nominal < 0:
-        found.append(f"the nominal size is {_length(nominal)}, below 0")
+        yield f"the nominal size is {_length(nominal)}, below 0"
     if 0 < nominal < _SMALLEST_SIZE:
-        found.append(f"the nominal size is {_length(nominal)}")
+        yield f"the nominal size is {_length(nominal)}"
     if abs(nominal) > _LARGEST_SIZE:
-        found.append(f"the nominal size is {_length(nominal)}, beyond those of ISO 286")
+        yield f"the nominal size is {_length(nominal)}, beyond those of ISO 286"
     if source.feature is Feature.SIZE and not source.over and 0 < nominal * _WIDE < zone:
-        found.append(f"the zone of {_length(zone)} is {zone / nominal:.0%} of the nominal size of {_length(nominal)}")
+        yield f"the zone of {_length(zone)} is {zone / nominal:.0%} of the nominal size of {_length(nominal)}"
     if abs(source.middle) > _OFF * zone:
-        found.append(f"the middle of its zone of {_length(zone)} is {_length(source.middle)} off the nominal size")
+        yield f"the middle of its zone of {_length(zone)} is {_length(source.middle)} off the nominal size"
     elif source.feature is Feature.SIZE and abs(source.middle) > 0.5 * zone * (1 + 1e-9):
-        found.append(
+        yield (
             f"both deviations have one sign, so the nominal size lies outside its zone, whose middle is "
             f"{_length(source.middle)} off"
         )
-    return found
 
 
-def _of_zone(source: Source) -> list[str]:
-    """Return what is doubted of the size of the zone and of its range."""
-    found, zone = [], source.zone
+def _of_zone(source: Source) -> Iterator[str]:
+    """Yield what is doubted of the size of the zone and of its range."""
+    zone = source.zone
     if zone < _FINEST_ZONE:
-        found.append(f"the zone of {_length(zone)} is finer than any process holds")
+        yield f"the zone of {_length(zone)} is finer than any process holds"
     elif not source.nominal and zone > _WIDEST_ZONE:
-        found.append(f"the zone of {_length(zone)} is wide, and no nominal size is stated beside it")
+        yield f"the zone of {_length(zone)} is wide, and no nominal size is stated beside it"
     elif source.nominal > 0 and source.feature is Feature.SIZE and not source.over:
         factor = zone / tolerance_factor(source.nominal)
         if not _FINEST <= factor <= _COARSEST:
             than = "finer than IT01" if factor < _FINEST else "coarser than IT15"
-            found.append(f"the zone of {_length(zone)} is {than} at a nominal size of {_length(source.nominal)}")
+            yield f"the zone of {_length(zone)} is {than} at a nominal size of {_length(source.nominal)}"
     if source.over and not _FLAT <= zone / source.over <= _STEEP:
-        found.append(
-            f"a zone of {_length(zone)} over {_length(source.over)} is an angle of {zone / source.over:.2g} rad"
-        )
+        yield f"a zone of {_length(zone)} over {_length(source.over)} is an angle of {zone / source.over:.2g} rad"
     if not source.locked and source.maximum > _RANGE * zone:
-        found.append(f"max of {_length(source.maximum)} is {source.maximum / zone:.3g} times the zone")
+        yield f"max of {_length(source.maximum)} is {source.maximum / zone:.3g} times the zone"
     if not source.locked and 0 < source.minimum < zone / _RANGE:
-        found.append(f"min of {_length(source.minimum)} is 1/{zone / source.minimum:.3g} of the zone")
-    return found
+        yield f"min of {_length(source.minimum)} is 1/{zone / source.minimum:.3g} of the zone"
 
 
-def _of_process(source: Source, middle_cost: float) -> list[str]:
-    """Return what is doubted of capability and cost."""
-    found = []
+def _of_process(source: Source, middle_cost: float) -> Iterator[str]:
+    """Yield what is doubted of capability and cost."""
     if not _CAPABILITY[0] <= source.cp <= _CAPABILITY[1]:
-        found.append(f"Cp is {source.cp:g}")
+        yield f"Cp is {source.cp:g}"
     if middle_cost and source.cost and not middle_cost / _COST <= source.cost <= middle_cost * _COST:
-        found.append(f"its cost of {source.cost:g} is far from {middle_cost:g}, the middle one of the table")
-    return found
+        yield f"its cost of {source.cost:g} is far from {middle_cost:g}, the middle one of the table"
 
 
 def _length(length: float) -> str:
@@ -342,19 +336,17 @@ def load_tolerance_table(
     unit = "" if "unit" in headers else _unit_of_heads(stated)
     plus = headers.index("plus") if "plus" in headers else 0
     both = others and "minus" not in headers and all(_says_both(cells[plus]) for _, cells in others)
-    kept = tuple(name for name in headers if name not in own)
-    require_columns(path, (*kept, *["minus"] * bool(both), *["unit"] * bool(unit)), ToleranceRow)
+    kept, more = [name for name in headers if name not in own], {"unit": unit} if unit else {}
+    require_columns(path, (*kept, *["minus"] * bool(both), *more), ToleranceRow)
     if len(set(own)) < len(own):
         twice = next(name for name in own if own.count(name) > 1)
         raise InputError(f"{path}: the column {twice!r} is there twice; each has one.")
     if not others:
         raise InputError(f"{path}: the table has no rows; one row per source is needed.")
-    if unit:
-        others, kept = [(number, (*cells, unit)) for number, cells in others], (*kept, "unit")
-    rows = [(number, dict(zip((*headers, *["unit"] * bool(unit)), cells, strict=True))) for number, cells in others]
+    rows = [(number, dict(zip(headers, cells, strict=True)) | more) for number, cells in others]
     _require_units(path, [(name, unit) for name, unit in stated if name not in own], rows)
     known = [
-        (number, _both_ways(_without_units({name: row[name] for name in kept}, place), place))
+        (number, _both_ways(_without_units({name: row[name] for name in (*kept, *more)}, place), place))
         for number, row, place in (
             (number, row, f"{path}, row {number} ({row['id'] or 'no id'})") for number, row in rows
         )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -309,22 +309,12 @@ class DifferencedResponse:
         """The response's columns."""
         return self.response.columns
 
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """The one output."""
-        return (self.output,)
-
-    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
-        """Return the output of every sample."""
-        found = self.response(x)
-        at = self.response.outputs.index(self.output)
-        return Evaluation(values=found.values[:, [at]], status=found.status)
-
     def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
         """Return the output of every sample and its derivatives, NaN by neighbours that failed, all in one call."""
         columns = len(self.columns)
         shifts = np.concatenate([np.zeros((1, columns)), np.diag(self.steps), -np.diag(self.steps)])
-        found = self((x[:, np.newaxis] + shifts).reshape(-1, columns))
+        found = self.response((x[:, np.newaxis] + shifts).reshape(-1, columns))
+        found = replace(found, values=found.values[:, [self.response.outputs.index(self.output)]])
         values, status = found.values.reshape(-1, shifts.shape[0]), found.status.reshape(-1, shifts.shape[0])
         slopes = (values[:, 1 : columns + 1] - values[:, columns + 1 :]) / (2 * self.steps)
         good = found.good.reshape(status.shape)[:, 1:].reshape(-1, 2, columns).all(axis=1)
