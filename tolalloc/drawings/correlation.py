@@ -196,20 +196,15 @@ def load_correlations(path: Path | str, sources: Sequence[Source]) -> Correlatio
     InputError, UnknownNameError
         The file, row and value that are not allowed.
     """
-    rows = _read(shipped_or_path(path, DATA, ".correlations.csv", "correlation"))
+    file = shipped_or_path(path, DATA, ".correlations.csv", "correlation")
+    rows = [(f"{file}, row {number}", [*cells]) for number, cells in read_table_file(file)]
+    if len(rows) < 2:
+        raise InputError(f"{file}: the table has no rows below its header; a list or a matrix is needed.")
     is_list = bool(set(LIST_HEADERS[1:]) & set(rows[0][1]))
     pairs = _pairs_of_list(rows, sources) if is_list else _pairs_of_matrix(rows, sources)
     correlation = Correlation(pairs=pairs, origin=str(path))
     correlation.require_sound(sources)
     return correlation
-
-
-def _read(path: Path) -> list[Row]:
-    """Return the rows with their places, the header first."""
-    rows = read_table_file(path)
-    if len(rows) < 2:
-        raise InputError(f"{path}: the table has no rows below its header; a list or a matrix is needed.")
-    return [(f"{path}, row {number}", list(cells)) for number, cells in rows]
 
 
 def _pairs_of_list(rows: Sequence[Row], sources: Sequence[Source]) -> tuple[Pair, ...]:

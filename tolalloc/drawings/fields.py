@@ -162,11 +162,7 @@ class ToleranceRow(Record):
     ] = Feature.SIZE
     nominal: Annotated[
         float,
-        TableColumn(
-            "nominal size, for grades, for you and for an own model; in inches where the unit is in",
-            "mm",
-            write=lambda source: _length_written(source, source.nominal),
-        ),
+        TableColumn("nominal size, for grades, for you and for an own model; in inches where the unit is in", "mm"),
     ] = 0.0
     plus: Annotated[float, TableColumn("upper limit; the zone is plus − minus", "unit", write=_plus)]
     minus: Annotated[
@@ -247,20 +243,8 @@ class ToleranceRow(Record):
         ),
     ] = ""
     locked: Annotated[bool, TableColumn("yes: allocation leaves the zone as it is")] = False
-    min: Annotated[
-        float,
-        Field(ge=0),
-        TableColumn(
-            "smallest zone that may be asked for", "unit", write=lambda source: _written(source, source.minimum)
-        ),
-    ]
-    max: Annotated[
-        float,
-        Field(ge=0),
-        TableColumn(
-            "largest zone that may be asked for", "unit", write=lambda source: _written(source, source.maximum)
-        ),
-    ]
+    min: Annotated[float, Field(ge=0), TableColumn("smallest zone that may be asked for", "unit", "minimum")]
+    max: Annotated[float, Field(ge=0), TableColumn("largest zone that may be asked for", "unit", "maximum")]
     cost: Annotated[
         float,
         Field(ge=0, le=1e9),
@@ -500,8 +484,12 @@ class ToleranceRow(Record):
         middle = (self.plus + self.minus) / 2 * factor if self.feature is Feature.SIZE else 0.0
         spectrum, teeth = parsed_spectrum(self.spectrum)
         shapes = parsed_shapes(self.shape)
-        plain = {name: own for name, own in COLUMNS.items() if own.attribute or not own.write}
-        stated: dict[str, Any] = {own.attribute or name: getattr(self, name) for name, own in plain.items()}
+        in_si = {"unit": factor, "mm": length}
+        stated: dict[str, Any] = {
+            own.attribute or name: getattr(self, name) * in_si[own.unit] if own.unit in in_si else getattr(self, name)
+            for name, own in COLUMNS.items()
+            if own.attribute or not own.write
+        }
         return Source(
             **stated | {"part": self.part or self.name},
             name=self.name,
@@ -509,9 +497,6 @@ class ToleranceRow(Record):
             places=self._places,
             zone=self.zone * factor,
             middle=middle,
-            minimum=self.min * factor,
-            maximum=self.max * factor,
-            nominal=self.nominal * length,
             step=self.step * factor,
             shape=shapes[0] if len(shapes) == 1 else shapes or 0.0,
             batches=parsed_batches(self.batches),
@@ -542,7 +527,11 @@ COLUMNS = {
 def cell_of(source: Source, name: str) -> Cell:
     """Return what a source writes into the column of a field."""
     own = COLUMNS[name]
-    return own.write(source) if own.write else getattr(source, own.attribute or name)
+    if own.write:
+        return own.write(source)
+    value: Any = getattr(source, own.attribute or name)
+    in_table = {"unit": _written, "mm": _length_written}.get(own.unit)
+    return in_table(source, value) if in_table else value
 
 
 def headers_in(

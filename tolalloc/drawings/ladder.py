@@ -188,17 +188,6 @@ class Ladder:
             listed = (zones / MICROMETRE).tolist()
             raise InputError.at("ladder", "zones [µm]", listed, "one number above 0 or more, each above the last")
 
-    @classmethod
-    def grades(cls, nominal: float) -> Ladder:
-        """Return the standard tolerance grades of a nominal size [m]."""
-        zones = grade_zones(nominal)
-        return cls(zones=np.array([*zones.values()]), labels=(*zones,))
-
-    @classmethod
-    def preferred(cls) -> Ladder:
-        """Return the preferred numbers."""
-        return cls(zones=ZONES, labels=(SERIES,) * ZONES.size)
-
     def within(self, minimum: float, maximum: float, place: str) -> Ladder:
         """Return the steps inside a range [m]; a range without a step is an InputError that names its place."""
         inside = (self.zones >= minimum * (1 - _ROUNDING)) & (self.zones <= maximum * (1 + _ROUNDING))
@@ -228,8 +217,9 @@ def group_ladder(sources: Sequence[Source]) -> Ladder:
         for source in sources
     )
     if graded and len({_size_step(source.nominal) for source in sources}) == 1:
-        ladder = Ladder.grades(max(source.nominal for source in sources))
+        zones = grade_zones(max(source.nominal for source in sources))
+        ladder = Ladder(zones=np.array([*zones.values()]), labels=(*zones,))
     else:
-        ladder = Ladder.preferred()
+        ladder = Ladder(zones=ZONES, labels=(SERIES,) * ZONES.size)
     minimum, maximum = max(source.minimum for source in sources), min(source.maximum for source in sources)
     return ladder.within(minimum, maximum, place)

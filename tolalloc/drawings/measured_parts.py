@@ -208,25 +208,23 @@ class MeasuredParts:
         """What the parts say about the process."""
         from scipy import stats
 
-        half = self.zone / 2.0
+        half, values, fits = self.zone / 2.0, np.array(self.values), list[FittedDistribution]()
         if self.stated:
             mean, deviation = self.stated.mean, self.stated.deviation
-            cpk = (half - abs(mean - self.middle)) / (3.0 * deviation)
-            return MeasuredFit(parts=self.parts, mean=mean, deviation=deviation, cp=self.cp, cpk=cpk, fits=())
-        values = np.array(self.values)
-        mean, deviation = float(values.mean()), float(values.std(ddof=1))
-        nearest = half - (mean if self.are_radii else abs(mean - self.middle))
-        fits = [_fitted(Distribution.NORMAL, stats.rayleigh if self.are_radii else stats.norm, values, self.are_radii)]
-        above = values if self.are_radii else values - (self.middle - half)
-        if above.min() > 0.0:
-            fits.append(_fitted(Distribution.LOGNORMAL, stats.lognorm, above, True))
-            fits.append(_fitted(Distribution.WEIBULL, stats.weibull_min, above, True))
+        else:
+            mean, deviation = float(values.mean()), float(values.std(ddof=1))
+            normal = stats.rayleigh if self.are_radii else stats.norm
+            fits.append(_fitted(Distribution.NORMAL, normal, values, self.are_radii))
+            above = values if self.are_radii else values - (self.middle - half)
+            if above.min() > 0.0:
+                fits.append(_fitted(Distribution.LOGNORMAL, stats.lognorm, above, True))
+                fits.append(_fitted(Distribution.WEIBULL, stats.weibull_min, above, True))
         return MeasuredFit(
-            parts=values.size,
+            parts=self.parts,
             mean=mean,
             deviation=deviation,
             cp=self.cp,
-            cpk=nearest / (3.0 * deviation),
+            cpk=(half - (mean if self.are_radii else abs(mean - self.middle))) / (3.0 * deviation),
             fits=tuple(sorted(fits, key=lambda fit: fit.aic)),
         )
 

@@ -56,20 +56,14 @@ class UserFunction:
         """
         self._require_arguments(arguments.shape[1])
         with np.errstate(all="ignore"):
-            whole = self._of_columns(arguments)
-            if whole is not None:
-                self._require_a_number(whole, arguments)
-                return whole
-            rows, reasons = [], []
-            for sample in arguments:
-                row, reason = self._of_sample(sample)
-                rows.append(row)
-                reasons += [reason] * bool(reason)
-            found = np.array(rows).reshape(-1, self.values)
-            few = _few(len(arguments))
-            self._require_same(arguments[few], found[few])
-        if len(reasons) == len(rows) >= _FEWEST:
-            raise SolveError(f"{self.place}: the function raises for each of {len(rows)} samples, first {reasons[0]}.")
+            found = self._of_columns(arguments)
+            if found is None:
+                answers, few = [self._of_sample(sample) for sample in arguments], _few(len(arguments))
+                found = np.array([row for row, _ in answers]).reshape(-1, self.values)
+                self._require_same(arguments[few], found[few])
+                if len(answers) >= _FEWEST and all(reason for _, reason in answers):
+                    said = f"the function raises for each of {len(answers)} samples, first {answers[0][1]}"
+                    raise SolveError(f"{self.place}: {said}.")
         self._require_a_number(found, arguments)
         return found
 

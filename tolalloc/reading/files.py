@@ -202,12 +202,12 @@ def shipped_or_path(name: str | Path, folder: Path, suffix: str, what: str) -> P
     if str(name) in shipped:
         return shipped[str(name)]
     path = found_from_here(name)
-    if path.suffix or is_file(path):
-        if not is_file(path):
-            if os.path.exists(path):
-                raise InputError(f"{path}: is a folder, a device or a pipe; allowed is a file.")
-            raise InputError(f"{path}: no such file; shipped {what} files are {', '.join(sorted(shipped))}.")
+    if is_file(path):
         return path
+    if path.suffix and os.path.exists(path):
+        raise InputError(f"{path}: is a folder, a device or a pipe; allowed is a file.")
+    if path.suffix:
+        raise InputError(f"{path}: no such file; shipped {what} files are {', '.join(sorted(shipped))}.")
     raise UnknownNameError.among(f"shipped {what} files", "name", str(name), shipped)
 
 
