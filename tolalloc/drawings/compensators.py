@@ -61,6 +61,10 @@ _AGAINST = Rule(
 )
 
 
+Units = Float[np.ndarray, "*sample column"]
+"""Numbers of some units, one row each: uniform ones [-] or deviations [m, angles rad]."""
+
+
 @dataclass(frozen=True)
 class Standing:
     """An active source, and where its columns stand among those of a unit."""
@@ -81,12 +85,12 @@ class Standing:
         """Columns of one deviation or vector [-]."""
         return 1 if self.source.feature is Feature.SIZE else 2
 
-    def of(self, numbers: Float[np.ndarray, "*sample column"]) -> Float[np.ndarray, "*sample copy width"]:
+    def of(self, numbers: Units) -> Float[np.ndarray, "*sample copy width"]:
         """Return the deviations or vectors of every like feature among the numbers of units, a copy."""
         own = numbers[..., self.vector]
         return own.reshape(*own.shape[:-1], -1, self.width).copy()
 
-    def put(self, numbers: Float[np.ndarray, "*sample column"], own: Float[np.ndarray, "*sample copy width"]) -> None:
+    def put(self, numbers: Units, own: Float[np.ndarray, "*sample copy width"]) -> None:
         """Put them back in place."""
         numbers[..., self.vector] = own.reshape(*own.shape[:-2], -1)
 
@@ -172,15 +176,13 @@ class Compensator(NamedFields, ABC):
         """Return the share of parts that find no mate, at the zones of sources by their names [-]."""
         return 0.0
 
-    def sorted(self, uniform: Float[np.ndarray, "*sample column"], known: Known) -> None:
+    def sorted(self, uniform: Units, known: Known) -> None:
         """Put the parts of units where their mates are, uniform numbers in place [-]; unless it sorts, nothing."""
 
-    def arranged(
-        self, deviations: Float[np.ndarray, "*sample column"], zones: Mapping[str, float], known: Known
-    ) -> None:
+    def arranged(self, deviations: Units, zones: Mapping[str, float], known: Known) -> None:
         """Put deviations of units at these zones [m] where it `arranges` them, in place [m]."""
 
-    def fitted(self, deviations: Float[np.ndarray, "*sample column"], known: Known) -> None:
+    def fitted(self, deviations: Units, known: Known) -> None:
         """Put what is chosen into deviations of units, in place [m]; unless it fits for measured ones, nothing."""
 
 
@@ -284,7 +286,7 @@ class Shim(_Fitting):
                 raise InputError.at(f"{place}, {self.called}", "source", own.name, "a size, which is a length")
         return found
 
-    def fitted(self, deviations: Float[np.ndarray, "*sample column"], known: Known) -> None:
+    def fitted(self, deviations: Units, known: Known) -> None:
         """Put the sizes that are chosen into deviations of units, in place [m]."""
         step = self.step * MICROMETRE
         for name, others in self.of_each:
@@ -355,12 +357,7 @@ class Indexing(_Fitting):
         """Yes: a vector that is turned grows with its zone as it is turned."""
         return True
 
-    def arranged(
-        self,
-        deviations: Float[np.ndarray, "*sample column"],
-        zones: Mapping[str, float],  # noqa: ARG002
-        known: Known,
-    ) -> None:
+    def arranged(self, deviations: Units, zones: Mapping[str, float], known: Known) -> None:  # noqa: ARG002
         """Turn the parts of units to the position that is chosen, deviations in place [m]."""
         for name, others in self.of_each:
             part = _complex(known[name].of(deviations))

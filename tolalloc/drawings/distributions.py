@@ -127,7 +127,6 @@ FORMS = {
     Distribution.MIXTURE: Form(),
     Distribution.EMPIRICAL: Form(),
 }
-"""What is known of every distribution."""
 
 
 def parsed_shapes(text: str) -> tuple[float, ...]:

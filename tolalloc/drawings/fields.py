@@ -52,7 +52,6 @@ UNITS = {"µm": 1.0, "um": 1.0, "mm": 1000.0, "in": 25400.0, "inch": 25400.0}
 """Unit of a length → micrometres."""
 
 ALLOWED_UNITS = "µm, um, mm, in, inch or %"
-"""`UNITS` in a sentence, with the per cent of the nominal size."""
 
 _CALLED = {"um": "µm", "inch": INCHES}
 """Other spelling of a unit → the one that is written."""
@@ -553,4 +552,3 @@ def headers_in(
 
 
 HEADERS = headers_in(COST_UNITS)
-"""Field → header of its column, costs in cost units."""

@@ -60,7 +60,6 @@ PRINTED = {
 """Zone of every grade in every size step, up to the grade from which on they repeat tenfold [µm]."""
 
 GRADES = (*PRINTED, *(f"IT{number}" for number in range(12, 19)))
-"""Names of the grades, finest first."""
 
 _COARSE = frozenset(("IT14", "IT15", "IT16", "IT17", "IT18"))
 """Grades that the standard does not allow up to 1 mm."""
@@ -87,9 +86,7 @@ _CORRECTED = {"K": 8, "M": 8, "N": 8, "P": 7}
 """Holes of these letters are a step of grades tighter than the shafts that they mirror, up to this grade."""
 _OF_K = range(4, 8)
 _FITS = "d to h, js, k, m, n and p, the same of holes in capitals, or IT, with a grade, such as h5, H7 or IT6"
-"""Fits that are known."""
 SERIES = "R′10"
-"""Name of the series."""
 _DECADE = (1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0, 5.0, 6.3, 8.0)
 """Its values within one decade [-]."""
 ZONES = np.array([*(float(f"{value}e{power}") for power in range(-1, 3) for value in _DECADE), 1000.0]) * MICROMETRE

@@ -17,6 +17,7 @@ from tolalloc.drawings.compensators import (
     Compensator,
     Known,
     Standing,
+    Units,
     one_source,
     require_vector,
 )
@@ -28,7 +29,6 @@ from tolalloc.reading.named_fields import Rule, flag, number, or_none, whole
 from tolalloc.reading.units import MICROMETRE
 
 _MEASURED = ("deviation", "direction", "size", "direction and size")
-"""What may be measured of parts that are sorted."""
 
 
 @dataclass(frozen=True)
@@ -212,7 +212,7 @@ class Sorting(Compensator):
         lost, further = self.leftover_of(sources), self.count ** self._numbers(sources[self.parts]) - 1
         return float(self.class_cost * further + self.leftover_cost * lost / (1.0 - lost))
 
-    def sorted(self, uniform: Float[np.ndarray, "*sample column"], known: Known) -> None:
+    def sorted(self, uniform: Units, known: Known) -> None:
         """Put the parts of units into the class of their mates, uniform numbers in place [-]."""
         if self.width is not None:
             return
@@ -233,9 +233,7 @@ class Sorting(Compensator):
         least = np.minimum(np.floor(self.count * mates), self.count - 1)
         return np.asarray(np.clip((least + np.modf(self.count * parts)[0]) / self.count, ABOVE_ZERO, BELOW_ONE))
 
-    def arranged(
-        self, deviations: Float[np.ndarray, "*sample column"], zones: Mapping[str, float], known: Known
-    ) -> None:
+    def arranged(self, deviations: Units, zones: Mapping[str, float], known: Known) -> None:
         """Put parts and mates into the classes of equal width that a batch builds units of, deviations in place [m].
 
         Where either is exact, as in the nominal unit, both stay.

@@ -46,13 +46,10 @@ _MOST_CELLS = 100_000
 _BLANKS, _UNSEEN = re.compile(r"[\u00a0\u2007\u2009\u202f]"), re.compile(r"[\u200b-\u200d\u2060\ufeff\u00ad]")
 """Blanks of other widths, and signs that nobody sees."""
 DATA = Path(__file__).parent / "data"
-"""Shipped tables."""
 NumberedRow = tuple[int, tuple[str, ...]]
 """Row as an editor counts it, from 1, and its cells."""
 _DECIMAL = re.compile(r"[+-]?\d*[.,]\d+([eE][+-]?\d+)?", re.ASCII)
 """Number with one decimal sign, whichever."""
-_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
-"""Number that is a thousand times as large where the sign separates thousands."""
 _APOSTROPHE = re.compile(r"^'(?=[=+\-@])")
 """What `tolalloc.reading.files.no_formula` writes before a text."""
 _ANY = Heads()
@@ -299,13 +296,10 @@ def _records(path: Path, heads: Heads = _ANY) -> list[NumberedRow]:
             so_far += len(record)
             require_believable(path, len(rows), len(record), so_far)
     except csv.Error as error:
+        said = f"a quotation mark is not closed, or not doubled within a cell ({error})"
         if "field larger" in str(error):
-            raise InputError(
-                f"{path}, row {len(rows) + 1}: a cell is too long; allowed are {csv.field_size_limit()} characters."
-            ) from None
-        raise InputError(
-            f"{path}, row {len(rows) + 1}: a quotation mark is not closed, or not doubled within a cell ({error})."
-        ) from None
+            said = f"a cell is too long; allowed are {csv.field_size_limit()} characters"
+        raise InputError(f"{path}, row {len(rows) + 1}: {said}.") from None
     heads.require_in(path, rows)
     hint = "numbers have a decimal point, and " if separator == "," else ""
     kept = _under_headers(path, _without_titles(rows, heads), f"{hint}cells are separated by {separator!r}")
@@ -379,7 +373,7 @@ def _with_decimal_points(
         for at in numbers
         if at < len(cells) and _DECIMAL.fullmatch(cells[at])
     }
-    grouped = {cell: number for cell, number in decimals.items() if _THOUSANDS.fullmatch(cell)}
+    grouped = {cell: number for cell, number in decimals.items() if _GROUPED.fullmatch(cell)}
     both = any("," in cell for cell in decimals) and any("." in cell for cell in decimals)
     if grouped and (both or (is_careful and len(grouped) == len(decimals))):
         cell, number = next(iter(grouped.items()))

@@ -132,7 +132,6 @@ class ProcessCapability(Record):
 
 
 ProcessCapabilities = Mapping[tuple[str, Feature], ProcessCapability]
-"""Process and feature → capability."""
 
 
 def load_process_capabilities(name: str | Path) -> ProcessCapabilities:
@@ -546,19 +545,16 @@ def require_small_zones(sources: Sequence[Source], largest: float, place: str | 
     """Raise unless all zones, those that may be asked for and measured parts are as small as a model believes [m]."""
     limit, farthest = largest / MICROMETRE, _MEASURED * largest / MICROMETRE
     for source in sources:
+        who = f"{place} ({source.name})"
         if source.measured and (own := max(map(abs, source.measured.values)) / MICROMETRE) > farthest:
             file = source.measured.path.name
-            raise InputError(
-                f"{place} ({source.name}): {file} has a deviation of {own:g} µm; allowed is {farthest:g} µm."
-            )
+            raise InputError(f"{who}: {file} has a deviation of {own:g} µm; allowed is {farthest:g} µm.")
         zone, smallest, most = (length / MICROMETRE for length in (source.zone, source.minimum, source.maximum))
         if zone > limit:
-            raise InputError(
-                f"{place} ({source.name}): the zone plus − minus is {zone:g} µm and must be 0 to {limit:g} µm."
-            )
+            raise InputError(f"{who}: the zone plus − minus is {zone:g} µm and must be 0 to {limit:g} µm.")
         if zone > 0 and not source.locked and most > limit:
             raise InputError(
-                f"{place} ({source.name}): the zone must lie between min and max, above 0 and up to {limit:g} µm: "
+                f"{who}: the zone must lie between min and max, above 0 and up to {limit:g} µm: "
                 f"min {smallest:g}, zone {zone:g}, max {most:g} µm."
             )
 

@@ -27,7 +27,6 @@ _ARCHIVES = {
     b"xl/workbook.bin": "a binary workbook (XLSB)",
     b"Index/Document.iwa": "a Numbers spreadsheet",
 }
-"""What stands in an archive of which kind."""
 _OFFICES = {"UTF-16": "utf-16", "Windows-1252": "cp1252"}
 """How spreadsheets save a CSV file that is not UTF-8 → codec of Python."""
 
