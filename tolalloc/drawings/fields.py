@@ -183,7 +183,7 @@ class ToleranceRow(Record):
     ] = Distribution.NORMAL
     Cp: Annotated[float, Field(ge=0.1, le=10), TableColumn("capability; 1 unless given", "-", "cp")] = 1.0
     shift: Annotated[
-        float, Field(ge=-1, le=1), TableColumn("mean shift over half the zone, sizes only", "half zone", "shift")
+        float, Field(ge=-1, le=1), TableColumn("mean shift over half the zone, sizes only", "half zone")
     ] = 0.0
     shape: Annotated[
         str,
@@ -291,7 +291,6 @@ class ToleranceRow(Record):
         TableColumn(
             "like features that each deviate on their own, for `each_pin.…` and `disc{j}.each_tooth.…`: their number",
             "-",
-            "each",
         ),
     ] = 1
     over: Annotated[

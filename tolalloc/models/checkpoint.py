@@ -23,6 +23,9 @@ from tolalloc.models.model import Evaluation, Response
 _PROBED = 1e-6
 """Relative difference up to which an answer asked for again is the same, on another machine too [-]."""
 
+Designs = Float[np.ndarray, "design gene"]
+Numbers = Float[np.ndarray, "design number"]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Checkpoint:
@@ -48,7 +51,7 @@ class Checkpoint:
         if self.path.exists():  # found out now, and not when the search begins
             self.read()
 
-    def read(self) -> tuple[str, Float[np.ndarray, "design gene"], Float[np.ndarray, "design number"]]:
+    def read(self) -> tuple[str, Designs, Numbers]:
         """Return the identity of the problem, designs and their numbers; another file's are an InputError."""
         try:
             with np.load(self.path, allow_pickle=False) as file:
@@ -84,12 +87,7 @@ class CachedAnswers:
         Where the answers are kept beyond this process; one of another problem is refused.
     """
 
-    def __init__(
-        self,
-        ask: Callable[[Float[np.ndarray, "design gene"]], Float[np.ndarray, "design number"]],
-        identity: str,
-        checkpoint: Checkpoint | None = None,
-    ) -> None:
+    def __init__(self, ask: Callable[[Designs], Numbers], identity: str, checkpoint: Checkpoint | None = None) -> None:
         self._ask, self._checkpoint = ask, checkpoint
         self._identity = _hashed(identity)
         self._known: dict[bytes, Float[np.ndarray, " number"]] = {}
@@ -97,7 +95,7 @@ class CachedAnswers:
         if checkpoint is not None and checkpoint.path.exists():
             self._read(checkpoint)
 
-    def __call__(self, designs: Float[np.ndarray, "design gene"]) -> Float[np.ndarray, "design number"]:
+    def __call__(self, designs: Designs) -> Numbers:
         """Return the numbers of every design; only new ones are asked for, in pieces as the checkpoint wants them.
 
         A piece ends where the file is written, so a resumed search asks for designs in the same company as before.
@@ -178,8 +176,6 @@ def _hashed(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _digest(
-    identity: str, designs: Float[np.ndarray, "design gene"], numbers: Float[np.ndarray, "design number"]
-) -> str:
+def _digest(identity: str, designs: Designs, numbers: Numbers) -> str:
     """Return the digest of all that a checkpoint holds."""
     return hashlib.sha256(identity.encode() + designs.tobytes() + numbers.tobytes()).hexdigest()

@@ -29,6 +29,9 @@ _SAME = 1e-9
 _FEWEST = 30
 """Samples from which on a function that raises for all of them has a fault rather than bad samples [-]."""
 
+Arguments = Float[np.ndarray, "sample argument"]
+Values = Float[np.ndarray, "sample value"]
+
 
 @dataclass(frozen=True, kw_only=True)
 class UserFunction:
@@ -39,7 +42,7 @@ class UserFunction:
     place: str  # Who is meant, for messages
     names: tuple[str, ...] = ()  # What these numbers are called, with their units, where it may return them by name
 
-    def __call__(self, arguments: Float[np.ndarray, "sample argument"]) -> Float[np.ndarray, "sample value"]:
+    def __call__(self, arguments: Arguments) -> Values:
         """Return the values of every sample, NaN where there are none.
 
         The function is first given whole columns, copies that it may change. What it returns counts only if every
@@ -67,12 +70,12 @@ class UserFunction:
         self._require_a_number(found, arguments)
         return found
 
-    def takes_columns(self, arguments: Float[np.ndarray, "sample argument"]) -> bool:
+    def takes_columns(self, arguments: Arguments) -> bool:
         """Return whether one call with whole columns gives the values of all samples."""
         with np.errstate(all="ignore"):
             return self._of_columns(arguments) is not None
 
-    def _of_columns(self, arguments: Float[np.ndarray, "sample argument"]) -> Float[np.ndarray, "sample value"] | None:
+    def _of_columns(self, arguments: Arguments) -> Values | None:
         """Return the values by one call with whole columns; None unless they can be trusted."""
         samples = arguments.shape[0]
         if samples < 2:
@@ -94,13 +97,11 @@ class UserFunction:
         self._require_same(arguments[few], alone)
         return None
 
-    def _alone(self, arguments: Float[np.ndarray, "sample argument"]) -> Float[np.ndarray, "sample value"]:
+    def _alone(self, arguments: Arguments) -> Values:
         """Return the values of samples that are called one by one."""
         return np.array([self._of_sample(sample)[0] for sample in arguments]).reshape(-1, self.values)
 
-    def _require_a_number(
-        self, found: Float[np.ndarray, "sample value"], arguments: Float[np.ndarray, "sample argument"]
-    ) -> None:
+    def _require_a_number(self, found: Values, arguments: Arguments) -> None:
         """Raise if none of many samples has an answer: what is wrong then is the function."""
         if len(found) >= _FEWEST and not np.isfinite(found).any():
             raise SolveError(
@@ -108,9 +109,7 @@ class UserFunction:
                 f"({_listed(arguments[0])}); allowed are numbers that are real and within ±{_LARGEST:g}."
             )
 
-    def _require_same(
-        self, arguments: Float[np.ndarray, "sample argument"], before: Float[np.ndarray, "sample value"]
-    ) -> None:
+    def _require_same(self, arguments: Arguments, before: Values) -> None:
         """Raise if the function says something else of the same samples in another order."""
         again = self._alone(arguments[::-1])[::-1]
         for sample, first, second in zip(arguments, before, again, strict=True):
