@@ -61,6 +61,10 @@ _AGAINST = Rule(
 )
 
 
+Units = Float[np.ndarray, "*sample column"]
+"""Numbers of some units, one row each: uniform ones [-] or deviations [m, angles rad]."""
+
+
 @dataclass(frozen=True)
 class Standing:
     """An active source, and where its columns stand among those of a unit."""
@@ -81,12 +85,12 @@ class Standing:
         """Columns of one deviation or vector [-]."""
         return 1 if self.source.feature is Feature.SIZE else 2
 
-    def of(self, numbers: Float[np.ndarray, "*sample column"]) -> Float[np.ndarray, "*sample copy width"]:
+    def of(self, numbers: Units) -> Float[np.ndarray, "*sample copy width"]:
         """Return the deviations or vectors of every like feature among the numbers of units, a copy."""
         own = numbers[..., self.vector]
         return own.reshape(*own.shape[:-1], -1, self.width).copy()
 
-    def put(self, numbers: Float[np.ndarray, "*sample column"], own: Float[np.ndarray, "*sample copy width"]) -> None:
+    def put(self, numbers: Units, own: Float[np.ndarray, "*sample copy width"]) -> None:
         """Put them back in place."""
         numbers[..., self.vector] = own.reshape(*own.shape[:-2], -1)
 
@@ -162,13 +166,7 @@ class Compensator(NamedFields, ABC):
 
     @abstractmethod
     def resolved(self, sources: Sequence[Source], place: str) -> Self:
-        """Return the same with the names that the table itself uses.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            No such source, or one of which nothing can be chosen so.
-        """
+        """Return the same with the table's own names; one of which nothing can be chosen so is refused."""
 
     @abstractmethod
     def cost(self, sources: Mapping[str, Source]) -> float:
@@ -178,15 +176,13 @@ class Compensator(NamedFields, ABC):
         """Return the share of parts that find no mate, at the zones of sources by their names [-]."""
         return 0.0
 
-    def sorted(self, uniform: Float[np.ndarray, "*sample column"], known: Known) -> None:
+    def sorted(self, uniform: Units, known: Known) -> None:
         """Put the parts of units where their mates are, uniform numbers in place [-]; unless it sorts, nothing."""
 
-    def arranged(
-        self, deviations: Float[np.ndarray, "*sample column"], zones: Mapping[str, float], known: Known
-    ) -> None:
+    def arranged(self, deviations: Units, zones: Mapping[str, float], known: Known) -> None:
         """Put deviations of units at these zones [m] where it `arranges` them, in place [m]."""
 
-    def fitted(self, deviations: Float[np.ndarray, "*sample column"], known: Known) -> None:
+    def fitted(self, deviations: Units, known: Known) -> None:
         """Put what is chosen into deviations of units, in place [m]; unless it fits for measured ones, nothing."""
 
 
@@ -204,16 +200,13 @@ class _Fitting(Compensator):
 
     @property
     def chosen(self) -> tuple[str, ...]:
-        """Sources of the parts."""
         return _listed(self.part)
 
     @property
     def named(self) -> tuple[str, ...]:
-        """Parts, then what is measured besides."""
         return (*self.chosen, *(name for own in self.against for name in _listed(own)))
 
     def cost(self, sources: Mapping[str, Source]) -> float:  # noqa: ARG002
-        """Return what it costs per unit [cost units]."""
         price: float = getattr(self, f"{self.counted[:-1]}_cost")
         return price * (self.count - 1)
 
@@ -227,22 +220,14 @@ class _Fitting(Compensator):
         )
 
     def resolved(self, sources: Sequence[Source], place: str) -> Self:
-        """Return the same with the names that the table itself uses.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            No such source, one that cannot be fitted so, or not one for each part.
-        """
         parts, against = _sources("part", self.part, sources, place), dict[Names, float]()
         for given, weight in self.against.items():
             others = _sources("against", given, sources, place)
             copies = {own.each for own in others} - {1}
             if len(others) not in (1, len(parts)) or (copies and copies != {own.each for own in parts}):
                 allowed = "one source for all parts or one for each of them, with as many like features or one"
-                raise InputError.at(
-                    f"{place}, {self.called}", "against", " and ".join(own.name for own in others), allowed
-                )
+                names = " and ".join(own.name for own in others)
+                raise InputError.at(f"{place}, {self.called}", "against", names, allowed)
             against[_together(others)] = weight
         return replace(self, part=_together(parts), against=against)  # type: ignore[type-var]
 
@@ -275,16 +260,6 @@ class Shim(_Fitting):
     either way, that leaves the least of it; d becomes d + step·k. Measuring errs by nothing (an assumption).
     Derivatives with respect to zones are those of the sizes chosen, as a unit that changes its size has none (own
     derivation).
-
-    Examples
-    --------
-    >>> Shim("pin.diameter", step=0.5, sizes=5, against={"housing.groove.radius": -1.0}).reach
-    2
-
-    Every pin for its own groove:
-
-    >>> Shim("each_pin.diameter", step=0.5, sizes=5, against={"each_pin.groove": -1.0}).label
-    '5 sizes of each_pin.diameter'
     """
 
     called: ClassVar[str] = "shim"
@@ -311,7 +286,7 @@ class Shim(_Fitting):
                 raise InputError.at(f"{place}, {self.called}", "source", own.name, "a size, which is a length")
         return found
 
-    def fitted(self, deviations: Float[np.ndarray, "*sample column"], known: Known) -> None:
+    def fitted(self, deviations: Units, known: Known) -> None:
         """Put the sizes that are chosen into deviations of units, in place [m]."""
         step = self.step * MICROMETRE
         for name, others in self.of_each:
@@ -345,11 +320,6 @@ class Indexing(_Fitting):
     sum v + s: the one that is nearest to the direction of −s. Other vectors of the part turn too and keep their law, as
     all directions are alike (own derivation). Measuring errs by nothing (an assumption). Derivatives with respect to
     zones are those of the positions chosen, with the vector as it is turned.
-
-    Examples
-    --------
-    >>> Indexing("sun.eccentricity", positions=6, against={"sun.assembly": 1.0}).label
-    '6 positions of sun.eccentricity'
     """
 
     called: ClassVar[str] = "indexing"
@@ -387,12 +357,7 @@ class Indexing(_Fitting):
         """Yes: a vector that is turned grows with its zone as it is turned."""
         return True
 
-    def arranged(
-        self,
-        deviations: Float[np.ndarray, "*sample column"],
-        zones: Mapping[str, float],  # noqa: ARG002
-        known: Known,
-    ) -> None:
+    def arranged(self, deviations: Units, zones: Mapping[str, float], known: Known) -> None:  # noqa: ARG002
         """Turn the parts of units to the position that is chosen, deviations in place [m]."""
         for name, others in self.of_each:
             part = _complex(known[name].of(deviations))
@@ -415,13 +380,7 @@ def _together(sources: Sequence[Source]) -> Names:
 
 
 def require_vector(source: Source, place: str, named: str) -> None:
-    """Raise unless a source is a vector whose direction is as likely as any other.
-
-    Raises
-    ------
-    InputError
-        It is a size, has no wave of order 1, or systematic waves that all parts share.
-    """
+    """Raise unless a source is a vector or has one of order 1, and no systematic waves: all directions alike."""
     orders = [order for order, _ in source.spectrum]
     if source.feature is Feature.SIZE or (orders and 1 not in orders):
         raise InputError.at(place, named, source.name, "a position, or a pitch or run-out with a wave of order 1")
@@ -454,13 +413,7 @@ def one_source(field_name: str, name: str, sources: Sequence[Source], place: str
 
 
 def in_force(compensators: Sequence[Compensator], sources: Sequence[Source], place: str) -> tuple[Compensator, ...]:
-    """Return the compensators that act, with the names of the table.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        A source that is not there or of which nothing can be chosen so, or that is chosen twice.
-    """
+    """Return the compensators that act, with the names of the table; a source may be chosen once alone."""
     found = [own.resolved(sources, place) for own in compensators]
     done = Counter((name, own.done) for own in found for name in own.chosen)
     for (name, what), times in done.items():
@@ -479,13 +432,7 @@ def in_force(compensators: Sequence[Compensator], sources: Sequence[Source], pla
 
 
 def all_choices(compensators: Sequence[Compensator], place: str) -> tuple[tuple[Compensator, ...], ...]:
-    """Return every combination of classes, sizes and positions, the first numbers first.
-
-    Raises
-    ------
-    InputError
-        More than are compared.
-    """
+    """Return every combination of classes, sizes and positions, the first numbers first; too many are an InputError."""
     found: tuple[tuple[Compensator, ...], ...] = tuple(product(*(own.choices for own in compensators)))
     if len(found) > MOST_CHOICES:
         raise InputError.at(place, "combinations at assembly", len(found), f"{MOST_CHOICES} or less")

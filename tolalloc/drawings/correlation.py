@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import combinations, permutations, zip_longest
+from itertools import combinations, zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +37,16 @@ class Pair:
     correlation: float
     place: str = field(default="correlations", repr=False)  # Where it stands, for messages
 
+    @property
+    def called(self) -> str:
+        """What messages call it."""
+        return f"{self.place}, {self.one} with {self.other}"
+
+
+def _varying(sources: Sequence[Source]) -> list[str]:
+    """Return the names of the sources with a zone."""
+    return [source.name for source in sources if source.zone > 0.0]
+
 
 @dataclass(frozen=True, kw_only=True)
 class Correlation:
@@ -47,7 +57,7 @@ class Correlation:
 
     def among(self, sources: Sequence[Source]) -> tuple[Pair, ...]:
         """Return the pairs whose sources both vary and whose correlation is not zero."""
-        varying = {source.name for source in sources if source.zone > 0.0}
+        varying = {*_varying(sources)}
         return tuple(pair for pair in self.pairs if pair.correlation and {pair.one, pair.other} <= varying)
 
     def require_sound(self, sources: Sequence[Source]) -> None:
@@ -64,12 +74,8 @@ class Correlation:
             _require_allowed(pair, known)
             first = seen.setdefault(frozenset((pair.one, pair.other)), pair)
             if abs(first.correlation - pair.correlation) > _ROUNDING:
-                raise InputError.at(
-                    f"{pair.place}, {pair.one} with {pair.other}",
-                    "correlation",
-                    pair.correlation,
-                    f"one value for both orders of a pair, and {first.place} says {first.correlation:g}",
-                )
+                allowed = f"one value for both orders of a pair, and {first.place} says {first.correlation:g}"
+                raise InputError.at(pair.called, "correlation", pair.correlation, allowed)
         self._require_no_contradiction(sources)
 
     def _require_no_contradiction(self, sources: Sequence[Source]) -> None:
@@ -80,18 +86,16 @@ class Correlation:
             # The eigenvalue is the sum of these parts; the most negative one is the pair that asks for too much.
             parts = np.triu(matrix * np.outer(vectors[:, 0], vectors[:, 0]), 1)
             one, other = (int(at) for at in np.unravel_index(parts.argmin(), parts.shape))
-            names = [source.name for source in sources if source.zone > 0.0]
-            raise InputError.at(
-                self.origin,
-                "least eigenvalue of the correlation matrix",
-                float(f"{values[0]:.3g}"),
+            names, what = _varying(sources), "least eigenvalue of the correlation matrix"
+            allowed = (
                 f"0 or more; the correlations contradict each other, above all {matrix[one, other]:g} of "
-                f"{names[one]} with {names[other]}",
+                f"{names[one]} with {names[other]}"
             )
+            raise InputError.at(self.origin, what, float(f"{values[0]:.3g}"), allowed)
 
     def source_matrix(self, sources: Sequence[Source]) -> Float[np.ndarray, "source source"]:
         """Return the correlation matrix of the varying sources [-]."""
-        names = [source.name for source in sources if source.zone > 0.0]
+        names = _varying(sources)
         matrix = np.eye(len(names))
         for pair in self.among(sources):
             one, other = names.index(pair.one), names.index(pair.other)
@@ -103,7 +107,7 @@ class Correlation:
 
         Pairs that depend on each other otherwise than by a correlation may be given as tied.
         """
-        members = {source.name: {source.name} for source in sources if source.zone > 0.0}
+        members = {name: {name} for name in _varying(sources)}
         for one, other in (*((pair.one, pair.other) for pair in self.among(sources)), *tied):
             joined = members[one] | members[other]
             members |= dict.fromkeys(joined, joined)
@@ -112,41 +116,40 @@ class Correlation:
 
     def mappings(self, sources: Sequence[Source]) -> tuple[str, ...]:
         """Return a sentence for every set of sources that depend on each other: which they are, and how strongly."""
-        matrix = self.source_matrix(sources)
-        position = {name: at for at, name in enumerate(source.name for source in sources if source.zone > 0.0)}
-        sentences = []
+        matrix, names, sentences = self.source_matrix(sources), _varying(sources), list[str]()
         for block in (block for block in self.blocks(sources) if len(block) > 1):
             pairs: dict[float, list[str]] = {}
             for one, other in combinations(block, 2):
-                correlation = float(matrix[position[one], position[other]])
+                correlation = float(matrix[names.index(one), names.index(other)])
                 pairs.setdefault(correlation, []).append(f"{one} with {other}")
             if len(pairs) == 1:
                 sentences.append(f"{', '.join(block)}: correlation {next(iter(pairs)):g} of each with each")
             else:
-                parts = [f"{value:g} ({', '.join(names)})" for value, names in pairs.items() if value]
+                parts = [f"{value:g} ({', '.join(own)})" for value, own in pairs.items() if value]
                 sentences.append(f"{', '.join(block)}: correlation {', '.join(parts)}")
         return tuple(sentences)
 
 
 def _require_allowed(pair: Pair, known: Mapping[str, Source]) -> None:
     """Raise unless a pair names two sources with like columns, and a correlation."""
-    place = f"{pair.place}, {pair.one} with {pair.other}"
     for name in (pair.one, pair.other):
         if name not in known:
             raise UnknownNameError.among(pair.place, "source", name, known)
     if not -1 <= pair.correlation <= 1:
-        raise InputError.at(place, "correlation", pair.correlation, "-1 to 1")
+        raise InputError.at(pair.called, "correlation", pair.correlation, "-1 to 1")
     if pair.one == pair.other:
-        raise InputError.at(place, "pair", pair.one, "two different sources")
+        raise InputError.at(pair.called, "pair", pair.one, "two different sources")
     columns = zip_longest(known[pair.one].columns, known[pair.other].columns, fillvalue="nothing")
     for one, other in columns:
         if one.removeprefix(pair.one) != other.removeprefix(pair.other):
-            raise InputError.at(
-                place,
-                "columns",
-                f"{one} with {other}",
-                "like columns of both sources, as two diameters, two bores or two pitches of the same orders have",
-            )
+            allowed = "like columns of both sources, as two diameters, two bores or two pitches of the same orders have"
+            raise InputError.at(pair.called, "columns", f"{one} with {other}", allowed)
+
+
+def symmetric_root(matrix: Float[np.ndarray, "row row"]) -> Float[np.ndarray, "row row"]:
+    """Return the symmetric root of a covariance; Cholesky's does not exist where something is fully correlated."""
+    values, vectors = np.linalg.eigh(matrix)
+    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -160,9 +163,8 @@ class CorrelatedSource:
 
     @cached_property
     def factor(self) -> Float[np.ndarray, "column column"]:
-        """The symmetric root of the covariance; Cholesky's does not exist where columns are fully correlated."""
-        values, vectors = np.linalg.eigh(self.covariance)
-        return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
+        """The symmetric root of the covariance."""
+        return symmetric_root(self.covariance)
 
     def standard_values(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
         """Return correlated columns for independent uniform numbers in (0, 1)."""
@@ -194,20 +196,15 @@ def load_correlations(path: Path | str, sources: Sequence[Source]) -> Correlatio
     InputError, UnknownNameError
         The file, row and value that are not allowed.
     """
-    rows = _read(shipped_or_path(path, DATA, ".correlations.csv", "correlation"))
+    file = shipped_or_path(path, DATA, ".correlations.csv", "correlation")
+    rows = [(f"{file}, row {number}", [*cells]) for number, cells in read_table_file(file)]
+    if len(rows) < 2:
+        raise InputError(f"{file}: the table has no rows below its header; a list or a matrix is needed.")
     is_list = bool(set(LIST_HEADERS[1:]) & set(rows[0][1]))
     pairs = _pairs_of_list(rows, sources) if is_list else _pairs_of_matrix(rows, sources)
     correlation = Correlation(pairs=pairs, origin=str(path))
     correlation.require_sound(sources)
     return correlation
-
-
-def _read(path: Path) -> list[Row]:
-    """Return the rows with their places, the header first."""
-    rows = read_table_file(path)
-    if len(rows) < 2:
-        raise InputError(f"{path}: the table has no rows below its header; a list or a matrix is needed.")
-    return [(f"{path}, row {number}", list(cells)) for number, cells in rows]
 
 
 def _pairs_of_list(rows: Sequence[Row], sources: Sequence[Source]) -> tuple[Pair, ...]:
@@ -222,13 +219,10 @@ def _pairs_of_list(rows: Sequence[Row], sources: Sequence[Source]) -> tuple[Pair
     pairs = []
     for place, cells in rows[1:]:
         row = dict(zip(header, cells, strict=True))
-        correlation = number_at(
-            f"{place} ({row['sources'] or 'no sources'})", "correlation", row["correlation"], _ALLOWED
-        )
-        pairs += [
-            Pair(one=one, other=other, correlation=correlation, place=place)
-            for one, other in combinations(_group(row["sources"], sources, place), 2)
-        ]
+        where = f"{place} ({row['sources'] or 'no sources'})"
+        value = number_at(where, "correlation", row["correlation"], _ALLOWED)
+        group = combinations(_group(row["sources"], sources, place), 2)
+        pairs += [Pair(one=one, other=other, correlation=value, place=place) for one, other in group]
     return tuple(pairs)
 
 
@@ -261,22 +255,18 @@ def _pairs_of_matrix(rows: Sequence[Row], sources: Sequence[Source]) -> tuple[Pa
             f"{rows[-1][0]}: the matrix is not square with the same names down and across; down are "
             f"{', '.join(below)}, across are {', '.join(header)}."
         )
-    values = {
-        (one, other): (number_at(f"{place} ({one} with {other})", "correlation", cell, _ALLOWED), place)
+    own = {source.own_id: source.name for source in sources if source.own_id}
+    pairs = {
+        (one, other): Pair(
+            one=own.get(one, one),
+            other=own.get(other, other),
+            correlation=number_at(f"{place} ({one} with {other})", "correlation", cell, _ALLOWED),
+            place=place,
+        )
         for place, (one, *cells) in rows[1:]
         for other, cell in zip(header, cells, strict=True)
     }
     for name in header:
-        value, place = values[name, name]
-        if value != 1.0:
-            raise InputError.at(f"{place} ({name})", "value on the diagonal", value, "1")
-    own = {source.own_id: source.name for source in sources if source.own_id}
-    return tuple(
-        Pair(
-            one=own.get(one, one),
-            other=own.get(other, other),
-            correlation=values[one, other][0],
-            place=values[one, other][1],
-        )
-        for one, other in permutations(header, 2)
-    )
+        if (diagonal := pairs.pop((name, name))).correlation != 1.0:
+            raise InputError.at(f"{diagonal.place} ({name})", "value on the diagonal", diagonal.correlation, "1")
+    return tuple(pairs.values())

@@ -127,15 +127,10 @@ FORMS = {
     Distribution.MIXTURE: Form(),
     Distribution.EMPIRICAL: Form(),
 }
-"""What is known of every distribution."""
 
 
 def parsed_shapes(text: str) -> tuple[float, ...]:
-    """Return the shapes that a cell states, separated by blanks.
-
-    >>> parsed_shapes("2 5"), parsed_shapes("0.4"), parsed_shapes("")
-    ((2.0, 5.0), (0.4,), ())
-    """
+    """Return the shapes that a cell states, separated by blanks."""
     if not all(re.fullmatch(NUMBER, item) for item in text.split()):
         raise ValueError("allowed is a number with a decimal point, or for beta two such as '2 5'")
     return tuple(map(float, text.split()))
@@ -333,11 +328,8 @@ def batches_text(batches: tuple[Batch, ...]) -> str:
 class Mixture:
     """Parts from several batches, each with a mean and a spread of its own, of one common distribution.
 
-    Notes
-    -----
-    The base is normal for sizes, Rayleigh for the radius of a position. The quantile has no closed form: it is
-    interpolated between the probabilities of fixed values. The values are the quantiles of the batches, so that a
-    narrow batch is resolved as well as a wide one, and a grid over all of them.
+    The base is normal for sizes, Rayleigh for the radius of a position. The quantile is interpolated between the
+    probabilities of fixed values: quantiles of the batches, so that a narrow one is resolved too, and a grid over all.
     """
 
     base: Marginal
@@ -394,10 +386,7 @@ class Folded:
 def smoothed(values: Float[np.ndarray, " part"], width: float) -> Mixture:
     """Return the distribution of measured values, each widened to a normal one of this σ [half zone].
 
-    Notes
-    -----
-    The values are drawn together around their mean by as much as the widening spreads them, so that mean and standard
-    deviation stay the measured ones.
+    The values are drawn together around their mean by as much, so that mean and standard deviation stay as measured.
 
     References
     ----------
@@ -421,12 +410,10 @@ def smoothing_width(values: Float[np.ndarray, " part"]) -> float:
 
 
 def smoothed_magnitude(values: Float[np.ndarray, " part"]) -> Folded:
-    """Return the distribution of measured radii [largest radius].
+    """Return the distribution of measured radii, smoothed as deviations are and then mirrored at 0 [largest radius].
 
-    Notes
-    -----
-    They are smoothed as deviations are and then mirrored at 0, so that none becomes negative. The mean square stays the
-    measured one; mean and standard deviation do as far as no part lies within the smoothing width of 0.
+    The mean square stays the measured one; mean and standard deviation do as far as no part lies within the smoothing
+    width of 0.
     """
     batches = smoothed(values, smoothing_width(values)).batches
     return Folded(Mixture(NORMAL, batches + tuple(replace(batch, shift=-batch.shift) for batch in batches)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
@@ -104,31 +104,21 @@ class Drawing:
         ------
         InputError, UnknownNameError
             The row, field and value that are not allowed.
-
-        Examples
-        --------
-        A hub of 55.29 ± 0.1 mm is one source with one column, in metres:
-
-        >>> zone = {"plus": 0.1, "minus": -0.1, "unit": "mm", "min": 0.02, "max": 0.5, "cost": 3.0}
-        >>> hub = Drawing.of_rows([{"id": "hub", "nominal": 55.29, **zone}])
-        >>> hub.errors.columns, hub.sources[0].zone
-        (('hub',), 0.0002)
         """
         listed = list(rows) if isinstance(rows, Iterable) and not isinstance(rows, str | Mapping) else [rows]
-        if not all(isinstance(row, Mapping) and "id" in row for row in listed):
-            wrong = next(row for row in listed if not (isinstance(row, Mapping) and "id" in row))
-            raise InputError.at(place, "rows", wrong, 'a list of rows such as {"id": "hub", "plus": 0.1, …}')
+        for row in listed:
+            if not (isinstance(row, Mapping) and "id" in row):
+                raise InputError.at(place, "rows", row, 'a list of rows such as {"id": "hub", "plus": 0.1, …}')
         numbered = [(number, dict(row)) for number, row in enumerate(listed, start=1)]
         for number, row in numbered:
-            require_columns(f"{place}, row {number} ({row.get('id', 'no id')})", tuple(row), ToleranceRow)
+            require_columns(f"{place}, row {number} ({row['id']})", tuple(row), ToleranceRow)
         sources = sources_of_rows(numbered, processes, place, Path.cwd())
         if not isinstance(correlations, Correlation):
             correlations = load_correlations(correlations, sources) if correlations else Correlation()
         if currency and currency_in(currency) != currency:
             raise InputError.at(place, "currency", currency, "three letters such as EUR, or €, $, £ or ¥")
         errors = ErrorModel(sources, correlation=correlations, table=place)
-        notes = doubts(sources, place)
-        return cls(name=place, errors=errors, costs=_placed(costs), currency=currency, notes=notes)
+        return cls(name=place, errors=errors, costs=_placed(costs), currency=currency, notes=doubts(sources, place))
 
     def __repr__(self) -> str:
         return f"<drawing {self.name}: {len(self.sources)} sources>"
@@ -147,11 +137,6 @@ class Drawing:
         """Return the drawing at the zones of another tolerance table, with the same correlations and process costs.
 
         Its settings stay as well, but those that the table states.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            The file, row, field and value that are not allowed.
         """
         read = load_drawing(found_from_here(table))
         changed = self.with_sources(read.sources, str(table))
@@ -175,9 +160,8 @@ class Drawing:
     def to_csv(self, path: str | Path) -> Path:
         """Write the tolerance table, which `load_drawing` reads again, into a new file, and return its path.
 
-        Heads of an office's are written again, and what they mean into a TOML file beside the table. The settings that
-        belong to it stand below its rows. Process costs are not in the table: whoever reads it gives them again by
-        ``costs=``. Nor are correlations.
+        Heads of an office's are written again, and what they mean into a TOML file beside the table; its settings stand
+        below its rows. Process costs (``costs=``) and correlations are not in it.
 
         Raises
         ------
@@ -232,22 +216,15 @@ def load_drawing(
     ------
     InputError, UnknownNameError
         The file, row, field and value that are not allowed.
-
-    Examples
-    --------
-    >>> drawing = load_drawing("rv20e_drawing")
-    >>> len(drawing.sources), f"{1e6 * drawing.sources[0].zone:.1f} µm", drawing.settings["flank clearance [µm]"]
-    (50, '4.0 µm', 3.5)
     """
     sources = load_tolerance_table(beside(folder, table), beside(folder, processes), sheet, columns)
     correlation = load_correlations(beside(folder, correlations), sources) if correlations else Correlation()
     path = found_from_here(beside(folder, table))
     notes, currency = _read_beside(path, sheet, columns)
+    called = dict(heads_of(path, columns).called)
     return Drawing(
         name=str(table),
-        errors=ErrorModel(
-            sources, correlation=correlation, table=str(table), called=dict(heads_of(path, columns).called)
-        ),
+        errors=ErrorModel(sources, correlation=correlation, table=str(table), called=called),
         costs=_placed(costs if isinstance(costs, Mapping) else beside(folder, costs)),
         notes=(*notes, *doubts(sources, path.name)),
         currency=currency,
@@ -262,13 +239,6 @@ def _read_beside(table: Path, sheet: str, columns: Mapping[str, str]) -> tuple[t
     header, names = read_table_file(table, heads := heads_of(table, columns), sheet=sheet)[0]
     stated, units = [split_header(name) for name in names], {name: own.unit for name, own in COLUMNS.items()}
     own = own_heads(table, [name for name, _ in stated])
-    meant = ", ".join(f"{head} is {name}" for head, name in heads.called.items())
-    said = (f"{table.name}: heads as {heads_file(table).name} says: {meant}",) if heads_beside(table) else ()
-    return (*_notes(table, header, sheet, own), *said), stated_currency(table, stated, units)
-
-
-def _notes(table: Path, header: int, sheet: str, own: Sequence[str]) -> tuple[str, ...]:
-    """Return what of a tolerance table was left out or only kept, how it was read, and what is hidden in it."""
     titles = f"{table.name}: the header stands in row {header}; what stands above it was left out"
     kept = f"{table.name}: kept as they are, and written again: {', '.join(own)}"
     found = [titles] * (header > 1) + [kept] * bool(own)
@@ -276,7 +246,10 @@ def _notes(table: Path, header: int, sheet: str, own: Sequence[str]) -> tuple[st
         found += hidden_cells(table, sheet)
     elif encoding := other_encoding(table):
         found.append(f"{table.name}: read as {encoding}, since it is not UTF-8")
-    return tuple(found)
+    if heads_beside(table):
+        meant = ", ".join(f"{head} is {name}" for head, name in heads.called.items())
+        found.append(f"{table.name}: heads as {heads_file(table).name} says: {meant}")
+    return tuple(found), stated_currency(table, stated, units)
 
 
 def beside(folder: Path | None, name: str | Path) -> str | Path:

@@ -10,10 +10,13 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.drawings.compensators import Compensator, Standing
-from tolalloc.drawings.correlation import CorrelatedSource, Correlation
+from tolalloc.drawings.correlation import CorrelatedSource, Correlation, symmetric_root
 from tolalloc.drawings.distributions import ABOVE_ZERO, BELOW_ONE, ndtr, ndtri
 from tolalloc.drawings.sources import Source
 from tolalloc.exceptions import InputError, UnknownNameError
+
+Columns = Float[np.ndarray, "sample column"]
+Zones = Float[np.ndarray, " source"]
 
 
 @dataclass(frozen=True)
@@ -150,9 +153,8 @@ class ErrorModel:
 
     @cached_property
     def _factor(self) -> Float[np.ndarray, "source source"]:
-        """Symmetric root of the correlation; Cholesky's does not exist where sources are fully correlated [-]."""
-        values, vectors = np.linalg.eigh(self.source_correlation)
-        return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T)
+        """Root of the correlation [-]."""
+        return symmetric_root(self.source_correlation)
 
     @cached_property
     def columns_of_source(self) -> tuple[slice, ...]:
@@ -166,19 +168,16 @@ class ErrorModel:
         return {own.name: Standing(own, at) for own, at in zip(self.active, self.columns_of_source, strict=False)}
 
     @cached_property
-    def zones(self) -> Float[np.ndarray, " source"]:
+    def zones(self) -> Zones:
         """Zones of the active sources [m], then 1 for every joint one [-]."""
         return np.array([*(source.zone for source in self.active), *(1.0 for _ in self.joint)])
 
-    def standard_values(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
+    def standard_values(self, uniform: Columns) -> Columns:
         """Return all deviations per unit of zone for independent uniform numbers in (0, 1)."""
         return self.marginal_values(self.dependent(uniform))
 
-    def dependent(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
-        """Return uniform numbers as the sources depend on each other from independent ones in (0, 1) [-].
-
-        By their correlation, and then by parts that are sorted into classes and mated.
-        """
+    def dependent(self, uniform: Columns) -> Columns:
+        """Return uniform numbers as sources depend on each other, by correlation and then by mated classes [-]."""
         found = self.mixed(uniform, self._factor)
         for own in self.compensators:
             own.sorted(found, self._known)
@@ -189,8 +188,6 @@ class ErrorModel:
     ) -> Float[np.ndarray, "*sample column"]:
         """Return independent uniform numbers in (0, 1) made dependent by F, with F·Fᵀ the `source_correlation` [-].
 
-        Notes
-        -----
         A source that depends on no other keeps its numbers. The sums run source by source, so that no bit of a sample
         depends on how many samples stand beside it, as it would in a library's product of matrices.
         """
@@ -204,37 +201,30 @@ class ErrorModel:
                 mixed[..., self.columns_of_source[source]] = np.clip(ndtr(own), ABOVE_ZERO, BELOW_ONE)
         return mixed
 
-    def marginal_values(self, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
+    def marginal_values(self, uniform: Columns) -> Columns:
         """Return all deviations per unit of zone for uniform numbers that already have their correlation."""
         values = np.zeros_like(uniform)
         for source, columns in zip(self._varying, self.columns_of_source, strict=True):
             values[:, columns] = source.standard_values(uniform[:, columns])
         return values
 
-    def deviations(
-        self, standard: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]
-    ) -> Float[np.ndarray, "sample column"]:
+    def deviations(self, standard: Columns, zones: Zones) -> Columns:
         """Return the columns [m, angles rad] that the standard values give at the zones [m], sizes chosen for them."""
         found = self._arranged(standard, zones)
         for own in self.compensators:
             own.fitted(found, self._known)
         return found
 
-    def by_zone(
-        self, standard: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]
-    ) -> Float[np.ndarray, "sample column"]:
+    def by_zone(self, standard: Columns, zones: Zones) -> Columns:
         """Return the derivatives of the columns by the zones of their sources, with what is chosen in force [-].
 
-        They are the standard values, unless parts are turned or in classes of equal width: then the deviations as
-        arranged, over the zones.
+        Unless deviations are arranged they are the standard values, else the deviations as arranged over the zones.
         """
         if not any(own.arranges for own in self.compensators):
             return standard
         return np.asarray((self._arranged(standard, zones) - self.middles) / np.repeat(zones, self._counts))
 
-    def _arranged(
-        self, standard: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]
-    ) -> Float[np.ndarray, "sample column"]:
+    def _arranged(self, standard: Columns, zones: Zones) -> Columns:
         """Return the columns that the standard values give before sizes are chosen [m, rad]."""
         found = np.asarray(standard * np.repeat(zones, self._counts) + self.middles)
         of_sources = {own.name: float(zone) for own, zone in zip(self.active, zones, strict=False)}
@@ -253,13 +243,9 @@ class ErrorModel:
             [*(source.middles for source in self.active), *(np.zeros(len(source.columns)) for source in self.joint), []]
         )
 
-    def deviations_of_normal(
-        self, numbers: Float[np.ndarray, "sample column"], zones: Float[np.ndarray, " source"]
-    ) -> Float[np.ndarray, "sample column"]:
+    def deviations_of_normal(self, numbers: Columns, zones: Zones) -> Columns:
         """Return the columns [m, angles rad] that are as probable as independent standard normal numbers.
 
-        Notes
-        -----
         Beyond 8.2 standard deviations the uniform numbers reach 1 as closely as they can, and the deviations stay.
         """
         return self.deviations(self.standard_values(np.clip(ndtr(numbers), ABOVE_ZERO, BELOW_ONE)), zones)

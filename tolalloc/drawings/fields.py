@@ -52,7 +52,6 @@ UNITS = {"µm": 1.0, "um": 1.0, "mm": 1000.0, "in": 25400.0, "inch": 25400.0}
 """Unit of a length → micrometres."""
 
 ALLOWED_UNITS = "µm, um, mm, in, inch or %"
-"""`UNITS` in a sentence, with the per cent of the nominal size."""
 
 _CALLED = {"um": "µm", "inch": INCHES}
 """Other spelling of a unit → the one that is written."""
@@ -68,21 +67,9 @@ class TableColumn:
     # What stands there, as ``docs/first-study.md`` explains it, and what the header says behind the name
     meaning: str
     unit: str = ""
-    attribute: str = ""  # Field of the source that is this cell; empty where several cells make it together
-    # What a number of the cell is multiplied by for the source, if by anything [SI unit per unit]
-    scale: float | None = None
+    # Field of the source that is this cell, as the column is called unless given; none where `write` alone is
+    attribute: str = ""
     write: Callable[[Source], Cell] | None = None  # Returns the cell of a source, where it is not its attribute
-
-    def read(self, cell: Cell) -> Cell:
-        """Return the attribute of the source for a cell."""
-        return cell * self.scale if self.scale and isinstance(cell, float) else cell
-
-    def cell(self, source: Source) -> Cell:
-        """Return the cell of a source."""
-        if self.write:
-            return self.write(source)
-        value: Cell = getattr(source, self.attribute)
-        return value / self.scale if self.scale and isinstance(value, float) else value
 
 
 def _alternatives(words: Iterable[str]) -> str:
@@ -108,11 +95,7 @@ def _known_unit(text: str) -> str:
 
 
 def usual_unit(text: str) -> str:
-    """Return the unit of a row in its one spelling.
-
-    >>> usual_unit("inch"), usual_unit("um"), usual_unit("mm")
-    ('in', 'µm', 'mm')
-    """
+    """Return the unit of a row in its one spelling."""
     unit = usual_signs(text.strip())
     return _CALLED.get(unit, unit)
 
@@ -168,22 +151,17 @@ class ToleranceRow(Record):
             write=lambda source: source.own_id or source.name,
         ),
     ]
-    part: Annotated[str, TableColumn("part that carries it; the id unless given", attribute="part")] = ""
+    part: Annotated[str, TableColumn("part that carries it; the id unless given")] = ""
     feature: Annotated[
         Feature,
         TableColumn(
             "`size` (± zone), `position` (Ø zone of an axis), `pitch` (total cumulative deviation) or `runout` (full "
             "indicator reading); size unless given",
-            attribute="feature",
         ),
     ] = Feature.SIZE
     nominal: Annotated[
         float,
-        TableColumn(
-            "nominal size, for grades, for you and for an own model; in inches where the unit is in",
-            "mm",
-            write=lambda source: _length_written(source, source.nominal),
-        ),
+        TableColumn("nominal size, for grades, for you and for an own model; in inches where the unit is in", "mm"),
     ] = 0.0
     plus: Annotated[float, TableColumn("upper limit; the zone is plus − minus", "unit", write=_plus)]
     minus: Annotated[
@@ -197,18 +175,15 @@ class ToleranceRow(Record):
     unit: Annotated[
         str,
         AfterValidator(_known_unit),
-        TableColumn("µm, mm, in or % (of the nominal size), for plus, minus, min and max", attribute="unit"),
+        TableColumn("µm, mm, in or % (of the nominal size), for plus, minus, min and max"),
     ]
     distribution: Annotated[
         Distribution,
-        TableColumn(
-            f"{_alternatives(f'`{kind}`' for kind in Distribution)}; normal unless given",
-            attribute="distribution",
-        ),
+        TableColumn(f"{_alternatives(f'`{kind}`' for kind in Distribution)}; normal unless given"),
     ] = Distribution.NORMAL
     Cp: Annotated[float, Field(ge=0.1, le=10), TableColumn("capability; 1 unless given", "-", "cp")] = 1.0
     shift: Annotated[
-        float, Field(ge=-1, le=1), TableColumn("mean shift over half the zone, sizes only", "half zone", "shift")
+        float, Field(ge=-1, le=1), TableColumn("mean shift over half the zone, sizes only", "half zone")
     ] = 0.0
     shape: Annotated[
         str,
@@ -248,9 +223,7 @@ class ToleranceRow(Record):
     ] = None
     sorted: Annotated[
         bool,
-        TableColumn(
-            "yes: parts outside the zone are sorted out before assembly (a truncated distribution)", attribute="sorted"
-        ),
+        TableColumn("yes: parts outside the zone are sorted out before assembly (a truncated distribution)"),
     ] = False
     process: Annotated[
         str,
@@ -258,7 +231,6 @@ class ToleranceRow(Record):
             "how the feature is made today: row of a process capability library (`ta.drawing(processes=)`), which then "
             "gives Cp, shift, distribution, shape and sorting unless the row states them, and of the process cost "
             "table; with Cp stated, the library need not know it",
-            attribute="process",
         ),
     ] = ""
     group: Annotated[
@@ -267,24 +239,11 @@ class ToleranceRow(Record):
             "rows of one group keep the ratios of their zones: both discs of one drawing. Unless given, rows of one "
             "feature on identical parts of a reducer form a group if zone, limits and price are the same; any other "
             "row stands alone",
-            attribute="group",
         ),
     ] = ""
-    locked: Annotated[bool, TableColumn("yes: allocation leaves the zone as it is", attribute="locked")] = False
-    min: Annotated[
-        float,
-        Field(ge=0),
-        TableColumn(
-            "smallest zone that may be asked for", "unit", write=lambda source: _written(source, source.minimum)
-        ),
-    ]
-    max: Annotated[
-        float,
-        Field(ge=0),
-        TableColumn(
-            "largest zone that may be asked for", "unit", write=lambda source: _written(source, source.maximum)
-        ),
-    ]
+    locked: Annotated[bool, TableColumn("yes: allocation leaves the zone as it is")] = False
+    min: Annotated[float, Field(ge=0), TableColumn("smallest zone that may be asked for", "unit", "minimum")]
+    max: Annotated[float, Field(ge=0), TableColumn("largest zone that may be asked for", "unit", "maximum")]
     cost: Annotated[
         float,
         Field(ge=0, le=1e9),
@@ -295,7 +254,7 @@ class ToleranceRow(Record):
             write=lambda source: round(source.cost, 12),
         ),
     ]
-    grade: Annotated[str, TableColumn("carried through", attribute="grade")] = ""
+    grade: Annotated[str, TableColumn("carried through")] = ""
     step: Annotated[
         float,
         Field(ge=0, le=LARGEST_ZONE),
@@ -332,7 +291,6 @@ class ToleranceRow(Record):
         TableColumn(
             "like features that each deviate on their own, for `each_pin.…` and `disc{j}.each_tooth.…`: their number",
             "-",
-            "each",
         ),
     ] = 1
     over: Annotated[
@@ -348,14 +306,10 @@ class ToleranceRow(Record):
     drawing: Annotated[
         str,
         TableColumn(
-            "number and revision of the drawing that states the zone; shown beside the id in tables of reports",
-            attribute="drawing",
+            "number and revision of the drawing that states the zone; shown beside the id in tables of reports"
         ),
     ] = ""
-    label: Annotated[
-        str,
-        TableColumn("your own word for it, as the drawing has it; shown beside the id as well", attribute="label"),
-    ] = ""
+    label: Annotated[str, TableColumn("your own word for it, as the drawing has it; shown beside the id as well")] = ""
     source: Annotated[
         str,
         TableColumn(
@@ -375,7 +329,7 @@ class ToleranceRow(Record):
             write=lambda source: source.places or None,
         ),
     ] = 0
-    note: Annotated[str, TableColumn("carried through", attribute="note")] = ""
+    note: Annotated[str, TableColumn("carried through")] = ""
 
     @property
     def name(self) -> str:
@@ -528,8 +482,12 @@ class ToleranceRow(Record):
         middle = (self.plus + self.minus) / 2 * factor if self.feature is Feature.SIZE else 0.0
         spectrum, teeth = parsed_spectrum(self.spectrum)
         shapes = parsed_shapes(self.shape)
-        plain = {name: column for name, column in COLUMNS.items() if column.attribute}
-        stated: dict[str, Any] = {column.attribute: column.read(getattr(self, name)) for name, column in plain.items()}
+        in_si = {"unit": factor, "mm": length}
+        stated: dict[str, Any] = {
+            own.attribute or name: getattr(self, name) * in_si[own.unit] if own.unit in in_si else getattr(self, name)
+            for name, own in COLUMNS.items()
+            if own.attribute or not own.write
+        }
         return Source(
             **stated | {"part": self.part or self.name},
             name=self.name,
@@ -537,9 +495,6 @@ class ToleranceRow(Record):
             places=self._places,
             zone=self.zone * factor,
             middle=middle,
-            minimum=self.min * factor,
-            maximum=self.max * factor,
-            nominal=self.nominal * length,
             step=self.step * factor,
             shape=shapes[0] if len(shapes) == 1 else shapes or 0.0,
             batches=parsed_batches(self.batches),
@@ -554,9 +509,8 @@ class ToleranceRow(Record):
         if not self.measured:
             return None
         zone = (self.measured_zone or self.zone) * (self.micrometres * MICROMETRE)
-        made_to = MadeTo(
-            feature=self.feature, zone=zone, middle=middle, nominal=self.nominal * LENGTHS[self.length_unit]
-        )
+        nominal = self.nominal * LENGTHS[self.length_unit]
+        made_to = MadeTo(feature=self.feature, zone=zone, middle=middle, nominal=nominal)
         file, characteristic = named_file(self.measured)
         return load_measured_parts((folder / file).resolve(), made_to, characteristic)
 
@@ -568,20 +522,23 @@ COLUMNS = {
 """Field → what a table knows of it."""
 
 
+def cell_of(source: Source, name: str) -> Cell:
+    """Return what a source writes into the column of a field."""
+    own = COLUMNS[name]
+    if own.write:
+        return own.write(source)
+    value: Any = getattr(source, own.attribute or name)
+    in_table = {"unit": _written, "mm": _length_written}.get(own.unit)
+    return in_table(source, value) if in_table else value
+
+
 def headers_in(
     cost_unit: str, sources: Sequence[Source] = (), called: Mapping[str, str] = MappingProxyType({})
 ) -> dict[str, str]:
     """Return field → header of its column, in a table whose costs are in cost units or a currency.
 
-    Parameters
-    ----------
-    cost_unit
-        What costs are in.
-    sources
-        The rows: nominal sizes are in inches where all of them are, and state no unit where some are; like places are
-        counted where one does.
-    called
-        Head as the user's table writes it → field.
+    Nominal sizes are in inches where all sources are, and state no unit where some are; like places are counted where
+    one source does. What the user's table calls a field comes first.
     """
     lengths = {own.length_name for own in sources} or {"mm"}
     said = {COST_UNITS: cost_unit, "mm": lengths.pop() if len(lengths) == 1 else ""}
@@ -594,4 +551,3 @@ def headers_in(
 
 
 HEADERS = headers_in(COST_UNITS)
-"""Field → header of its column, costs in cost units."""

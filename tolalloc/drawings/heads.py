@@ -48,12 +48,7 @@ class Heads:
     called: Mapping[str, str] = field(default_factory=dict)
 
     def meant(self, head: str) -> str:
-        """Return a head as a column is named, with the unit that it states.
-
-        >>> heads = Heads(known=("id", "Cp"), called={"Merkmal": "id"})
-        >>> heads.meant("MERKMAL"), heads.meant("CP [-]"), heads.meant("Bemerkung")
-        ('id', 'Cp [-]', 'Bemerkung')
-        """
+        """Return a head as a column is named, with the unit that it states."""
         name, unit = split_header(head)
         spelt = self._names
         bracket = _BRACKET.fullmatch(name)

@@ -60,7 +60,6 @@ PRINTED = {
 """Zone of every grade in every size step, up to the grade from which on they repeat tenfold [µm]."""
 
 GRADES = (*PRINTED, *(f"IT{number}" for number in range(12, 19)))
-"""Names of the grades, finest first."""
 
 _COARSE = frozenset(("IT14", "IT15", "IT16", "IT17", "IT18"))
 """Grades that the standard does not allow up to 1 mm."""
@@ -87,9 +86,7 @@ _CORRECTED = {"K": 8, "M": 8, "N": 8, "P": 7}
 """Holes of these letters are a step of grades tighter than the shafts that they mirror, up to this grade."""
 _OF_K = range(4, 8)
 _FITS = "d to h, js, k, m, n and p, the same of holes in capitals, or IT, with a grade, such as h5, H7 or IT6"
-"""Fits that are known."""
 SERIES = "R′10"
-"""Name of the series."""
 _DECADE = (1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0, 5.0, 6.3, 8.0)
 """Its values within one decade [-]."""
 ZONES = np.array([*(float(f"{value}e{power}") for power in range(-1, 3) for value in _DECADE), 1000.0]) * MICROMETRE
@@ -100,11 +97,7 @@ number of a radius, a grade would be one of a feature half as large."""
 
 
 def _size_step(nominal: float) -> int:
-    """Return the position of the size step of a nominal size [m]; one outside 0 to 500 mm is an InputError.
-
-    >>> SIZE_STEPS[_size_step(0.052)]
-    80
-    """
+    """Return the position of the size step of a nominal size [m]; one outside 0 to 500 mm is an InputError."""
     size = nominal / MILLIMETRE
     if not 0 < size <= SIZE_STEPS[-1] * (1 + _ROUNDING):
         raise InputError.at("ISO 286-1", "nominal [mm]", size, f"a number above 0 and up to {SIZE_STEPS[-1]}")
@@ -137,11 +130,7 @@ def grade_zones(nominal: float) -> dict[str, float]:
 
 
 def is_fit(text: str) -> bool:
-    """Return whether a cell is written as a fit of ISO 286, a letter and a grade.
-
-    >>> is_fit("h5"), is_fit("IT6"), is_fit("0.05")
-    (True, True, False)
-    """
+    """Return whether a cell is written as a fit of ISO 286, a letter and a grade."""
     return _FIT.fullmatch(text) is not None
 
 
@@ -196,17 +185,6 @@ class Ladder:
             listed = (zones / MICROMETRE).tolist()
             raise InputError.at("ladder", "zones [µm]", listed, "one number above 0 or more, each above the last")
 
-    @classmethod
-    def grades(cls, nominal: float) -> Ladder:
-        """Return the standard tolerance grades of a nominal size [m]."""
-        zones = grade_zones(nominal)
-        return cls(zones=np.array([*zones.values()]), labels=(*zones,))
-
-    @classmethod
-    def preferred(cls) -> Ladder:
-        """Return the preferred numbers."""
-        return cls(zones=ZONES, labels=(SERIES,) * ZONES.size)
-
     def within(self, minimum: float, maximum: float, place: str) -> Ladder:
         """Return the steps inside a range [m]; a range without a step is an InputError that names its place."""
         inside = (self.zones >= minimum * (1 - _ROUNDING)) & (self.zones <= maximum * (1 + _ROUNDING))
@@ -222,19 +200,10 @@ class Ladder:
 
 
 def group_ladder(sources: Sequence[Source]) -> Ladder:
-    """Return the common ladder of sources that share one tolerance.
+    """Return the common ladder of sources that share one tolerance, none of them locked.
 
-    Parameters
-    ----------
-    sources
-        Sources of one group, none of them locked.
-
-    Notes
-    -----
-    A drawing that gives a group one tolerance gives all its members the same zone, whatever the ratios of their zones
-    in the tolerance table. So a step is one zone for all of them, and costs what the members cost at that zone
-    together. Grades serve a group whose members are sizes of one size step; otherwise one grade would mean several
-    zones.
+    A step is one zone for all of them, whatever the ratios of their zones in the table, and costs what they cost at it
+    together. Grades serve members that are sizes of one size step; otherwise one grade would mean several zones.
     """
     place = f"group {sources[0].dimension}" if len(sources) > 1 else f"source {sources[0].name}"
     locked = [source.name for source in sources if source.locked]
@@ -245,8 +214,9 @@ def group_ladder(sources: Sequence[Source]) -> Ladder:
         for source in sources
     )
     if graded and len({_size_step(source.nominal) for source in sources}) == 1:
-        ladder = Ladder.grades(max(source.nominal for source in sources))
+        zones = grade_zones(max(source.nominal for source in sources))
+        ladder = Ladder(zones=np.array([*zones.values()]), labels=(*zones,))
     else:
-        ladder = Ladder.preferred()
+        ladder = Ladder(zones=ZONES, labels=(SERIES,) * ZONES.size)
     minimum, maximum = max(source.minimum for source in sources), min(source.maximum for source in sources)
     return ladder.within(minimum, maximum, place)

@@ -69,8 +69,7 @@ class FittedDistribution:
     distribution: Distribution
     shape: float  # Shape, 0 for a normal distribution [-]
     scale: float  # σ of the normal, median of the lognormal, scale of the Weibull distribution [m]
-    log_likelihood: float  # Logarithm of the likelihood, with densities per µm [-]
-    aic: float  # Akaike's information criterion; the smaller the better [-]
+    aic: float  # Akaike's information criterion, with densities per µm; the smaller the better [-]
     distance: float  # Kolmogorov and Smirnov's largest distance from the measured shares [-]
 
 
@@ -113,9 +112,8 @@ class MeasuredParts:
     At another zone the parts are assumed to deviate in proportion to it. The path stays out of the text of a record, so
     that a digest of the same parts in another folder is the same.
 
-    The process is assumed to be normal, of a position on each axis, with the mean and the standard deviation of the
-    parts, unless the parts refute that with an error of 1 % (Anderson & Darling 1954); then they are smoothed. What so
-    few parts leave open of mean and standard deviation is `tolalloc.capability.monte_carlo.ProcessUncertainty`.
+    The process is assumed to be normal, of a position on each axis, with the parts' mean and standard deviation, unless
+    the parts refute that with an error of 1 % (Anderson & Darling 1954); then they are smoothed.
 
     References
     ----------
@@ -210,25 +208,23 @@ class MeasuredParts:
         """What the parts say about the process."""
         from scipy import stats
 
-        half = self.zone / 2.0
+        half, values, fits = self.zone / 2.0, np.array(self.values), list[FittedDistribution]()
         if self.stated:
             mean, deviation = self.stated.mean, self.stated.deviation
-            cpk = (half - abs(mean - self.middle)) / (3.0 * deviation)
-            return MeasuredFit(parts=self.parts, mean=mean, deviation=deviation, cp=self.cp, cpk=cpk, fits=())
-        values = np.array(self.values)
-        mean, deviation = float(values.mean()), float(values.std(ddof=1))
-        nearest = half - (mean if self.are_radii else abs(mean - self.middle))
-        fits = [_fitted(Distribution.NORMAL, stats.rayleigh if self.are_radii else stats.norm, values, self.are_radii)]
-        above = values if self.are_radii else values - (self.middle - half)
-        if above.min() > 0.0:
-            fits.append(_fitted(Distribution.LOGNORMAL, stats.lognorm, above, True))
-            fits.append(_fitted(Distribution.WEIBULL, stats.weibull_min, above, True))
+        else:
+            mean, deviation = float(values.mean()), float(values.std(ddof=1))
+            normal = stats.rayleigh if self.are_radii else stats.norm
+            fits.append(_fitted(Distribution.NORMAL, normal, values, self.are_radii))
+            above = values if self.are_radii else values - (self.middle - half)
+            if above.min() > 0.0:
+                fits.append(_fitted(Distribution.LOGNORMAL, stats.lognorm, above, True))
+                fits.append(_fitted(Distribution.WEIBULL, stats.weibull_min, above, True))
         return MeasuredFit(
-            parts=values.size,
+            parts=self.parts,
             mean=mean,
             deviation=deviation,
             cp=self.cp,
-            cpk=nearest / (3.0 * deviation),
+            cpk=(half - (mean if self.are_radii else abs(mean - self.middle))) / (3.0 * deviation),
             fits=tuple(sorted(fits, key=lambda fit: fit.aic)),
         )
 
@@ -269,13 +265,11 @@ def _fitted(
     lengths = values / MICROMETRE
     start = {"floc": 0.0} if starts_at_zero else {}
     found: Sequence[float] = family.fit(lengths, **start)
-    log_likelihood = float(family.logpdf(lengths, *found).sum())
     return FittedDistribution(
         distribution=distribution,
         shape=float(found[0]) if len(found) > 2 else 0.0,
         scale=float(found[-1]) * MICROMETRE,
-        log_likelihood=log_likelihood,
-        aic=2.0 * (len(found) - len(start)) - 2.0 * log_likelihood,
+        aic=2.0 * (len(found) - len(start)) - 2.0 * float(family.logpdf(lengths, *found).sum()),
         distance=float(stats.kstest(lengths, family.cdf, args=found).statistic),
     )
 
@@ -292,11 +286,7 @@ class MadeTo:
 
 
 def named_file(text: str) -> tuple[str, str]:
-    """Return the file that a table names, and the characteristic of a Q-DAS file behind a colon.
-
-    >>> named_file("cmm/parts.dfq:Ø 5/8"), named_file("parts.csv")
-    (('cmm/parts.dfq', 'Ø 5/8'), ('parts.csv', ''))
-    """
+    """Return the file that a table names, and the characteristic of a Q-DAS file behind a colon."""
     found = _AQDEF.fullmatch(text)
     return (found[1], (found[2] or "").strip()) if found else (text, "")
 
@@ -447,10 +437,7 @@ def _aqdef_text(path: Path) -> str:
 def _read_field(key: str, at: int, content: str, found: dict[int, _Characteristic], common: dict[str, str]) -> None:
     """Take a field of a characteristic, or of all of them."""
     if key.startswith("K2"):
-        if at:
-            found.setdefault(at, _Characteristic()).fields[key] = content
-        else:
-            common[key] = content
+        (found.setdefault(at, _Characteristic()).fields if at else common)[key] = content
     elif key == "K0001" and at:
         found.setdefault(at, _Characteristic()).values.append((content, _VALID))
     elif key == "K0002":

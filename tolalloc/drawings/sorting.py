@@ -17,6 +17,7 @@ from tolalloc.drawings.compensators import (
     Compensator,
     Known,
     Standing,
+    Units,
     one_source,
     require_vector,
 )
@@ -28,7 +29,6 @@ from tolalloc.reading.named_fields import Rule, flag, number, or_none, whole
 from tolalloc.reading.units import MICROMETRE
 
 _MEASURED = ("deviation", "direction", "size", "direction and size")
-"""What may be measured of parts that are sorted."""
 
 
 @dataclass(frozen=True)
@@ -79,12 +79,6 @@ class Sorting(Compensator):
     ----------
     Mease, Nair, Sudjianto, Selective assembly in manufacturing: statistical issues and optimal binning strategies,
     Technometrics 46 (2004) 165–175.
-
-    Examples
-    --------
-    >>> sorting = Sorting("pin.diameter", "housing.groove.radius", classes=4)
-    >>> round(sorting.leftover, 4)
-    0.0975
     """
 
     called: ClassVar[str] = "sorting"
@@ -137,13 +131,7 @@ class Sorting(Compensator):
         return self.width is not None
 
     def resolved(self, sources: Sequence[Source], place: str) -> Sorting:
-        """Return the same with the names that the table itself uses.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            No such source, or one that cannot be sorted so.
-        """
+        """Return the same with the names that the table itself uses."""
         parts = one_source("parts", self.parts, sources, place)
         mates = one_source("mates", self.mates, sources, place)
         for name, own in (("parts", parts), ("mates", mates)):
@@ -224,7 +212,7 @@ class Sorting(Compensator):
         lost, further = self.leftover_of(sources), self.count ** self._numbers(sources[self.parts]) - 1
         return float(self.class_cost * further + self.leftover_cost * lost / (1.0 - lost))
 
-    def sorted(self, uniform: Float[np.ndarray, "*sample column"], known: Known) -> None:
+    def sorted(self, uniform: Units, known: Known) -> None:
         """Put the parts of units into the class of their mates, uniform numbers in place [-]."""
         if self.width is not None:
             return
@@ -245,9 +233,7 @@ class Sorting(Compensator):
         least = np.minimum(np.floor(self.count * mates), self.count - 1)
         return np.asarray(np.clip((least + np.modf(self.count * parts)[0]) / self.count, ABOVE_ZERO, BELOW_ONE))
 
-    def arranged(
-        self, deviations: Float[np.ndarray, "*sample column"], zones: Mapping[str, float], known: Known
-    ) -> None:
+    def arranged(self, deviations: Units, zones: Mapping[str, float], known: Known) -> None:
         """Put parts and mates into the classes of equal width that a batch builds units of, deviations in place [m].
 
         Where either is exact, as in the nominal unit, both stay.
@@ -297,13 +283,7 @@ class Sorting(Compensator):
         return np.asarray((source.standard_values(numbers)[:, vector] * source.zone + source.middles[0]) * source.lever)
 
     def sectors(self, source: str) -> Float[np.ndarray, " end"]:
-        """Return where the sectors of one of its sources begin and end, counted from the x axis [°]; of none, nothing.
-
-        Examples
-        --------
-        >>> Sorting("disc1.runout", "disc2.runout", classes=4, by="direction").sectors("disc1.runout").tolist()
-        [0.0, 90.0, 180.0, 270.0, 360.0]
-        """
+        """Return where the sectors of one of its sources begin and end, from the x axis on; of none, nothing [°]."""
         if 1 not in self.measured:
             return np.empty(0)
         turned = 180.0 if self.opposite and source == self.mates else 0.0

@@ -14,14 +14,7 @@ from math import degrees
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawings.distributions import (
-    NORMAL,
-    RAYLEIGH,
-    Batch,
-    Distribution,
-    Marginal,
-    Mixture,
-)
+from tolalloc.drawings.distributions import NORMAL, RAYLEIGH, Batch, Distribution, Marginal, Mixture
 from tolalloc.drawings.measured_parts import MeasuredParts
 from tolalloc.drawings.zones import Feature, Spectrum, Systematic, ZoneMapping
 from tolalloc.reading.units import INCH, MICROMETRE, MILLIMETRE
@@ -48,11 +41,7 @@ _TIMES = re.compile(r"(?:(\d+)[x×] +)?(.*?)(?: +\(?(\d+)[x×]\)?)?", re.DOTALL)
 
 
 def is_angular(source: str) -> bool:
-    """Return whether the columns of a source are angles, by the last part of its name.
-
-    >>> is_angular("disc1.tilt"), is_angular("disc1.runout")
-    (True, False)
-    """
+    """Return whether the columns of a source are angles, by the last part of its name."""
     return source.rpartition(".")[2] in ANGULAR
 
 
@@ -78,8 +67,7 @@ def rounded_down(number: float, step: float = 0.0, usual: Sequence[tuple[float, 
 def neglected_columns(patterns: Sequence[str], columns: Sequence[str]) -> frozenset[str]:
     """Return the columns that are taken as zero: those of a source that a pattern such as ``*.tilt`` names.
 
-    A pattern may name nothing that this reducer has; a misspelt one leaves its column without a value, and that is
-    refused.
+    A pattern may name nothing; a misspelt one leaves its column without a value, and that is refused.
     """
     return frozenset(
         name
@@ -108,11 +96,7 @@ def known_as(sources: Iterable[Source]) -> list[str]:
 
 
 def like_places(text: str) -> tuple[int, str]:
-    """Return for how many like places a name stands, 0 where it does not say, and the name alone.
-
-    >>> like_places("6× crank*.journal*.eccentricity"), like_places("pin (3x)"), like_places("shaft")
-    ((6, 'crank*.journal*.eccentricity'), (3, 'pin'), (0, 'shaft'))
-    """
+    """Return for how many like places a name stands, 0 where it does not say, and the name alone."""
     before, name, after = _TIMES.fullmatch(text).groups()  # type: ignore[union-attr]  # it matches any text
     return int(before or after or 0), name
 
@@ -135,10 +119,9 @@ def by_row(sources: Iterable[Source]) -> list[tuple[Source, tuple[Source, ...]]]
 
 @dataclass(frozen=True, kw_only=True)
 class Source:
-    """One tolerance on a drawing: one source of error, one or more columns of the model.
+    """One tolerance on a drawing, and the columns of the model that it moves.
 
-    What stands here without a word is as `tolalloc.drawings.fields.ToleranceRow` says, the one list of what a table may
-    state.
+    What stands here without a word is as `tolalloc.drawings.fields.ToleranceRow` says.
     """
 
     name: str  # Identifier; a column is this name, or this name and a component
@@ -367,8 +350,7 @@ class Source:
         """What the zone became, where it became anything else."""
         mean, deviation = (number * self.zone for number in self.zone_mapping.moments)
         if self.feature is Feature.SIZE:
-            is_off = abs(mean) > _ROUNDING * self.zone
-            off = self.said(mean, "+.3g") if is_off else self.said(0.0)
+            off = self.said(mean, "+.3g") if abs(mean) > _ROUNDING * self.zone else self.said(0.0)
             spread = f"{self._kind}, mean {off} off the middle, σ = {self.said(deviation)}"
         elif self.feature is Feature.POSITION:
             spread = f"radius {self._kind}, mean {self.said(mean)}, σ = {self.said(deviation)}, any phase"
@@ -406,12 +388,9 @@ class Source:
 def limited_measure(source: Source, columns: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, " sample"]:
     """Return what a gauge would show of a source for its own columns, in such a way that it compares with the zone [m].
 
-    Notes
-    -----
     Systematic waves are taken off. A size: its deviation from the middle, for like features the largest magnitude. A
-    position: twice the distance from
-    the true one, the largest of like features. Pitch and run-out: the range over a turn, or at the teeth for a spectrum
-    with a random part.
+    position: twice the distance from the true one, the largest of like features. Pitch and run-out: the range over a
+    turn, or at the teeth for a spectrum with a random part.
     """
     length = columns * source.lever - (source.middles if source.systematic else source.middle)
     if source.feature is Feature.SIZE:

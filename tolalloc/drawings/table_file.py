@@ -15,7 +15,6 @@ from datetime import date, time, timedelta
 from enum import StrEnum
 from io import BytesIO, StringIO
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Literal, TypeVar, get_args, get_origin
 from unicodedata import normalize
 from zipfile import ZipFile
@@ -47,13 +46,10 @@ _MOST_CELLS = 100_000
 _BLANKS, _UNSEEN = re.compile(r"[\u00a0\u2007\u2009\u202f]"), re.compile(r"[\u200b-\u200d\u2060\ufeff\u00ad]")
 """Blanks of other widths, and signs that nobody sees."""
 DATA = Path(__file__).parent / "data"
-"""Shipped tables."""
 NumberedRow = tuple[int, tuple[str, ...]]
 """Row as an editor counts it, from 1, and its cells."""
 _DECIMAL = re.compile(r"[+-]?\d*[.,]\d+([eE][+-]?\d+)?", re.ASCII)
 """Number with one decimal sign, whichever."""
-_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
-"""Number that is a thousand times as large where the sign separates thousands."""
 _APOSTROPHE = re.compile(r"^'(?=[=+\-@])")
 """What `tolalloc.reading.files.no_formula` writes before a text."""
 _ANY = Heads()
@@ -64,13 +60,9 @@ Row = TypeVar("Row", bound=Record)
 class DateText(str):
     """Date or time of a workbook, into which a spreadsheet turns numbers: kept in a note, refused elsewhere."""
 
-    __slots__ = ()
-
 
 class AmbiguousText(str):
     """Text that is another number where its sign separates thousands: no matter in a note, refused as a number."""
-
-    __slots__ = ()
 
 
 def is_workbook(path: Path) -> bool:
@@ -223,11 +215,7 @@ def _marked(run: Any) -> str:
 
 
 def _plain(cell: str) -> str:
-    """Return a cell with the keyboard's blanks and accents, and its minus where a number has a true one.
-
-    >>> _plain("\u22120.05"), _plain("10\u221220 mm"), _plain("hub\u00a0seat\u200b ")
-    ('-0.05', '10−20 mm', 'hub seat')
-    """
+    """Return a cell with the keyboard's blanks and accents, and its minus where a number has a true one."""
     cell = normalize("NFC", _UNSEEN.sub("", _BLANKS.sub(" ", cell))).strip()
     negative = "-" + cell[1:].lstrip()
     is_number = _TRUE_MINUS.fullmatch(cell) or (cell[:1] == "\u2212" and WITH_UNIT.fullmatch(negative))
@@ -269,13 +257,7 @@ def read_table_file(path: Path, heads: Heads = _ANY, sheet: str = "") -> tuple[N
 
 
 def _with_units(path: Path, rows: tuple[NumberedRow, ...], heads: Heads) -> tuple[NumberedRow, ...]:
-    """Return a table whose first row states the units of its columns with these in its heads.
-
-    Raises
-    ------
-    InputError
-        A head states another unit than the cell below it.
-    """
+    """Return a table whose first row states the units of its columns with these in its heads."""
     if len(rows) < 2 or not heads.known:
         return rows
     (first, header), (number, cells), *others = rows
@@ -314,13 +296,10 @@ def _records(path: Path, heads: Heads = _ANY) -> list[NumberedRow]:
             so_far += len(record)
             require_believable(path, len(rows), len(record), so_far)
     except csv.Error as error:
+        said = f"a quotation mark is not closed, or not doubled within a cell ({error})"
         if "field larger" in str(error):
-            raise InputError(
-                f"{path}, row {len(rows) + 1}: a cell is too long; allowed are {csv.field_size_limit()} characters."
-            ) from None
-        raise InputError(
-            f"{path}, row {len(rows) + 1}: a quotation mark is not closed, or not doubled within a cell ({error})."
-        ) from None
+            said = f"a cell is too long; allowed are {csv.field_size_limit()} characters"
+        raise InputError(f"{path}, row {len(rows) + 1}: {said}.") from None
     heads.require_in(path, rows)
     hint = "numbers have a decimal point, and " if separator == "," else ""
     kept = _under_headers(path, _without_titles(rows, heads), f"{hint}cells are separated by {separator!r}")
@@ -362,13 +341,7 @@ def _under_headers(path: Path, rows: Sequence[tuple[str, ...]], hint: str) -> li
 
 
 def _with_points(path: Path, number: int, cells: Sequence[str], kinds: Sequence[str]) -> NumberedRow:
-    """Return a row of a workbook whose numbers, where they were kept as text, have decimal points.
-
-    Raises
-    ------
-    InputError
-        A number kept as text whose sign may separate thousands, or what a spreadsheet made a date of.
-    """
+    """Return a row of a workbook whose numbers, where they were kept as text, have decimal points."""
     found = list[str]()
     for cell, kind in zip(cells, (*kinds, *["number"] * len(cells)), strict=False):
         if isinstance(cell, AmbiguousText) and kind == "number":
@@ -400,7 +373,7 @@ def _with_decimal_points(
         for at in numbers
         if at < len(cells) and _DECIMAL.fullmatch(cells[at])
     }
-    grouped = {cell: number for cell, number in decimals.items() if _THOUSANDS.fullmatch(cell)}
+    grouped = {cell: number for cell, number in decimals.items() if _GROUPED.fullmatch(cell)}
     both = any("," in cell for cell in decimals) and any("." in cell for cell in decimals)
     if grouped and (both or (is_careful and len(grouped) == len(decimals))):
         cell, number = next(iter(grouped.items()))
@@ -476,9 +449,7 @@ def read_text_table(path: Path) -> TextTable:
     )
 
 
-def read_rows(
-    path: Path, kind: type[Row], named_by: str, units: Mapping[str, str] = MappingProxyType({})
-) -> tuple[tuple[str, Row], ...]:
+def read_rows(path: Path, kind: type[Row], named_by: str, units: Mapping[str, str]) -> tuple[tuple[str, Row], ...]:
     """Return the rows of a CSV file, each behind the place that messages name: file, row, and the field `named_by`.
 
     The headers are the fields of the record, with or without a unit in brackets. Numbers are never converted, so a
@@ -508,11 +479,6 @@ def require_units(path: Path, stated: Sequence[tuple[str, str]], units: Mapping[
     """Raise if the header of a column states another unit than the one it has, empty where it has none.
 
     A currency is a cost unit like any other, three letters as in EUR or its sign; it is one for the whole file.
-
-    Raises
-    ------
-    InputError
-        The column and its unit.
     """
     for name, unit in stated:
         known = units.get(name, "")
@@ -525,13 +491,7 @@ def require_units(path: Path, stated: Sequence[tuple[str, str]], units: Mapping[
 
 
 def stated_currency(path: Path, stated: Sequence[tuple[str, str]], units: Mapping[str, str]) -> str:
-    """Return the currency that the headers of costs state, empty where they state none.
-
-    Raises
-    ------
-    InputError
-        A column that states another one than those before it.
-    """
+    """Return the currency that headers of costs state, empty where none does; a second one is an InputError."""
     first = ""
     for name, unit in stated:
         own = currency_in(unit) if units.get(name, "").startswith(COST_UNITS) else ""
@@ -542,13 +502,7 @@ def stated_currency(path: Path, stated: Sequence[tuple[str, str]], units: Mappin
 
 
 def require_columns(path: Path | str, headers: tuple[str, ...], kind: type[Record]) -> None:
-    """Raise unless a record knows each column, each is there once, and none that it needs is missing.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        The column.
-    """
+    """Raise unless a record knows each column, each is there once, and none that it needs is missing."""
     for at, name in enumerate(headers, start=1):
         if not name:
             raise InputError(f"{path}: the header of column {at} is empty; allowed is the name of a column.")
@@ -563,13 +517,7 @@ def require_columns(path: Path | str, headers: tuple[str, ...], kind: type[Recor
 
 
 def typed_cells(kind: type[Record], row: Mapping[str, object], place: str) -> dict[str, object]:
-    """Return the cells of a row that are not empty, text as the type that its field asks for.
-
-    Raises
-    ------
-    InputError
-        The field and value that are not allowed.
-    """
+    """Return the cells of a row that are not empty, text as the type that its field asks for."""
     stated = {name: cell.strip() if isinstance(cell, str) else cell for name, cell in row.items()}
     typed, faults = dict[str, object](), Faults()
     for name, cell in stated.items():
@@ -582,13 +530,7 @@ def typed_cells(kind: type[Record], row: Mapping[str, object], place: str) -> di
 
 
 def plain_number(text: str) -> float:
-    """Return the number that a cell shows; what else Python takes for a number is a slip in a table.
-
-    Raises
-    ------
-    ValueError
-        The text is no number, or one with ``_`` or with digits of another script.
-    """
+    """Return the number that a cell shows; with ``_`` or digits of another script it is a ValueError."""
     if "_" in text or not text.isascii():
         raise ValueError(f"{text!r} is no plain number")
     return float(text)
@@ -603,11 +545,7 @@ def number_at(place: str, field: str, text: str, allowed: str = "a number with a
 
 
 def usual_word(text: str) -> str:
-    """Return a word as the fields have it.
-
-    >>> usual_word("Maß"), usual_word("Rundlauf"), usual_word("size")
-    ('size', 'runout', 'size')
-    """
+    """Return a word as the fields have it."""
     return office_words("cells").get(text.strip().lower(), text)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from io import StringIO
@@ -23,6 +23,7 @@ from tolalloc.drawings.fields import (
     UNITS,
     Cell,
     ToleranceRow,
+    cell_of,
     headers_in,
     shapes_text,
     usual_unit,
@@ -131,7 +132,6 @@ class ProcessCapability(Record):
 
 
 ProcessCapabilities = Mapping[tuple[str, Feature], ProcessCapability]
-"""Process and feature → capability."""
 
 
 def load_process_capabilities(name: str | Path) -> ProcessCapabilities:
@@ -157,14 +157,7 @@ def load_process_capabilities(name: str | Path) -> ProcessCapabilities:
 def with_process(cells: Mapping[str, object], capabilities: ProcessCapabilities, place: str) -> dict[str, object]:
     """Return the cells of a row of a tolerance table, completed by the capability of the process that it names.
 
-    Raises
-    ------
-    UnknownNameError
-        The library has no such process for the row's feature, and the row does not state Cp either.
-
-    Notes
-    -----
-    A process may be known to a process cost table alone. Its row states Cp, so nothing has to be looked up.
+    A process may be known to a process cost table alone: its row states Cp, so nothing has to be looked up.
     """
     process, feature = cells.get("process"), cells.get("feature", Feature.SIZE)
     if process is None:
@@ -182,23 +175,14 @@ def with_process(cells: Mapping[str, object], capabilities: ProcessCapabilities,
 
 
 def doubts(sources: Sequence[Source], table: str) -> tuple[str, ...]:
-    """Return what is allowed in a table but hardly meant, a sentence a row.
-
-    Parameters
-    ----------
-    sources
-        All rows, in metres.
-    table
-        What the table is called, for messages.
-    """
+    """Return what is allowed in a table but hardly meant, a sentence a row."""
     costs = np.array([source.cost for source in sources if source.zone > 0 and source.cost > 0])
     middle = float(np.median(costs)) if costs.size >= _FEWEST else 0.0
-    found = []
-    for source in sources:
-        if reasons := _reasons(source, middle):
-            said = "; ".join(reasons)
-            found.append(f"{table}, {source.own_id or source.name}: {said}. Is it meant?")
-    return tuple(found)
+    return tuple(
+        f"{table}, {source.own_id or source.name}: {'; '.join(reasons)}. Is it meant?"
+        for source in sources
+        if (reasons := _reasons(source, middle))
+    )
 
 
 def _reasons(source: Source, middle_cost: float) -> list[str]:
@@ -210,58 +194,52 @@ def _reasons(source: Source, middle_cost: float) -> list[str]:
     return [*_of_size(source), *_of_zone(source), *_of_process(source, middle_cost), *of_parts]
 
 
-def _of_size(source: Source) -> list[str]:
-    """Return what is doubted of the nominal size and of where the zone lies beside it."""
-    found, zone, nominal = [], source.zone, source.nominal
+def _of_size(source: Source) -> Iterator[str]:
+    """Yield what is doubted of the nominal size and of where the zone lies beside it."""
+    zone, nominal = source.zone, source.nominal
     if nominal < 0:
-        found.append(f"the nominal size is {_length(nominal)}, below 0")
+        yield f"the nominal size is {_length(nominal)}, below 0"
     if 0 < nominal < _SMALLEST_SIZE:
-        found.append(f"the nominal size is {_length(nominal)}")
+        yield f"the nominal size is {_length(nominal)}"
     if abs(nominal) > _LARGEST_SIZE:
-        found.append(f"the nominal size is {_length(nominal)}, beyond those of ISO 286")
+        yield f"the nominal size is {_length(nominal)}, beyond those of ISO 286"
     if source.feature is Feature.SIZE and not source.over and 0 < nominal * _WIDE < zone:
-        found.append(f"the zone of {_length(zone)} is {zone / nominal:.0%} of the nominal size of {_length(nominal)}")
+        yield f"the zone of {_length(zone)} is {zone / nominal:.0%} of the nominal size of {_length(nominal)}"
     if abs(source.middle) > _OFF * zone:
-        found.append(f"the middle of its zone of {_length(zone)} is {_length(source.middle)} off the nominal size")
+        yield f"the middle of its zone of {_length(zone)} is {_length(source.middle)} off the nominal size"
     elif source.feature is Feature.SIZE and abs(source.middle) > 0.5 * zone * (1 + 1e-9):
-        found.append(
+        yield (
             f"both deviations have one sign, so the nominal size lies outside its zone, whose middle is "
             f"{_length(source.middle)} off"
         )
-    return found
 
 
-def _of_zone(source: Source) -> list[str]:
-    """Return what is doubted of the size of the zone and of its range."""
-    found, zone = [], source.zone
+def _of_zone(source: Source) -> Iterator[str]:
+    """Yield what is doubted of the size of the zone and of its range."""
+    zone = source.zone
     if zone < _FINEST_ZONE:
-        found.append(f"the zone of {_length(zone)} is finer than any process holds")
+        yield f"the zone of {_length(zone)} is finer than any process holds"
     elif not source.nominal and zone > _WIDEST_ZONE:
-        found.append(f"the zone of {_length(zone)} is wide, and no nominal size is stated beside it")
+        yield f"the zone of {_length(zone)} is wide, and no nominal size is stated beside it"
     elif source.nominal > 0 and source.feature is Feature.SIZE and not source.over:
         factor = zone / tolerance_factor(source.nominal)
         if not _FINEST <= factor <= _COARSEST:
             than = "finer than IT01" if factor < _FINEST else "coarser than IT15"
-            found.append(f"the zone of {_length(zone)} is {than} at a nominal size of {_length(source.nominal)}")
+            yield f"the zone of {_length(zone)} is {than} at a nominal size of {_length(source.nominal)}"
     if source.over and not _FLAT <= zone / source.over <= _STEEP:
-        found.append(
-            f"a zone of {_length(zone)} over {_length(source.over)} is an angle of {zone / source.over:.2g} rad"
-        )
+        yield f"a zone of {_length(zone)} over {_length(source.over)} is an angle of {zone / source.over:.2g} rad"
     if not source.locked and source.maximum > _RANGE * zone:
-        found.append(f"max of {_length(source.maximum)} is {source.maximum / zone:.3g} times the zone")
+        yield f"max of {_length(source.maximum)} is {source.maximum / zone:.3g} times the zone"
     if not source.locked and 0 < source.minimum < zone / _RANGE:
-        found.append(f"min of {_length(source.minimum)} is 1/{zone / source.minimum:.3g} of the zone")
-    return found
+        yield f"min of {_length(source.minimum)} is 1/{zone / source.minimum:.3g} of the zone"
 
 
-def _of_process(source: Source, middle_cost: float) -> list[str]:
-    """Return what is doubted of capability and cost."""
-    found = []
+def _of_process(source: Source, middle_cost: float) -> Iterator[str]:
+    """Yield what is doubted of capability and cost."""
     if not _CAPABILITY[0] <= source.cp <= _CAPABILITY[1]:
-        found.append(f"Cp is {source.cp:g}")
+        yield f"Cp is {source.cp:g}"
     if middle_cost and source.cost and not middle_cost / _COST <= source.cost <= middle_cost * _COST:
-        found.append(f"its cost of {source.cost:g} is far from {middle_cost:g}, the middle one of the table")
-    return found
+        yield f"its cost of {source.cost:g} is far from {middle_cost:g}, the middle one of the table"
 
 
 def _length(length: float) -> str:
@@ -297,22 +275,12 @@ def heads_of(path: Path, columns: Mapping[str, str] = MappingProxyType({})) -> H
 
 
 def heads_file(table: Path) -> Path:
-    """Return the file beside a tolerance table that says what its heads mean, whether it is there or not.
-
-    >>> heads_file(Path("shop/zones.xlsx")).name, heads_file(Path("mine.tolerances.csv")).name
-    ('zones.toml', 'mine.tolerances.toml')
-    """
+    """Return the file beside a tolerance table that says what its heads mean, whether it is there or not."""
     return table.with_suffix(".toml")
 
 
 def heads_beside(table: Path) -> Mapping[str, str]:
-    """Return what the file beside a tolerance table says, nothing where there is none or it is of another kind.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        The field and value that are not allowed.
-    """
+    """Return what the file beside a tolerance table says, nothing where there is none or it is of another kind."""
     path = heads_file(table)
     content = read_toml(path) if is_file(path) else {}
     if not get_close_matches("columns", content):
@@ -327,13 +295,7 @@ def heads_text(called: Mapping[str, str]) -> str:
 
 
 def own_heads(path: Path, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the heads of columns of the user's own.
-
-    Raises
-    ------
-    InputError
-        All that are nearly the name of a column, each with the nearest.
-    """
+    """Return the heads of the user's own columns; those nearly the name of a column are an InputError."""
     spelt = {name.lower(): name for name in ToleranceRow.model_fields}
     own = [name for name in names if name and name not in ToleranceRow.model_fields]
     near = {name: get_close_matches(name.lower(), spelt, n=1, cutoff=_NEAR) for name in own}
@@ -373,19 +335,17 @@ def load_tolerance_table(
     unit = "" if "unit" in headers else _unit_of_heads(stated)
     plus = headers.index("plus") if "plus" in headers else 0
     both = others and "minus" not in headers and all(_says_both(cells[plus]) for _, cells in others)
-    kept = tuple(name for name in headers if name not in own)
-    require_columns(path, (*kept, *["minus"] * bool(both), *["unit"] * bool(unit)), ToleranceRow)
+    kept, more = [name for name in headers if name not in own], {"unit": unit} if unit else {}
+    require_columns(path, (*kept, *["minus"] * bool(both), *more), ToleranceRow)
     if len(set(own)) < len(own):
         twice = next(name for name in own if own.count(name) > 1)
         raise InputError(f"{path}: the column {twice!r} is there twice; each has one.")
     if not others:
         raise InputError(f"{path}: the table has no rows; one row per source is needed.")
-    if unit:
-        others, kept = [(number, (*cells, unit)) for number, cells in others], (*kept, "unit")
-    rows = [(number, dict(zip((*headers, *["unit"] * bool(unit)), cells, strict=True))) for number, cells in others]
+    rows = [(number, dict(zip(headers, cells, strict=True)) | more) for number, cells in others]
     _require_units(path, [(name, unit) for name, unit in stated if name not in own], rows)
     known = [
-        (number, _both_ways(_without_units({name: row[name] for name in kept}, place), place))
+        (number, _both_ways(_without_units({name: row[name] for name in (*kept, *more)}, place), place))
         for number, row, place in (
             (number, row, f"{path}, row {number} ({row['id'] or 'no id'})") for number, row in rows
         )
@@ -404,13 +364,7 @@ def _says_both(plus: str) -> bool:
 
 
 def _both_ways(row: dict[str, str], place: str) -> dict[str, str]:
-    """Return a row with both deviations of one cell that says both, where it states no other.
-
-    Raises
-    ------
-    InputError
-        A fit of what has no nominal size, or is no size or a radius.
-    """
+    """Return a row with both deviations of one cell that says both, where it states no other."""
     plus = row.get("plus", "")
     if not _says_both(plus) or row.get("minus"):
         return row
@@ -440,13 +394,7 @@ def _unit_of_heads(stated: Sequence[tuple[str, str]]) -> str:
 
 
 def _without_units(row: dict[str, str], place: str) -> dict[str, str]:
-    """Return a row whose numbers stand without the units behind them, which must be those of their columns.
-
-    Raises
-    ------
-    InputError
-        A number in another unit.
-    """
+    """Return a row whose numbers stand without the units behind them, which must be those of their columns."""
     found, unit = dict(row), usual_unit(row["unit"])
     for name, cell in row.items():
         own = {"unit": unit, "mm": INCHES if unit == INCHES else "mm"}.get(COLUMNS[name].unit, "")
@@ -461,7 +409,7 @@ def _without_units(row: dict[str, str], place: str) -> dict[str, str]:
 def _require_units(path: Path, stated: Sequence[tuple[str, str]], rows: Sequence[tuple[int, dict[str, str]]]) -> None:
     """Raise unless headers state the units of `COLUMNS`; that of zones may also be the one unit of all rows.
 
-    A nominal size may be stated in inches where all rows are in inches, and in mm where none is.
+    A nominal size may be in inches where all rows are, and in mm where none is.
     """
     units = {name: column.unit for name, column in COLUMNS.items()}
     for column, unit in stated:
@@ -488,11 +436,6 @@ def sources_of_rows(
     """Return the sources of numbered rows, whose cells are text or already of the type of their field.
 
     The place is what messages name; files of measured parts are looked for in the folder.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        The row, field and value that are not allowed.
     """
     # The shipped library is read where a row names a process of it.
     is_asked = capabilities != _SHIPPED or any(row.get("process") for _, row in rows)
@@ -540,14 +483,13 @@ def _require_filled(row: Mapping[str, object], where: str) -> None:
 def table_rows(sources: Sequence[Source], folder: Path | None = None) -> list[list[str | int | float]]:
     """Return the cells of the sources in the order of `COLUMNS`, the user's own behind them.
 
-    Files of measured parts are named from the folder that the table is written to; without one in such a way that they
-    are found from everywhere.
+    Files of measured parts are named from the folder of the table, or so that they are found from everywhere.
     """
     own = own_heads_of(sources)
-    columns = [COLUMNS[name] for name in headers_in(COST_UNITS, sources)]
+    names = headers_in(COST_UNITS, sources)
     return [
         [
-            *(_written(column.cell(source), folder) for column in columns),
+            *(_written(cell_of(source, name), folder) for name in names),
             *(dict(source.own_cells).get(head, "") for head in own),
         ]
         for source, _ in by_row(sources)
@@ -600,28 +542,19 @@ def table_text(
 
 
 def require_small_zones(sources: Sequence[Source], largest: float, place: str | Path) -> None:
-    """Raise unless all zones, those that may be asked for and measured parts are as small as a model believes [m].
-
-    Raises
-    ------
-    InputError
-        The source with a larger one.
-    """
+    """Raise unless all zones, those that may be asked for and measured parts are as small as a model believes [m]."""
     limit, farthest = largest / MICROMETRE, _MEASURED * largest / MICROMETRE
     for source in sources:
+        who = f"{place} ({source.name})"
         if source.measured and (own := max(map(abs, source.measured.values)) / MICROMETRE) > farthest:
             file = source.measured.path.name
-            raise InputError(
-                f"{place} ({source.name}): {file} has a deviation of {own:g} µm; allowed is {farthest:g} µm."
-            )
+            raise InputError(f"{who}: {file} has a deviation of {own:g} µm; allowed is {farthest:g} µm.")
         zone, smallest, most = (length / MICROMETRE for length in (source.zone, source.minimum, source.maximum))
         if zone > limit:
-            raise InputError(
-                f"{place} ({source.name}): the zone plus − minus is {zone:g} µm and must be 0 to {limit:g} µm."
-            )
+            raise InputError(f"{who}: the zone plus − minus is {zone:g} µm and must be 0 to {limit:g} µm.")
         if zone > 0 and not source.locked and most > limit:
             raise InputError(
-                f"{place} ({source.name}): the zone must lie between min and max, above 0 and up to {limit:g} µm: "
+                f"{who}: the zone must lie between min and max, above 0 and up to {limit:g} µm: "
                 f"min {smallest:g}, zone {zone:g}, max {most:g} µm."
             )
 

@@ -139,11 +139,6 @@ def parsed_systematic(text: str) -> Systematic:
     """Return systematic waves such as ``2:5.0@30``, order:amplitude@direction, in the unit of the text and rad.
 
     A wave is amplitude·cos(order·(θ − direction)), half as high as its indicator reading.
-
-    Examples
-    --------
-    >>> parsed_systematic("2:5.0@90")
-    ((2, 5.0, 1.5707963267948966),)
     """
     found: dict[int, tuple[float, float]] = {}
     for item in text.split():
@@ -173,12 +168,9 @@ def spectrum_text(spectrum: Spectrum) -> str:
 def harmonic_range_quantile(spectrum: Spectrum, teeth: int = 0, base: Marginal = RAYLEIGH) -> float:
     """Return the 99.73 % quantile of the range over a turn of random harmonics of this spectrum.
 
-    Notes
-    -----
     An order's wave is its relative amplitude times a random one of the base, at any phase; the range is taken over the
-    whole turn, or at the teeth if there are any. One order has a closed form; several are integrated over a fixed
-    Sobol sequence, of 2¹⁴ points or, where the range is taken over few teeth, 2¹⁵. Its standard error is below a
-    hundredth of the quantile.
+    whole turn, or at the teeth if there are any. One order has a closed form; several are integrated over a fixed Sobol
+    sequence, of 2¹⁴ points or, at teeth, 2¹⁵. Its standard error is below a hundredth of the quantile.
     """
     if len(spectrum) == 1 and not teeth:
         return 2.0 * base.reach * spectrum[0][1]
@@ -218,11 +210,8 @@ def _vectors(
 def _isotropic(magnitude: Marginal, uniform: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
     """Return both components of vectors of random magnitude at any phase, for independent uniform numbers in (0, 1).
 
-    Notes
-    -----
-    The two normal numbers of a vector give its direction; the probability of their length, Rayleigh's, gives the
-    magnitude. So a vector turns and grows with its normal numbers, and vectors whose normal numbers are correlated
-    point alike, as normal ones do, however the axes lie.
+    A vector's two normal numbers give its direction, the probability of their length, Rayleigh's, its magnitude:
+    vectors whose normal numbers are correlated point alike, however the axes lie.
     """
     normal = ndtri(uniform).reshape(uniform.shape[0], -1, 2)
     length = np.hypot(normal[..., 0], normal[..., 1])
@@ -235,8 +224,6 @@ def _isotropic(magnitude: Marginal, uniform: Float[np.ndarray, "sample column"])
 class ZoneMapping:
     """Distribution of a source's columns per unit of zone.
 
-    Notes
-    -----
     A size spreads around the middle of its zone; a one-sided distribution starts at the lower limit. The radius of a
     position and the amplitudes of harmonics start at zero, at any phase. Bounded amplitudes of several orders fill the
     zone where all orders are at their largest.

@@ -49,19 +49,8 @@ class SimulatedUnit:
     stop_time: float  # Simulated time [s]
     engine: Any  # The library
 
-    @property
-    def name(self) -> str:
-        """The file's name."""
-        return self.path.stem
-
     def __call__(self, *values: float) -> list[float]:
-        """Return the variables at the end of a simulation with these parameters.
-
-        Raises
-        ------
-        ValueError
-            The simulation has no end.
-        """
+        """Return the variables at the end of a simulation with these parameters; one without an end is a ValueError."""
         start = {name: float(value) for name, value in zip(self.parameters, values, strict=True)}
         try:
             found = self.engine.simulate_fmu(
@@ -72,23 +61,6 @@ class SimulatedUnit:
         except Exception as error:
             raise ValueError(f"{self.path}: {error}") from None
         return [float(found[name][-1]) for name in self.variables]
-
-
-def simulated(path: str, parameters: tuple[str, ...], variables: tuple[str, ...], stop_time: float) -> SimulatedUnit:
-    """Return a unit as a function.
-
-    Raises
-    ------
-    InputError
-        The library is missing, or there is no such file.
-    """
-    try:
-        import fmpy
-    except ImportError:
-        raise InputError("Functional Mock-up Units need the optional extra: pip install -e '.[fmu]'.") from None
-    if not Path(path).is_file():
-        raise InputError(f"{path}: no such Functional Mock-up Unit.")
-    return SimulatedUnit(Path(path), parameters, variables, stop_time, fmpy)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,13 +126,7 @@ class FunctionModel:
                     raise InputError.at(f"{place} of {output}", name, slopes.get(name), allowed)
 
     def set_to(self, settings: Mapping[str, float]) -> FunctionModel:
-        """Return the function with other values of its settings [units of their names].
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            A setting that it does not have, or a value outside its bounds.
-        """
+        """Return the function with other values of its settings [units of their names]."""
         require_settings(f"model {self.name}", self.settings, settings)
         changed = (replace(own, value=settings.get(own.name, own.value)) for own in self.settings)
         return replace(self, settings=tuple(changed))
@@ -175,13 +141,7 @@ class FunctionModel:
         return replace(self, neglected=(*self.neglected, *patterns))
 
     def bound(self, errors: ErrorModel, place: str) -> BoundFunction:
-        """Return the model at the sources of a drawing.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            A source that is no input, or an input without a row.
-        """
+        """Return the model at the sources of a drawing, which must be inputs and give all that are not left out."""
         lengths = {column: LENGTHS[own.length_name] for own in errors.sources for column in own.columns}
         for column in (*errors.columns, *errors.fixed):
             if column not in self.inputs:
@@ -268,8 +228,7 @@ class BoundFunction(Model):
         widths = self.steps / self.source.step
         units = np.random.default_rng(0).uniform(-0.5, 0.5, (_ASKED, widths.size))  # no input moves as another one
         arguments = self._arguments(units * widths)
-        function = self._user_function(self.source.callable, self.source.outputs)
-        return ARRAY_RATE if function.takes_columns(arguments) else super().stated_rate
+        return ARRAY_RATE if self._user_function.takes_columns(arguments) else super().stated_rate
 
     @property
     def content(self) -> Any:
@@ -293,8 +252,7 @@ class BoundFunction(Model):
 
     def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
         """Return the outputs of every sample; one for which the function raises or returns no number fails."""
-        asked = self._user_function(self.source.callable, self.source.outputs)
-        found = self._called(asked, x)
+        found = self._called(self._user_function, x)
         values = found[:, [self.source.outputs.index(name) for name in self.outputs]]
         status = np.where(np.isfinite(values).all(axis=1), 0, 1).astype(np.uint8)
         self.observe(status)
@@ -401,8 +359,10 @@ class BoundFunction(Model):
         parts = np.split(x, range(_AT_ONCE, x.shape[0], _AT_ONCE))
         return np.concatenate([asked(self._arguments(part)) for part in parts])
 
-    def _user_function(self, function: Callable[..., Any], names: tuple[str, ...]) -> UserFunction:
-        return UserFunction(function=function, values=len(names), place=f"model {self.name}", names=names)
+    @property
+    def _user_function(self) -> UserFunction:
+        names = self.source.outputs
+        return UserFunction(function=self.source.callable, values=len(names), place=f"model {self.name}", names=names)
 
     def _arguments(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample argument"]:
         """Return what the function takes: inputs [mm or in, angles rad], then settings [units of their names]."""
@@ -433,13 +393,6 @@ def model(
     """Return a model of your own: any function of the dimensions on a drawing.
 
     The parameters are those of `FunctionModel`; the name is the function's unless given.
-
-    Examples
-    --------
-    >>> import tolalloc as ta
-    >>> gap = ta.model(lambda housing, shaft: housing - shaft, inputs=("housing", "shaft"), outputs=("gap [mm]",))
-    >>> gap.outputs
-    ('gap [mm]',)
     """
     for field_name, names in (("inputs", inputs), ("outputs", outputs)):
         if isinstance(names, str):
@@ -477,7 +430,13 @@ def from_fmu(path: str, inputs: Mapping[str, str], outputs: Mapping[str, str], s
     InputError
         The optional library that runs such units is not installed, or there is no such file.
     """
-    function = simulated(path, tuple(inputs.values()), tuple(outputs.values()), stop_time)
+    try:
+        import fmpy
+    except ImportError:
+        raise InputError("Functional Mock-up Units need the optional extra: pip install -e '.[fmu]'.") from None
+    if not Path(path).is_file():
+        raise InputError(f"{path}: no such Functional Mock-up Unit.")
+    unit = SimulatedUnit(Path(path), tuple(inputs.values()), tuple(outputs.values()), stop_time, fmpy)
     return FunctionModel(
-        function=function, inputs=tuple(inputs), outputs=tuple(outputs), step=_STEP_OF_SIMULATION, name=function.name
+        function=unit, inputs=tuple(inputs), outputs=tuple(outputs), step=_STEP_OF_SIMULATION, name=unit.path.stem
     )

@@ -89,13 +89,8 @@ def _parts(thing: Any) -> Any:
     if isinstance(thing, PurePath):
         return (str(thing),)
     if isinstance(thing, CodeType):
-        names = (
-            thing.co_names,
-            thing.co_varnames,
-            thing.co_argcount,
-            thing.co_posonlyargcount,
-            thing.co_kwonlyargcount,
-        )
+        counts = thing.co_argcount, thing.co_posonlyargcount, thing.co_kwonlyargcount
+        names = (thing.co_names, thing.co_varnames, *counts)
         return (thing.co_code, thing.co_exceptiontable, thing.co_consts, thing.co_flags, names)
     return _of_definition(thing) if isinstance(thing, FunctionType | type) else _of_object(thing)
 

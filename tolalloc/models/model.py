@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -280,11 +280,9 @@ class _Exact:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The model's columns."""
         return self.model.columns
 
     def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
-        """Return the output of every sample and its derivatives."""
         return self.model.derivatives(self.output, x)
 
 
@@ -292,13 +290,6 @@ class _Exact:
 class DifferencedResponse:
     """One output of a response that knows no derivatives.
 
-    Raises
-    ------
-    InputError, UnknownNameError
-        A step that is not above zero, or an output that the response does not have.
-
-    Notes
-    -----
     A sample with derivatives costs one answer and two for every column. The truncation falls with the square of the
     step; across a kink a difference is a mean of both sides.
     """
@@ -318,22 +309,12 @@ class DifferencedResponse:
         """The response's columns."""
         return self.response.columns
 
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """The one output."""
-        return (self.output,)
-
-    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
-        """Return the output of every sample."""
-        found = self.response(x)
-        at = self.response.outputs.index(self.output)
-        return Evaluation(values=found.values[:, [at]], status=found.status)
-
     def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
         """Return the output of every sample and its derivatives, NaN by neighbours that failed, all in one call."""
         columns = len(self.columns)
         shifts = np.concatenate([np.zeros((1, columns)), np.diag(self.steps), -np.diag(self.steps)])
-        found = self((x[:, np.newaxis] + shifts).reshape(-1, columns))
+        found = self.response((x[:, np.newaxis] + shifts).reshape(-1, columns))
+        found = replace(found, values=found.values[:, [self.response.outputs.index(self.output)]])
         values, status = found.values.reshape(-1, shifts.shape[0]), found.status.reshape(-1, shifts.shape[0])
         slopes = (values[:, 1 : columns + 1] - values[:, columns + 1 :]) / (2 * self.steps)
         good = found.good.reshape(status.shape)[:, 1:].reshape(-1, 2, columns).all(axis=1)
@@ -357,10 +338,7 @@ class HasCopies(Protocol):
     def shared_lines(self, stated: Mapping[str, Hashable]) -> Mapping[str, str]:
         """Return the line of the drawing, part and feature, of every source that is one of several copies.
 
-        Parameters
-        ----------
-        stated
-            Source → what the table states of it; copies of which it states different things have lines of their own.
+        Copies of which the table states different things, by source, have lines of their own.
         """
 
 
@@ -380,19 +358,7 @@ class ModelSource(Protocol):
         """Return the same that takes as exact what a drawing leaves out of the sources that patterns name, too."""
 
     def bound(self, errors: ErrorModel, place: str) -> Model:
-        """Return the model at the sources of a drawing; nothing is solved.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            A source that the model does not have, or an input that nobody gives.
-        """
+        """Return the model at the sources of a drawing, none unknown and none wanting; nothing is solved."""
 
     def set_to(self, settings: Mapping[str, float]) -> ModelSource:
-        """Return the same at other values of its settings and operating conditions [units of their names].
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            A setting that it does not have, or a value outside its bounds.
-        """
+        """Return the same at other values of its settings and operating conditions [units of their names]."""

@@ -82,13 +82,7 @@ class DrawnAmounts:
 
 
 def require_settings(place: str, known: Iterable[Setting], wanted: Mapping[str, float]) -> None:
-    """Raise unless every wanted value is one of a known setting, within its bounds.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        The setting that is not known, or the value that is not allowed.
-    """
+    """Raise unless every wanted value is one of a known setting, within its bounds."""
     own = {setting.name: setting for setting in known}
     for name, value in wanted.items():
         if name not in own:

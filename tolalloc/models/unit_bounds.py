@@ -13,6 +13,12 @@ from jaxtyping import Float, Int
 Sign = Literal[1, -1]
 """1 where a large output is bad, −1 where a small one is."""
 
+Variables = Float[np.ndarray, " variable"]
+"""An end of a box of scales [-] and settings [units of their names]."""
+
+Pair = tuple[Float[np.ndarray, "unit variable"], Float[np.ndarray, "unit variable"]]
+"""Two numbers of every unit by every variable."""
+
 Least = tuple[Float[np.ndarray, " unit"], Float[np.ndarray, "unit variable"]]
 """Lower bound of sign·output of every unit, −∞ where none is known, and how much every variable may move it."""
 
@@ -45,13 +51,7 @@ class ScaledUnits:
 class UnitBounds(Protocol):
     """What is certain of one output of some random units."""
 
-    def least(
-        self,
-        lower: Float[np.ndarray, " variable"],
-        upper: Float[np.ndarray, " variable"],
-        sign: Sign,
-        rows: Int[np.ndarray, " unit"],
-    ) -> Least:
+    def least(self, lower: Variables, upper: Variables, sign: Sign, rows: Int[np.ndarray, " unit"]) -> Least:
         """Return what sign·output of some of the units is at least anywhere in a box of scales [-] and settings."""
 
 
@@ -69,19 +69,10 @@ class BoundedModel(Protocol):
         """Return what is certain of an output of random units, sharpest near some designs."""
 
 
-def least_by_slopes(
-    slopes: tuple[Float[np.ndarray, "unit variable"], Float[np.ndarray, "unit variable"]],
-    lower: Float[np.ndarray, " variable"],
-    upper: Float[np.ndarray, " variable"],
-) -> tuple[Float[np.ndarray, "unit variable"], Float[np.ndarray, "unit variable"]]:
+def least_by_slopes(slopes: Pair, lower: Variables, upper: Variables) -> Pair:
     """Return from where every unit is best bounded in a box, and by how much every variable may lower it from there.
 
-    Parameters
-    ----------
-    slopes
-        Least and largest derivative by every variable, valid all over the box.
-    lower, upper
-        Ends of the box.
+    The slopes are the least and largest derivative by every variable, valid all over the box.
 
     Notes
     -----
@@ -107,7 +98,7 @@ class SlopeBounds:
     high: Float[np.ndarray, " slope"]
 
     @cached_property
-    def _slopes(self) -> tuple[Float[np.ndarray, "unit variable"], Float[np.ndarray, "unit variable"]]:
+    def _slopes(self) -> Pair:
         """Least and largest derivative of every unit by every variable."""
         columns, standard = self.units.standard.shape[1], self.units.standard
         one, other = standard * self.low[:columns], standard * self.high[:columns]
@@ -118,13 +109,7 @@ class SlopeBounds:
             for side, own in ((np.minimum, self.low), (np.maximum, self.high))
         )
 
-    def least(
-        self,
-        lower: Float[np.ndarray, " variable"],
-        upper: Float[np.ndarray, " variable"],
-        sign: Sign,
-        rows: Int[np.ndarray, " unit"],
-    ) -> Least:
+    def least(self, lower: Variables, upper: Variables, sign: Sign, rows: Int[np.ndarray, " unit"]) -> Least:
         """Return what sign·output is at least anywhere in a box; settings start from their middles."""
         slopes = [own[rows] for own in self._slopes]
         low, high = slopes if sign > 0 else (-slopes[1], -slopes[0])

@@ -29,6 +29,9 @@ _SAME = 1e-9
 _FEWEST = 30
 """Samples from which on a function that raises for all of them has a fault rather than bad samples [-]."""
 
+Arguments = Float[np.ndarray, "sample argument"]
+Values = Float[np.ndarray, "sample value"]
+
 
 @dataclass(frozen=True, kw_only=True)
 class UserFunction:
@@ -39,7 +42,7 @@ class UserFunction:
     place: str  # Who is meant, for messages
     names: tuple[str, ...] = ()  # What these numbers are called, with their units, where it may return them by name
 
-    def __call__(self, arguments: Float[np.ndarray, "sample argument"]) -> Float[np.ndarray, "sample value"]:
+    def __call__(self, arguments: Arguments) -> Values:
         """Return the values of every sample, NaN where there are none.
 
         The function is first given whole columns, copies that it may change. What it returns counts only if every
@@ -56,29 +59,23 @@ class UserFunction:
         """
         self._require_arguments(arguments.shape[1])
         with np.errstate(all="ignore"):
-            whole = self._of_columns(arguments)
-            if whole is not None:
-                self._require_a_number(whole, arguments)
-                return whole
-            rows, reasons = [], []
-            for sample in arguments:
-                row, reason = self._of_sample(sample)
-                rows.append(row)
-                reasons += [reason] * bool(reason)
-            found = np.array(rows).reshape(-1, self.values)
-            few = _few(len(arguments))
-            self._require_same(arguments[few], found[few])
-        if len(reasons) == len(rows) >= _FEWEST:
-            raise SolveError(f"{self.place}: the function raises for each of {len(rows)} samples, first {reasons[0]}.")
+            found = self._of_columns(arguments)
+            if found is None:
+                answers, few = [self._of_sample(sample) for sample in arguments], _few(len(arguments))
+                found = np.array([row for row, _ in answers]).reshape(-1, self.values)
+                self._require_same(arguments[few], found[few])
+                if len(answers) >= _FEWEST and all(reason for _, reason in answers):
+                    said = f"the function raises for each of {len(answers)} samples, first {answers[0][1]}"
+                    raise SolveError(f"{self.place}: {said}.")
         self._require_a_number(found, arguments)
         return found
 
-    def takes_columns(self, arguments: Float[np.ndarray, "sample argument"]) -> bool:
+    def takes_columns(self, arguments: Arguments) -> bool:
         """Return whether one call with whole columns gives the values of all samples."""
         with np.errstate(all="ignore"):
             return self._of_columns(arguments) is not None
 
-    def _of_columns(self, arguments: Float[np.ndarray, "sample argument"]) -> Float[np.ndarray, "sample value"] | None:
+    def _of_columns(self, arguments: Arguments) -> Values | None:
         """Return the values by one call with whole columns; None unless they can be trusted."""
         samples = arguments.shape[0]
         if samples < 2:
@@ -100,13 +97,11 @@ class UserFunction:
         self._require_same(arguments[few], alone)
         return None
 
-    def _alone(self, arguments: Float[np.ndarray, "sample argument"]) -> Float[np.ndarray, "sample value"]:
+    def _alone(self, arguments: Arguments) -> Values:
         """Return the values of samples that are called one by one."""
         return np.array([self._of_sample(sample)[0] for sample in arguments]).reshape(-1, self.values)
 
-    def _require_a_number(
-        self, found: Float[np.ndarray, "sample value"], arguments: Float[np.ndarray, "sample argument"]
-    ) -> None:
+    def _require_a_number(self, found: Values, arguments: Arguments) -> None:
         """Raise if none of many samples has an answer: what is wrong then is the function."""
         if len(found) >= _FEWEST and not np.isfinite(found).any():
             raise SolveError(
@@ -114,9 +109,7 @@ class UserFunction:
                 f"({_listed(arguments[0])}); allowed are numbers that are real and within ±{_LARGEST:g}."
             )
 
-    def _require_same(
-        self, arguments: Float[np.ndarray, "sample argument"], before: Float[np.ndarray, "sample value"]
-    ) -> None:
+    def _require_same(self, arguments: Arguments, before: Values) -> None:
         """Raise if the function says something else of the same samples in another order."""
         again = self._alone(arguments[::-1])[::-1]
         for sample, first, second in zip(arguments, before, again, strict=True):
@@ -159,13 +152,7 @@ class UserFunction:
             raise
 
     def _in_order(self, found: Any) -> Any:
-        """Return what the function returned in the order of its outputs, where it says them by name.
-
-        Raises
-        ------
-        InputError
-            Other names than those of the outputs, with or without their units.
-        """
+        """Return what the function returned in the order of its outputs, where it says them by name."""
         said = _named_values(found)
         if not said or not self.names:
             return found
@@ -181,10 +168,7 @@ class UserFunction:
     def _numbers(self, found: Any) -> Float[np.ndarray, "..."]:
         """Return what the function returned as numbers of its own, NaN where that is no answer.
 
-        Raises
-        ------
-        InputError
-            Text, times, or numbers of 32 bits and less, whose rounding differences would take for a slope.
+        Refused are text, times, and numbers of 32 bits and less, whose rounding differences would take for a slope.
         """
         if isinstance(found, list | tuple):
             return np.array([self._numbers(one) for one in found])

@@ -27,7 +27,6 @@ _ARCHIVES = {
     b"xl/workbook.bin": "a binary workbook (XLSB)",
     b"Index/Document.iwa": "a Numbers spreadsheet",
 }
-"""What stands in an archive of which kind."""
 _OFFICES = {"UTF-16": "utf-16", "Windows-1252": "cp1252"}
 """How spreadsheets save a CSV file that is not UTF-8 → codec of Python."""
 
@@ -41,12 +40,7 @@ def is_file(path: Path) -> bool:
 
 
 def read_bytes(path: Path, what: str) -> bytes:
-    """Return the content of a file.
-
-    Parameters
-    ----------
-    what
-        What it should be, for messages.
+    """Return the content of a file, which messages call by what it should be.
 
     Raises
     ------
@@ -67,14 +61,7 @@ def read_bytes(path: Path, what: str) -> bytes:
 
 
 def require_table(path: Path, content: bytes, is_workbook: bool) -> None:
-    """Raise if a file that should be a table is one of another kind.
-
-    Parameters
-    ----------
-    content
-        What it holds.
-    is_workbook
-        Whether its name says a workbook (XLSX).
+    """Raise if a file that should be a table, or a workbook (XLSX), is one of another kind.
 
     Raises
     ------
@@ -140,13 +127,7 @@ def other_encoding(path: Path) -> str:
 
 
 def require_believable(path: Path, row: int, columns: int, cells: int) -> None:
-    """Raise if a table is larger than is believed, so that none takes the memory of a machine.
-
-    Raises
-    ------
-    InputError
-        The row in which the columns or the cells so far are too many.
-    """
+    """Raise if a table is larger than is believed, so that none takes the memory of a machine."""
     if columns > MOST_COLUMNS or cells > MOST_CELLS:
         raise InputError(
             f"{path}, row {row}: the table is too large, with {columns} columns and {cells} cells so far; allowed are "

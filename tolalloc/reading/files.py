@@ -42,10 +42,7 @@ class Record(pydantic.BaseModel):
 
 
 def times(unit: float) -> pydantic.AfterValidator:
-    """Return what takes a number from a file's unit of measurement, such as that of an alias `length_mm`, to SI units.
-
-    A record of the design says by it, and by bounds in the file's unit, how a file may state its numbers.
-    """
+    """Return what takes a number from a file's unit, such as that of an alias `length_mm`, to SI units."""
     return pydantic.AfterValidator(lambda value: value * unit)
 
 
@@ -101,10 +98,8 @@ def validated(model: type[Model], data: Mapping[str, Any], place: Path | str) ->
 
     Raises
     ------
-    InputError
-        A field is missing or its value is not allowed.
-    UnknownNameError
-        A field that the record does not have.
+    InputError, UnknownNameError
+        A field is missing, its value is not allowed, or the record does not have it.
     """
     try:
         return model.model_validate(data)
@@ -207,23 +202,17 @@ def shipped_or_path(name: str | Path, folder: Path, suffix: str, what: str) -> P
     if str(name) in shipped:
         return shipped[str(name)]
     path = found_from_here(name)
-    if path.suffix or is_file(path):
-        if not is_file(path):
-            if os.path.exists(path):
-                raise InputError(f"{path}: is a folder, a device or a pipe; allowed is a file.")
-            raise InputError(f"{path}: no such file; shipped {what} files are {', '.join(sorted(shipped))}.")
+    if is_file(path):
         return path
+    if path.suffix and os.path.exists(path):
+        raise InputError(f"{path}: is a folder, a device or a pipe; allowed is a file.")
+    if path.suffix:
+        raise InputError(f"{path}: no such file; shipped {what} files are {', '.join(sorted(shipped))}.")
     raise UnknownNameError.among(f"shipped {what} files", "name", str(name), shipped)
 
 
 def require_new(path: Path) -> None:
-    """Refuse a file that is there already or whose folder cannot be written, before anything long runs.
-
-    Raises
-    ------
-    InputError
-        The file cannot be made without losing another, or not at all.
-    """
+    """Raise if a file is there already or its folder cannot be written, before anything long runs."""
     if path.exists():
         raise InputError(f"{path}: the file exists; name a new one, nothing is overwritten.")
     if not path.parent.is_dir() or not os.access(path.parent, os.W_OK):
@@ -231,13 +220,7 @@ def require_new(path: Path) -> None:
 
 
 def write_new(path: Path, text: str) -> None:
-    """Write a new text file.
-
-    Raises
-    ------
-    InputError
-        The file is there already or cannot be made.
-    """
+    """Write a new text file; one that is there already or cannot be made is an InputError."""
     require_new(path)
     try:
         with path.open("x", encoding="utf-8", newline="") as file:
@@ -252,11 +235,7 @@ def no_formula(cell: object) -> object:
 
 
 def is_formula(text: str) -> bool:
-    """Return whether a spreadsheet would calculate a text; a number is none.
-
-    >>> is_formula("=1+1"), is_formula("-cmd"), is_formula("-1.5"), is_formula("bore")
-    (True, True, False, False)
-    """
+    """Return whether a spreadsheet would calculate a text; a number is none."""
     return bool(_FORMULA.match(text)) and not _SIGNED.fullmatch(text)
 
 

@@ -38,24 +38,14 @@ class Rule:
     name: str = ""  # What a refusal calls the field; its own name unless given
 
     def check(self, place: str, name: str, value: object, *, of_argument: bool = False) -> None:
-        """Raise unless the value is allowed.
-
-        Raises
-        ------
-        InputError
-            Where, the name, the value and what is allowed; of an argument, a command says its option instead.
-        """
+        """Raise unless the value is allowed; of an argument, a command says its option instead."""
         if not self.keeps(value):
             refusal = InputError.of_argument if of_argument else InputError.at
             raise refusal(place, self.name or name, value, self.allowed)
 
 
 def number(allowed: str, *, above: float = -inf, least: float = -inf, most: float = inf, below: float = inf) -> Rule:
-    """Return the rule of a finite number in a range.
-
-    >>> number("a share above 0 up to 0.5", above=0, most=0.5).keeps(0.7)
-    False
-    """
+    """Return the rule of a finite number in a range."""
 
     def keeps(value: Any) -> bool:
         return is_number(value) and isfinite(value) and above < value < below and least <= value <= most
@@ -66,11 +56,7 @@ def number(allowed: str, *, above: float = -inf, least: float = -inf, most: floa
 def whole(
     allowed: str, least: int, most: float = inf, *, multiple: int = 1, power_of_two: bool = False, name: str = ""
 ) -> Rule:
-    """Return the rule of a whole number in a range, which may have to be a multiple or a power of two.
-
-    >>> whole("a power of two, 2 or more", 2, power_of_two=True).keeps(12)
-    False
-    """
+    """Return the rule of a whole number in a range, which may have to be a multiple or a power of two."""
 
     def keeps(value: Any) -> bool:
         good = type(value) is int and least <= value <= most and value % multiple == 0
@@ -135,10 +121,7 @@ def rules_of(record: Any) -> dict[str, tuple[Rule, ...]]:
 
 
 class NamedFields:
-    """Base of frozen dataclasses that a user writes.
-
-    A dataclass alone answers a wrong field with a bare TypeError, and a wrong value not at all.
-    """
+    """Base of frozen dataclasses that a user writes: a wrong field or value is refused in one sentence."""
 
     called: ClassVar[str]
     """What messages call the record."""

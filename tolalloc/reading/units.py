@@ -1,7 +1,4 @@
-"""Units: factors to the SI units used inside, and the units in the names of outputs and columns.
-
-Multiply by the factor on the way in, divide on the way out: ``length = 4.0 * MICROMETRE``.
-"""
+"""Units: factors to the SI units used inside (multiply on the way in, divide on the way out), and units in names."""
 
 from __future__ import annotations
 
@@ -34,30 +31,18 @@ _THOUSANDTH = re.compile(r"[0#?],+(?![0#?])")
 
 
 def unit_of(name: str) -> str:
-    """Return the unit in the name of an output, which stands last in brackets.
-
-    >>> unit_of("lost motion [arcmin]")
-    'arcmin'
-    """
+    """Return the unit in the name of an output, which stands last in brackets."""
     return name.split("[")[-1].split("]")[0] if "[" in name else "-"
 
 
 def currency_in(unit: str) -> str:
-    """Return the currency that a unit of costs begins with, three letters or a sign; empty where there is none.
-
-    >>> currency_in("EUR µm^n"), currency_in("€"), currency_in("cost units")
-    ('EUR', '€', '')
-    """
+    """Return the currency that a unit of costs begins with, three letters or a sign; empty where there is none."""
     found = _CURRENCY.match(unit)
     return found[1] if found else ""
 
 
 def in_cost_units(unit: str) -> str:
-    """Return a unit with cost units for its currency, so that it is known whatever a user counts costs in.
-
-    >>> in_cost_units("EUR µm^n"), in_cost_units("µm")
-    ('cost units µm^n', 'µm')
-    """
+    """Return a unit with cost units for its currency, so that it is known whatever a user counts costs in."""
     return _CURRENCY.sub(COST_UNITS, unit, count=1)
 
 
@@ -77,22 +62,10 @@ def is_unit(text: str) -> bool:
 def number_in(cell: str, unit: str) -> str:
     """Return what a cell states without the unit behind its number.
 
-    Parameters
-    ----------
-    cell
-        A number, or one behind ±, with or without a unit.
-    unit
-        The unit that it may state.
-
     Raises
     ------
     ValueError
         It states another unit.
-
-    Examples
-    --------
-    >>> number_in("0.05 mm", "mm"), number_in("5%", "%"), number_in("0.05", "mm")
-    ('0.05', '5', '0.05')
     """
     found = WITH_UNIT.fullmatch(usual_signs(cell))
     if found is None:
@@ -104,11 +77,7 @@ def number_in(cell: str, unit: str) -> str:
 
 
 def shown_number(value: float, form: str) -> str:
-    """Return a number with what its format adds to it: leading zeros, per cent, the name of a unit.
-
-    >>> shown_number(7, "000"), shown_number(0.05, "0.00%"), shown_number(0.02, '0.00" mm"')
-    ('007', '5%', '0.02 mm')
-    """
+    """Return a number with what its format adds to it: leading zeros, per cent, the name of a unit."""
     if re.fullmatch(r"0{2,}", form) and float(value).is_integer():
         return f"{int(value):0{len(form)}d}"
     if "%" in re.sub(r'"[^"]*"', "", form):
