@@ -6,7 +6,7 @@ import inspect
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import MISSING, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from numbers import Integral
 from pathlib import Path
@@ -210,15 +210,9 @@ def door(inquiry: type[Inquiry[Any]]) -> Callable[..., Answer[Any]]:
             raise (error.as_option(f"ta.{inquiry.word}", field) if field else error) from None
 
     hints = get_type_hints(inquiry)
-    empty = inspect.Parameter.empty
     parameters = [
-        inspect.Parameter(
-            own.name,
-            inspect.Parameter.POSITIONAL_OR_KEYWORD if at < inquiry.by_position else inspect.Parameter.KEYWORD_ONLY,
-            default=empty if own.default is MISSING else own.default,
-            annotation=hints[own.name],
-        )
-        for at, own in enumerate(fields(inquiry))
+        own.replace(kind=own.POSITIONAL_OR_KEYWORD if at < inquiry.by_position else own.kind, annotation=hints[name])
+        for at, (name, own) in enumerate(inspect.signature(inquiry).parameters.items())
     ]
     ask.__name__ = ask.__qualname__ = inquiry.word
     ask.__doc__ = inquiry.__doc__
