@@ -124,7 +124,7 @@ def allocate(
 
     study = _with_first_limit(way.study(script), limit, yield_target)
     if grades:
-        own = questions_of(("allocation",), tuple(study.questions), "tolalloc allocate")[0]
+        own = questions_of(("allocation",), study.questions, "tolalloc allocate")[0]
         graded = replace(own, grades=True) if isinstance(own, Allocation) else own
         study = replace(study, questions=(*(q for q in study.questions if q.kind != "allocation"), graded))
     _run(study, ("allocation",), "-allocate", way)
@@ -155,37 +155,32 @@ def _with_first_limit(study: Study, limit: float | None, yield_target: float | N
     return replace(study, limits={**study.limits, leading: changed})
 
 
-@dataclass(frozen=True)
-class _Place:
-    """Where a run is written, and the run before it."""
+def _places(named: Path | None, name: str) -> tuple[Path, Path | None]:
+    """Return the folder of a run and the last finished one before it: where none is named, the next numbered in runs.
 
-    folder: Path
-    before: Path | None  # The last finished run of the same name; none where a folder was named
+    So a study runs again after an edit.
+    """
+    from tolalloc.reports.finished_run import finished
+    from tolalloc.reports.folder import RUNS, numbered
 
-    @classmethod
-    def of(cls, named: Path | None, name: str) -> _Place:
-        """Return the named folder; else the next numbered one in runs, so that the study runs again after an edit."""
-        from tolalloc.reports.finished_run import finished
-        from tolalloc.reports.folder import RUNS, numbered
+    if named:
+        return named, None
+    *earlier, folder = numbered(RUNS / name)
+    last = finished(earlier)[-1:]
+    return folder, last[0].folder if last else None
 
-        if named:
-            return cls(named, None)
-        *earlier, folder = numbered(RUNS / name)
-        last = finished(earlier)[-1:]
-        return cls(folder, last[0].folder if last else None)
 
-    def tell_changes(self) -> None:
-        """Say what changed since the run before; nothing where one of the two is no ranking and no allocation."""
-        from tolalloc.reports.tellers.comparison import ComparisonTeller
-        from tolalloc.running.progress import SILENT
-        from tolalloc.study.inquiries.compare import Compare
+def _tell_changes(before: Path, folder: Path) -> None:
+    """Say what changed since the run before; nothing where one of the two is no ranking and no allocation."""
+    from tolalloc.reports.tellers.comparison import ComparisonTeller
+    from tolalloc.running.progress import SILENT
+    from tolalloc.study.inquiries.compare import Compare
 
-        if self.before:
-            with suppress(InputError):
-                asked = Compare(first=self.before, second=self.folder)
-                found = asked.solve(asked.prepare(), SILENT)
-                for sentence in ComparisonTeller(found.result, found.header).since:
-                    say(sentence)
+    with suppress(InputError):
+        asked = Compare(first=before, second=folder)
+        found = asked.solve(asked.prepare(), SILENT)
+        for sentence in ComparisonTeller(found.result, found.header).since:
+            say(sentence)
 
 
 def _run(study: Study, kinds: tuple[str, ...], ending: str, way: _Way) -> None:
@@ -195,9 +190,9 @@ def _run(study: Study, kinds: tuple[str, ...], ending: str, way: _Way) -> None:
     from tolalloc.study.study import cache_beside
     from tolalloc.study.study import run as run_study
 
-    place = _Place.of(way.out, f"{study.name}{ending}")
-    folder, paper = place.folder, way.paper if way.pdf else ""
-    questions = questions_of(kinds, tuple(study.questions), f"study {study.name}")
+    folder, before = _places(way.out, f"{study.name}{ending}")
+    paper = way.paper if way.pdf else ""
+    questions = questions_of(kinds, study.questions, f"study {study.name}")
     if paper:
         require_printable(paper)
     announce_kernel(study.model)
@@ -232,7 +227,8 @@ def _run(study: Study, kinds: tuple[str, ...], ending: str, way: _Way) -> None:
             say(warning, warns=True)
         if (more := len(warnings) - _WARNINGS) > 0:
             say(f"{more} more {'note' if more == 1 else 'notes'} in the report, or with --verbose.", warns=True)
-        place.tell_changes()
+        if before:
+            _tell_changes(before, folder)
     note(f"Report: {folder / 'report.html'}")
 
 
@@ -258,7 +254,7 @@ def _show(answer: Answer[Any]) -> None:
     tables = []
     if answer.tables:
         frame = answer.to_frame()
-        columns = [column for column in answer.shown if column in frame.columns] or list(frame.columns[:6])
+        columns = [column for column in answer.teller.shown if column in frame.columns] or list(frame.columns[:6])
         part = f", first {_ROWS} of {len(frame)} rows" if len(frame) > _ROWS else ""
         tables = [(frame[columns].head(_ROWS), f"{answer.header.name}: {answer.kind}{part}")]
     tell(answer, False, *tables)

@@ -56,29 +56,6 @@ Neglected = Annotated[
 ProcessesName = Annotated[str, Word("Process capability library that rows of the table may name: shipped name or CSV.")]
 
 
-def named_reducer(reducer: str | None, *written: Path | None, argument: str = "reducer") -> str:
-    """Return the reducer that was asked for, the default one unless given.
-
-    No file, of those that are to be written, is about a reducer that nobody named.
-
-    Raises
-    ------
-    InputError
-        A file is to be written and no reducer was given; the message says the argument, or the option of a command.
-    """
-    if reducer is not None:
-        return reducer
-    if any(written):
-        from tolalloc.reducers.reducer.files import PRESETS
-
-        presets = ", ".join(sorted(file.name.split(".")[0] for file in PRESETS.glob("*.reducer.toml")))
-        raise InputError(
-            f"{argument} is missing: where a file is written the reducer must be named; allowed is a preset "
-            f"({presets}) or a TOML file."
-        )
-    return DEFAULT_REDUCER
-
-
 @dataclass(frozen=True, kw_only=True)
 class Inquiry(NamedFields, ABC, Generic[Prepared]):
     """A question that is asked without a study.
@@ -147,19 +124,22 @@ class Inquiry(NamedFields, ABC, Generic[Prepared]):
         return ()
 
     def with_reducer(self, *written: Path | None, argument: str = "reducer") -> Self:
-        """Return it with the default reducer if it asks for one and none is given; see `named_reducer`.
+        """Return it with the default reducer if it asks for one and none is given.
 
-        Parameters
-        ----------
-        written
-            Files that are written besides its own, such as the report.
-        argument
-            What a message calls the reducer.
+        No file, of its own or of others that are written such as the report, is about a reducer that nobody named; a
+        message says the argument, or the option of a command.
         """
-        if not any(own.name == "reducer" for own in fields(self)):
+        if getattr(self, "reducer", DEFAULT_REDUCER) is not None:
             return self
-        files = (*written, *(getattr(self, name) for name in self.written))
-        named: dict[str, Any] = {"reducer": named_reducer(vars(self)["reducer"], *files, argument=argument)}
+        if any(written) or any(getattr(self, name) for name in self.written):
+            from tolalloc.reducers.reducer.files import PRESETS
+
+            presets = ", ".join(sorted(file.name.split(".")[0] for file in PRESETS.glob("*.reducer.toml")))
+            raise InputError(
+                f"{argument} is missing: where a file is written the reducer must be named; allowed is a preset "
+                f"({presets}) or a TOML file."
+            )
+        named: dict[str, Any] = {"reducer": DEFAULT_REDUCER}
         return replace(self, **named)
 
     def ask(self, progress: Progress | None = None) -> Answer[Any]:

@@ -219,6 +219,7 @@ class Problem(NamedFields):
         "Sequence[Compensator]",
         each("several of ta.Sorting(...), ta.Shim(...) and ta.Indexing(...)", a(Compensator)),
     ] = ()
+    questions: Sequence[Any] = ()
 
     def __post_init__(self) -> None:
         if isinstance(self.effort, str):
@@ -241,11 +242,6 @@ class Problem(NamedFields):
     def _place(cls, named: Mapping[str, Any]) -> str:
         """Return who is meant; a name that is none is not said."""
         return f"{cls.called} {named['name']}" if _is_name(named.get("name")) else cls.called
-
-    @property
-    def asked(self) -> tuple[object, ...]:
-        """What is asked; nothing yet."""
-        return ()
 
     @property
     def quick(self) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from inspect import signature
 from pathlib import Path
@@ -88,8 +88,9 @@ class Ranking(Question):
             largest_failed_share=study.largest_failed_share,
             by=self.by,
         )
-        result = rank(asked, record)
-        return Answer(kind=self.kind, header=prepared.header_after(record), result=result)
+        result, header = rank(asked, record), prepared.header
+        header = replace(header, assumptions=tuple(dict.fromkeys(header.assumptions)))
+        return _answer(self.kind, header, record, result)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,14 +183,8 @@ class Allocation(Question):
             effort=prepared.allocation_effort,
             seed=study.seed,
             largest_failed_share=study.largest_failed_share,
-            grades=self.grades,
-            fixed_first=self.fixed_first,
-            front=self.front,
-            what_if=self.what_if,
-            unit_price=self.unit_price,
-            quality_loss=self.quality_loss,
-            boxes=self.boxes,
             place=prepared.place,
+            **vars(self),
         )
         if checkpoint and prepared.unknown:
             record.progress.tell(f"The checkpoint {checkpoint} is neither read nor written: {prepared.unknown}.")
@@ -240,7 +235,7 @@ def _answer(kind: str, header: Header, record: RunRecord, result: Result) -> Ans
     return Answer(kind=kind, header=replace(header, statuses=record.counts, stages=record.stages), result=result)
 
 
-def questions_of(kinds: tuple[str, ...], asked: tuple[Question, ...], place: str) -> tuple[Question, ...]:
+def questions_of(kinds: tuple[str, ...], asked: Sequence[Question], place: str) -> tuple[Question, ...]:
     """Return the questions of a study that are meant by their kinds; one that it does not ask has its defaults.
 
     Raises

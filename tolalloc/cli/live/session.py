@@ -125,39 +125,6 @@ def names_in(sent: Mapping[str, Any], key: str, known: Collection[str]) -> froze
     return frozenset(found)
 
 
-def judged(
-    prepared: Prepared, model: Model, outputs: tuple[str, ...], values: Float[np.ndarray, "unit output"]
-) -> dict[str, Any]:
-    """Return the yield of all limits, and of each output its quantiles, its share and its histogram.
-
-    Parameters
-    ----------
-    prepared
-        The study.
-    model
-        What answered, whose own limits are in force.
-    outputs
-        Names of the outputs, in the order of the values.
-    values
-        Outputs of every unit, NaN where a unit has none [as the names state].
-    """
-    read = [(own.in_force(model), values[:, outputs.index(own.output)]) for own in prepared.requirements]
-    kept = np.all([own.limits.kept_by(found) for own, found in read], axis=0)
-    inside = proportion(len(values), int(np.count_nonzero(~kept)))
-    limited = model.own_limits
-    return {
-        "units": len(values),
-        "lost": int(np.count_nonzero(np.isnan(values).any(axis=1))),
-        "yield": [inside.estimate, inside.low, inside.high],
-        "target": prepared.target,
-        # share of units that do not work at all, for every limit that the model has of its own
-        "broken": {
-            own.output: float((~own.limits.kept_by(found)).mean()) for own, found in read if own.output in limited
-        },
-        "outputs": [_output(own, found, kept) for own, found in read],
-    }
-
-
 def _output(
     requirement: Requirement, values: Float[np.ndarray, " unit"], kept: Bool[np.ndarray, " unit"]
 ) -> dict[str, Any]:
@@ -273,7 +240,27 @@ class Session:
         if not (type(count) is int and 1 <= count <= MOST):
             raise InputError.at("page", "units", count, f"a whole number up to {MOST}")
         values = self._solved(design, count, wanted)
-        return None if values is None else judged(self.prepared, self.model(design), self.outputs, values[:count])
+        return None if values is None else self._judged(design, values[:count])
+
+    def _judged(self, design: LiveDesign, values: Float[np.ndarray, "unit output"]) -> dict[str, Any]:
+        """Return the yield of all limits, and of each output its quantiles, its share and its histogram.
+
+        A unit without an output has NaN there; limits of the model's own are those in force at the design.
+        """
+        model = self.model(design)
+        read = [(own.in_force(model), values[:, self.outputs.index(own.output)]) for own in self.prepared.requirements]
+        kept = np.all([own.limits.kept_by(found) for own, found in read], axis=0)
+        inside = proportion(len(values), int(np.count_nonzero(~kept)))
+        broken = [(own, found) for own, found in read if own.output in model.own_limits]
+        return {
+            "units": len(values),
+            "lost": int(np.count_nonzero(np.isnan(values).any(axis=1))),
+            "yield": [inside.estimate, inside.low, inside.high],
+            "target": self.prepared.target,
+            # share of units that do not work at all, for every limit that the model has of its own
+            "broken": {own.output: float((~own.limits.kept_by(found)).mean()) for own, found in broken},
+            "outputs": [_output(own, found, kept) for own, found in read],
+        }
 
     def _solved(
         self, design: LiveDesign, count: int, wanted: Callable[[], bool]
@@ -307,7 +294,7 @@ class Session:
             values = self._solved(scaled, FIRST, wanted)
             if values is None:
                 return None
-            outputs = judged(self.prepared, self.model(scaled), self.outputs, values[:FIRST])["outputs"]
+            outputs = self._judged(scaled, values[:FIRST])["outputs"]
             cost = sum(own.cost for own in self.sources(scaled))
             quantiles = [[item["value"] for item in own["quantiles"]] for own in outputs]
             found.append({"factor": factor, "cost": cost, "quantiles": quantiles})
