@@ -96,13 +96,7 @@ class SayingNumbers(TyperGroup):
     """All commands; an option or argument that is no number is refused in a sentence of ours."""
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the command that was asked for.
-
-        Raises
-        ------
-        InputError
-            The option, its value, and that a number is allowed.
-        """
+        """Run the command that was asked for."""
         try:
             return super().invoke(ctx)
         except typer.BadParameter as error:

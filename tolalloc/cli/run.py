@@ -131,13 +131,7 @@ def allocate(
 
 
 def _with_first_limit(study: Study, limit: float | None, yield_target: float | None) -> Study:
-    """Return the study with another first limit or yield.
-
-    Raises
-    ------
-    InputError
-        The study has no limits, or the first one has two sides.
-    """
+    """Return the study with another first limit or yield."""
     if limit is None and yield_target is None:
         return study
     if not study.limits:

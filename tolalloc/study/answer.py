@@ -37,10 +37,6 @@ class Answer(Generic[Result]):
         The numbers, frozen, with units.
     told_by
         What tells of it; the teller of its kind unless given.
-
-    Notes
-    -----
-    What is shown is made once, when it is first asked for. A notebook shows the first sentence, table and figure.
     """
 
     kind: str

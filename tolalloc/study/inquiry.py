@@ -81,39 +81,21 @@ class Inquiry(NamedFields, ABC, Generic[Prepared]):
         cls.called = f"tolalloc {getattr(cls, 'word', cls.__name__)}"
 
     def __post_init__(self) -> None:
-        """Take every field as what its annotation says: a path also as text, a number also as a whole one.
-
-        Raises
-        ------
-        InputError
-            A field of another kind, or a value that its rule does not allow.
-        """
+        """Take every field as what its annotation says: a path also as text, a number also as a whole one."""
         for name, kind in _kinds(type(self)).items():
             object.__setattr__(self, name, _taken(self.called, name, kind, getattr(self, name)))
         super().__post_init__()
 
     @abstractmethod
     def prepare(self) -> Prepared:
-        """Return what is solved, all files read and all values checked; nothing long runs.
-
-        Raises
-        ------
-        TolallocError
-            One sentence on what is wrong.
-        """
+        """Return what is solved, all files read and all values checked; nothing long runs."""
 
     def room(self, prepared: Prepared) -> str:  # noqa: ARG002
         """Return the compiled room that it solves with, empty for none."""
         return self.kernel
 
     def apart_from(self, report: Path | None) -> None:
-        """Refuse files that must not stand in the folder of a report; nothing unless an inquiry says otherwise.
-
-        Raises
-        ------
-        InputError
-            A file that would stand in the folder.
-        """
+        """Refuse files that must not stand in the folder of a report; nothing unless an inquiry says otherwise."""
 
     @abstractmethod
     def solve(self, prepared: Prepared, progress: Progress) -> Answer[Any]:

@@ -77,13 +77,7 @@ class Prepared:
 
     @cached_property
     def assemblies(self) -> tuple[tuple[Compensator, ...], ...]:
-        """What may act at assembly, every combination of classes and sizes; the first one is that of today.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            A source that is not there or cannot be sorted or shimmed, or too many combinations.
-        """
+        """What may act at assembly, every combination of classes and sizes; the first one is that of today."""
         choices = all_choices(self.study.compensators, self.place)
         return tuple(in_force(own, self._stated.sources, self.place) for own in choices)
 
@@ -119,13 +113,7 @@ class Prepared:
 
     @cached_property
     def requirements(self) -> tuple[Requirement, ...]:
-        """What the study limits, the leading output first.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            No limit, or limits of no output.
-        """
+        """What the study limits, the leading output first."""
         if not self.study.limits:
             raise InputError(f"{self.place}: limits is empty; limit one output at least, the leading one first.")
         for name in self.study.limits:
@@ -213,13 +201,7 @@ class Prepared:
 
     @cached_property
     def currency(self) -> str:
-        """What costs are in, by the headers of tolerance table and process costs; empty where they are cost units.
-
-        Raises
-        ------
-        InputError
-            The two state different ones.
-        """
+        """What costs are in, by the headers of tolerance table and process costs; empty where they are cost units."""
         drawing = self.study.drawing
         own, made = (drawing.currency, currency_of_costs(drawing.costs)) if drawing else ("", "")
         if own and made and own != made:

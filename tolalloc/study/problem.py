@@ -51,11 +51,6 @@ class Limit(NamedFields):
     ------
     InputError
         No side, sides in the wrong order, or numbers that are not finite.
-
-    Examples
-    --------
-    >>> Limit(upper=60.0).upper
-    60.0
     """
 
     called: ClassVar[str] = "limit"
@@ -84,12 +79,6 @@ class Limit(NamedFields):
         return Limits(upper=self.upper, lower=self.lower)
 
 
-def _places(until: str) -> int:
-    """Return how many places a text speaks of."""
-    said = until.split()[-1]
-    return int(said) if said.isdigit() else _NUMBERS.index(said) + 1
-
-
 @dataclass(frozen=True, kw_only=True)
 class Effort(NamedFields):
     """How much a study may compute.
@@ -108,16 +97,6 @@ class Effort(NamedFields):
     until
         ``"order of the first three"``, any number of places: the blocks of a ranking grow until that order is stable,
         within a limit.
-
-    Raises
-    ------
-    InputError
-        A field of another kind.
-
-    Examples
-    --------
-    >>> Effort(until="order of the first five").places
-    5
     """
 
     called: ClassVar[str] = "effort"
@@ -133,7 +112,10 @@ class Effort(NamedFields):
     @property
     def places(self) -> int | None:
         """First places whose order a ranking must settle; None where nothing is asked of it [-]."""
-        return None if self.until is None else _places(self.until)
+        if self.until is None:
+            return None
+        said = self.until.split()[-1]
+        return int(said) if said.isdigit() else _NUMBERS.index(said) + 1
 
     def notes(self, model: Model) -> tuple[str, ...]:
         """Return what a reader must know of the time that was asked for."""

@@ -46,13 +46,7 @@ class Question(NamedFields, ABC):
 
     @abstractmethod
     def answer(self, prepared: Prepared, record: RunRecord, checkpoint: Path | None) -> Answer[Any]:
-        """Return the answer.
-
-        Parameters
-        ----------
-        checkpoint
-            File that keeps an interrupted search, if one is wanted.
-        """
+        """Return the answer; a checkpoint is a file that keeps an interrupted search."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,9 +58,6 @@ class Ranking(Question):
     by
         What is ranked: ``dimension``, each dimension of the drawing with all its places together, or ``source``, each
         source alone.
-
-    >>> Ranking().by
-    'dimension'
     """
 
     kind: ClassVar[str] = "ranking"
@@ -103,11 +94,6 @@ class Difference(Question):
         Source, or a pattern of several as ``disc*.pitch``, and its full zone [µm].
     units
         Random units of either drawing [-].
-
-    Examples
-    --------
-    >>> Difference(zones={"pin.diameter": 3.0}).units
-    1024
     """
 
     kind: ClassVar[str] = "difference"
@@ -153,11 +139,6 @@ class Allocation(Question):
     boxes
         Boxes of zones and settings in which a cost is looked for that no drawing undercuts, on the real model; 0 for
         none. The more, the nearer the bound; a reducer looks at some 50 to 200 a second [-].
-
-    Examples
-    --------
-    >>> Allocation(grades=True).grades
-    True
     """
 
     kind: ClassVar[str] = "allocation"
@@ -236,13 +217,7 @@ def _answer(kind: str, header: Header, record: RunRecord, result: Result) -> Ans
 
 
 def questions_of(kinds: tuple[str, ...], asked: Sequence[Question], place: str) -> tuple[Question, ...]:
-    """Return the questions of a study that are meant by their kinds; one that it does not ask has its defaults.
-
-    Raises
-    ------
-    UnknownNameError
-        A kind that is no question.
-    """
+    """Return the questions of a study that are meant by their kinds; one that it does not ask has its defaults."""
     known: dict[str, Any] = {"ranking": Ranking, "allocation": Allocation}
     own = {question.kind: question for question in asked}
     for kind in kinds:

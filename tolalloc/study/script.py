@@ -64,13 +64,7 @@ def _belongs_to(name: str, folder: Path) -> bool:
 
 
 def load_study(path: Path) -> Study:
-    """Return the study that a script defines, and leave its modules in force for the rest of the process.
-
-    Raises
-    ------
-    InputError
-        The script is missing, broken, or defines no study.
-    """
+    """Return the study of `load_script`, and leave its modules in force for the rest of the process."""
     script = load_script(path)
     sys.path.insert(0, str(script.folder))
     sys.modules.update(script.modules)

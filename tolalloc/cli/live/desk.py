@@ -15,7 +15,7 @@ from pathlib import Path
 from threading import Event, Lock, Thread
 from typing import Any, cast
 
-from tolalloc.cli.live.session import LiveDesign, LiveUnits, Session, names_in
+from tolalloc.cli.live.session import LiveDesign, Session, names_in
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import table_text
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
@@ -74,13 +74,7 @@ class Job:
 
     @classmethod
     def asked(cls, kind: str, study: Study, settings: tuple[str, ...] = ()) -> Job:
-        """Ask a question of a study, at the quick effort.
-
-        Raises
-        ------
-        InputError
-            The page does not ask such a question.
-        """
+        """Ask a question of a study, at the quick effort."""
         if kind not in KINDS:
             raise InputError.at("page", "question", kind, " or ".join(KINDS))
         job = cls(kind=kind, study=study, settings=settings)
@@ -186,13 +180,7 @@ class Desk:
         }
 
     def answer(self, name: str, sent: dict[str, Any]) -> dict[str, Any]:
-        """Return the answer to a request.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            A request that is none, or a field of it that is not allowed.
-        """
+        """Return the answer to a request."""
         if name not in self._asked:
             raise UnknownNameError.among("page", "request", name, self._asked)
         return self._asked[name](sent)
@@ -208,7 +196,7 @@ class Desk:
     def _design(self, sent: dict[str, Any]) -> dict[str, Any]:
         design = self._read(sent)
         self._newest(sent)  # what older designs still solve is not wanted any more
-        found = LiveUnits(session=self.session).unit(design, sent.get("unit", 0))
+        found = self.session.unit(design, sent.get("unit", 0))
         return {**self.session.priced(design), **found}
 
     def _units(self, sent: dict[str, Any]) -> dict[str, Any]:
@@ -222,10 +210,10 @@ class Desk:
 
     def _scene(self, sent: dict[str, Any]) -> dict[str, Any]:
         swept = (str(sent["source"]), sent.get("share", 0.0)) if "source" in sent else None
-        return LiveUnits(session=self.session).scene(self._read(sent), sent.get("unit", 0), swept)
+        return self.session.scene(self._read(sent), sent.get("unit", 0), swept)
 
     def _sweep(self, sent: dict[str, Any]) -> dict[str, Any]:
-        return LiveUnits(session=self.session).swept(self._read(sent), sent.get("unit", 0), str(sent.get("source")))
+        return self.session.swept(self._read(sent), sent.get("unit", 0), str(sent.get("source")))
 
     def _study(self, design: LiveDesign, name: str = "", locked: frozenset[str] = frozenset()) -> Study:
         """Return the study at a design, with further sources locked."""

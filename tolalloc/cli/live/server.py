@@ -79,13 +79,7 @@ class LiveServer:
 
     @cached_property
     def http(self) -> ThreadingHTTPServer:
-        """The server of the standard library, at its port.
-
-        Raises
-        ------
-        InputError
-            The port is taken or none.
-        """
+        """The server of the standard library, at its port."""
         handler = type("Handler", (_Handler,), {"live": self, "free": BoundedSemaphore(MOST_AT_ONCE)})
         try:
             return _BoundedServer(("127.0.0.1", self.port), handler)
