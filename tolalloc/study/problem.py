@@ -51,6 +51,11 @@ class Limit(NamedFields):
     ------
     InputError
         No side, sides in the wrong order, or numbers that are not finite.
+
+    Examples
+    --------
+    >>> Limit(upper=60.0).upper
+    60.0
     """
 
     called: ClassVar[str] = "limit"

@@ -58,6 +58,9 @@ class Ranking(Question):
     by
         What is ranked: ``dimension``, each dimension of the drawing with all its places together, or ``source``, each
         source alone.
+
+    >>> Ranking().by
+    'dimension'
     """
 
     kind: ClassVar[str] = "ranking"
@@ -139,6 +142,11 @@ class Allocation(Question):
     boxes
         Boxes of zones and settings in which a cost is looked for that no drawing undercuts, on the real model; 0 for
         none. The more, the nearer the bound; a reducer looks at some 50 to 200 a second [-].
+
+    Examples
+    --------
+    >>> Allocation(grades=True).grades
+    True
     """
 
     kind: ClassVar[str] = "allocation"

@@ -93,6 +93,12 @@ class Study(Problem):
     ------
     InputError, UnknownNameError
         A field that is not allowed, or that no question of the study reads.
+
+    Examples
+    --------
+    >>> import tolalloc as ta
+    >>> ta.Study(ta.reducer("rv20e"), ta.drawing("rv20e_drawing"), limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60)}).seed
+    1
     """
 
     called: ClassVar[str] = "study"
