@@ -392,15 +392,11 @@ def allocate(
 
     falling, budgets = np.asarray(factor, dtype=float), np.asarray(limits, dtype=float)
     count, rows = len(falling), len(budgets)
-    a, lower, upper = (np.broadcast_to(np.asarray(own, dtype=float), count) for own in (fixed, smallest, largest))
-    worst, square = (
-        np.broadcast_to(np.asarray(own, dtype=float), (rows, count)) for own in (worst_case, root_sum_square)
-    )
+    own, lower, upper = (np.broadcast_to(np.asarray(a, float), count).tolist() for a in (fixed, smallest, largest))
+    worst, square = (np.broadcast_to(np.asarray(a, float), (rows, count)) for a in (worst_case, root_sum_square))
     made = [
-        Process(
-            name=f"{at + 1}", cost=Reciprocal(fixed=float(a[at]), factor=float(falling[at])), minimum=low, maximum=high
-        )
-        for at, (low, high) in enumerate(zip(lower.tolist(), upper.tolist(), strict=True))
+        Process(name=f"{at}", cost=Reciprocal(fixed=a, factor=b), minimum=low, maximum=high)
+        for at, (a, b, low, high) in enumerate(zip(own, falling.tolist(), lower, upper, strict=True), start=1)
     ]
     problem = AllocationProblem(
         features=tuple(PricedFeature(name=own.name, processes=(own,)) for own in made),

@@ -8,7 +8,8 @@ import tolalloc as ta
 from tests.builders import study_of_lengths
 from tests.golden.cases import small_effort
 from tests.verification.test_own_words import ROWS
-from tolalloc.study.duration import Duration, durations
+from tolalloc.reports.tellers.check import CheckedTime
+from tolalloc.study.duration import durations
 from tolalloc.study.prepared import Prepared
 
 
@@ -46,5 +47,5 @@ def test_the_units_of_a_reducer_of_uncertain_stiffness_are_foretold():
 
 
 def test_it_is_said_in_words():
-    told = Duration(kind="ranking", units=(9_000, 54_000), seconds=(12.3, 310.0))
+    told = CheckedTime(effort="full", kind="ranking", units=(9_000, 54_000), seconds=(12.3, 310.0))
     assert told.sentence == "ranking: about 9,000 to 54,000 units, 12 s to 5.2 min here."

@@ -15,7 +15,6 @@ from dataclasses import dataclass, field
 from math import isnan
 from pathlib import Path
 from threading import Event, RLock, Thread
-from types import TracebackType
 from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
@@ -79,14 +78,10 @@ class _Stage:
             return ""
         of = f" of {self.known:,}" if self.known and not over else ""
         rate = self.units / max(self.seconds, 1e-9)
-        said = f"{self.units:,}{of} {self.counted}, {_rounded(rate)} {self.counted}/s"
+        at_rate = f"{rate:,.0f}" if rate >= 10 else f"{rate:.2g}"
+        said = f"{self.units:,}{of} {self.counted}, {at_rate} {self.counted}/s"
         left = (self.known - self.units) / rate
         return f"{said}, {f'{left:.0f} s' if left < 100 else f'{left / 60:.0f} min'} left" if of else said
-
-
-def _rounded(rate: float) -> str:
-    """Return a rate with two digits at least."""
-    return f"{rate:,.0f}" if rate >= 10 else f"{rate:.2g}"
 
 
 class Lines:
@@ -104,9 +99,7 @@ class Lines:
         self._clock.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self._over.set()
         self._end("stopped" if kind else "done", short=kind is KeyboardInterrupt)
 
@@ -176,9 +169,7 @@ class Bars:
         self._bar.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self._end(stopped=kind is not None)
         self._bar.stop()
 

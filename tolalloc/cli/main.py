@@ -41,41 +41,27 @@ def _version(version: Annotated[bool, typer.Option("--version", help="Print the 
         raise typer.Exit
 
 
-_COMMANDS: tuple[Callable[..., None], ...] = (
-    new,
-    check,
-    open_page,
-    run,
-    rank,
-    allocate,
-    whatif,
-    series,
-    *map(inquiry_command, all_inquiries()),
-    schema,
-    doctor,
-)
-"""In the order in which a newcomer meets them."""
-
-EXAMPLES = {own.word: own.example for own in all_inquiries()} | {
-    "new": "tolalloc new mine --like rv40e --cranks 3 --with all",
-    "run": "tolalloc run mine/study.py --quick",
-    "check": "tolalloc check mine/study.py",
-    "open": "tolalloc open mine/study.py",
-    "rank": "tolalloc rank mine/study.py --quick --pdf",
-    "allocate": "tolalloc allocate mine/study.py --grades --limit 50",
-    "whatif": "tolalloc whatif mine/study.py pin.diameter=3 'disc*.pitch=10'",
-    "series": "tolalloc series mine/*.py --quick",
-    "schema": "tolalloc schema reducer",
-    "doctor": "tolalloc doctor",
+_COMMANDS: dict[Callable[..., None], str] = {
+    new: "tolalloc new mine --like rv40e --cranks 3 --with all",
+    check: "tolalloc check mine/study.py",
+    open_page: "tolalloc open mine/study.py",
+    run: "tolalloc run mine/study.py --quick",
+    rank: "tolalloc rank mine/study.py --quick --pdf",
+    allocate: "tolalloc allocate mine/study.py --grades --limit 50",
+    whatif: "tolalloc whatif mine/study.py pin.diameter=3 'disc*.pitch=10'",
+    series: "tolalloc series mine/*.py --quick",
+    **{inquiry_command(own): own.example for own in all_inquiries()},
+    schema: "tolalloc schema reducer",
+    doctor: "tolalloc doctor",
 }
-"""An example for the help of every command, in a folder that ``tolalloc new mine --with all`` made."""
+"""Every command, as a newcomer meets them, with an example in a folder that ``tolalloc new mine --with all`` made."""
 
 _FIRST_DAY = "1980-01-01"
 """First day that a file inside a workbook, a ZIP archive, can state."""
 
-for command in _COMMANDS:
-    word = command.__name__.removesuffix("_page")
-    app.command(word, epilog=f"Example: `{EXAMPLES[word]}`")(saying_options(command, word))
+EXAMPLES = {command.__name__.removesuffix("_page"): example for command, example in _COMMANDS.items()}
+for (word, example), command in zip(EXAMPLES.items(), _COMMANDS, strict=True):
+    app.command(word, epilog=f"Example: `{example}`")(saying_options(command, word))
 
 
 def main() -> None:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable
-from dataclasses import MISSING, fields
+from collections.abc import Callable, Iterable
 from functools import wraps
-from pathlib import Path
 from typing import Annotated, Any, get_args, get_type_hints
 
 import typer
@@ -22,7 +20,7 @@ from tolalloc.study.inquiry import Inquiry, Word
 def inquiry_command(inquiry: type[Inquiry[Any]]) -> Callable[..., None]:
     """Return the command of an inquiry."""
 
-    def command(out: Path | None, as_json: bool, **given: Any) -> None:
+    def command(out: ReportFolder = None, as_json: AsJson = False, **given: Any) -> None:
         from tolalloc.reports.folder import require_usable
 
         asked = inquiry(**given).with_reducer(out, argument="--reducer")
@@ -41,28 +39,31 @@ def inquiry_command(inquiry: type[Inquiry[Any]]) -> Callable[..., None]:
 
     command.__name__ = inquiry.word
     command.__doc__ = inspect.cleandoc(inquiry.__doc__ or "").split("\n\n")[0]
-    own = [_parameter(inquiry, at) for at in range(len(fields(inquiry)))]
-    last = [_keyword("out", ReportFolder, None), _keyword("as_json", AsJson, False)]
-    command.__signature__ = inspect.Signature([*own, *last])  # type: ignore[attr-defined]
-    command.__annotations__ = {one.name: one.annotation for one in (*own, *last)}
+    own = [_parameter(inquiry, at, field) for at, field in enumerate(parameters_of(inquiry))]
+    return taking(command, (*own, *parameters_of(command)))
+
+
+def parameters_of(stated: Callable[..., Any]) -> list[inspect.Parameter]:
+    """Return the fields of a record, or what a function names, each to be given by its name."""
+    found = inspect.signature(stated, eval_str=True).parameters.values()
+    return [own.replace(kind=own.KEYWORD_ONLY) for own in found if own.kind is not own.VAR_KEYWORD]
+
+
+def taking(command: Callable[..., None], parameters: Iterable[inspect.Parameter]) -> Callable[..., None]:
+    """Return a command that says it takes just these, in this order."""
+    command.__signature__ = inspect.Signature([*parameters])  # type: ignore[attr-defined]
+    command.__annotations__ = {own.name: own.annotation for own in parameters}
     return command
 
 
-def _parameter(inquiry: type[Inquiry[Any]], at: int) -> inspect.Parameter:
+def _parameter(inquiry: type[Inquiry[Any]], at: int, own: inspect.Parameter) -> inspect.Parameter:
     """Return the argument or option of a field."""
-    own = fields(inquiry)[at]
-    kind, word = get_args(get_type_hints(inquiry, include_extras=True)[own.name])[:2]
+    kind, word = get_args(own.annotation)[:2]
     if not isinstance(word, Word):
         raise TypeError(f"{inquiry.__name__}.{own.name}: its annotation has no Word")
     names = (word.option,) if word.option else ()
     said = typer.Argument(help=word.help) if at < inquiry.by_position else typer.Option(*names, help=word.help)
-    return _keyword(own.name, Annotated[kind, said], ... if own.default is MISSING else own.default)
-
-
-def _keyword(name: str, annotation: Any, default: Any) -> inspect.Parameter:
-    empty = inspect.Parameter.empty
-    given = empty if default is ... else default
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=given, annotation=annotation)
+    return own.replace(annotation=Annotated[kind, said])
 
 
 def saying_options(command: Callable[..., None], word: str) -> Callable[..., None]:
@@ -95,13 +96,7 @@ class SayingNumbers(TyperGroup):
     """All commands; an option or argument that is no number is refused in a sentence of ours."""
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the command that was asked for.
-
-        Raises
-        ------
-        InputError
-            The option, its value, and that a number is allowed.
-        """
+        """Run the command that was asked for."""
         try:
             return super().invoke(ctx)
         except typer.BadParameter as error:

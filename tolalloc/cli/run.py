@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, replace
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tolalloc.cli.console import AsJson, announce_kernel, note, print_json, print_table, say, shown_progress, tell
+from tolalloc.cli.options import parameters_of, taking
 from tolalloc.exceptions import InputError, StoppedError
 from tolalloc.study.script import load_study
 
@@ -20,73 +23,79 @@ if TYPE_CHECKING:
 
 Script = Annotated[Path, typer.Argument(help="Python script that defines study = Study(...).")]
 Quick = Annotated[bool, typer.Option("--quick", help="Small samples, wide intervals; every stage is real.")]
-Seconds = Annotated[
-    float | None,
-    typer.Option(help="About how long ranking and allocation may take together, by a stated rate [s]."),
-]
-Seed = Annotated[int | None, typer.Option(help="Seed of every random number, instead of the study's.")]
-Out = Annotated[
-    Path | None, typer.Option(help="Run folder, new or empty; the next one of runs/NAME, runs/NAME-2, … unless given.")
-]
 Fresh = Annotated[bool, typer.Option("--fresh", help="Solve again what runs beside this one have solved and kept.")]
-
 Scheduler = Annotated[
     str,
     typer.Option(help="Workers that solve the units: 'local' for one per core, or the address of a Dask scheduler."),
 ]
 Verbose = Annotated[bool, typer.Option("--verbose", help="Say everything that the report says in sentences.")]
 Pdf = Annotated[bool, typer.Option("--pdf", help="Print the report as report.pdf too, by an installed browser.")]
-Paper = Annotated[str, typer.Option(help="Paper of --pdf: A4 or Letter.")]
 
 _ROWS = 16  # of an answer's first table that are printed
 _WARNINGS = 2
 """Warnings of all answers together that are said where the report holds them all [-]."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Way:
+    """How a study is run: the options that ``run``, ``rank`` and ``allocate`` share, in the order of their help."""
+
+    quick: Quick = False
+    seconds: Annotated[
+        float | None,
+        typer.Option(help="About how long ranking and allocation may take together, by a stated rate [s]."),
+    ] = None
+    seed: Annotated[int | None, typer.Option(help="Seed of every random number, instead of the study's.")] = None
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Run folder, new or empty; the next one of runs/NAME, runs/NAME-2, … unless given."),
+    ] = None
+    fresh: Fresh = False
+    scheduler: Scheduler = ""
+    pdf: Pdf = False
+    paper: Annotated[str, typer.Option(help="Paper of --pdf: A4 or Letter.")] = "A4"
+    verbose: Verbose = False
+    as_json: AsJson = False
+
+    def study(self, script: Path) -> Study:
+        """Return the study of a script with what the command line changes."""
+        study = load_study(script)
+        if self.seed is not None:
+            study = replace(study, seed=self.seed)
+        if self.quick:
+            study = study.with_effort("quick")
+        return study if self.seconds is None else study.with_effort(replace(study.effort, seconds=self.seconds))
+
+
+def _going(command: Callable[..., None]) -> Callable[..., None]:
+    """Return a command that has the options of `_Way` behind its own."""
+    *own, _ = parameters_of(command)
+
+    @wraps(command)
+    def asked(**given: Any) -> None:
+        command(**{one.name: given.pop(one.name) for one in own if one.name in given}, way=_Way(**given))
+
+    return taking(asked, (*own, *parameters_of(_Way)))
+
+
+@_going
 def run(
     script: Script,
     only: Annotated[str, typer.Option(help="Some of the questions, as ranking,allocation; all unless given.")] = "",
-    quick: Quick = False,
-    seconds: Seconds = None,
-    seed: Seed = None,
-    out: Out = None,
-    fresh: Fresh = False,
-    scheduler: Scheduler = "",
-    pdf: Pdf = False,
-    paper: Paper = "A4",
-    verbose: Verbose = False,
-    as_json: AsJson = False,
+    *,
+    way: _Way,
 ) -> None:
     """Run a study: every question once, one folder, one report."""
-    study = _asked(script, quick, seconds, seed)
-    kinds = tuple(kind.strip() for kind in only.split(",") if kind.strip())
-    _run(
-        study,
-        kinds,
-        _Place.of(out, study.name),
-        _Way(fresh, scheduler, paper if pdf else "", verbose, as_json),
-    )
+    _run(way.study(script), tuple(kind.strip() for kind in only.split(",") if kind.strip()), "", way)
 
 
-def rank(
-    script: Script,
-    quick: Quick = False,
-    seconds: Seconds = None,
-    seed: Seed = None,
-    out: Out = None,
-    fresh: Fresh = False,
-    scheduler: Scheduler = "",
-    pdf: Pdf = False,
-    paper: Paper = "A4",
-    verbose: Verbose = False,
-    as_json: AsJson = False,
-) -> None:
+@_going
+def rank(script: Script, *, way: _Way) -> None:
     """Tell which error drives which output, which order and the rejects: short for run --only ranking."""
-    study = _asked(script, quick, seconds, seed)
-    place = _Place.of(out, f"{study.name}-rank")
-    _run(study, ("ranking",), place, _Way(fresh, scheduler, paper if pdf else "", verbose, as_json))
+    _run(way.study(script), ("ranking",), "-rank", way)
 
 
+@_going
 def allocate(
     script: Script,
     limit: Annotated[
@@ -98,47 +107,22 @@ def allocate(
     grades: Annotated[
         bool, typer.Option("--grades", help="Zones of ISO 286 grades and preferred numbers alone.")
     ] = False,
-    quick: Quick = False,
-    seconds: Seconds = None,
-    seed: Seed = None,
-    out: Out = None,
-    fresh: Fresh = False,
-    scheduler: Scheduler = "",
-    pdf: Pdf = False,
-    paper: Paper = "A4",
-    verbose: Verbose = False,
-    as_json: AsJson = False,
+    *,
+    way: _Way,
 ) -> None:
     """Find the cheapest drawing that keeps every limit, verified: short for run --only allocation."""
     from tolalloc.study.questions import Allocation, questions_of
 
-    study = _with_first_limit(_asked(script, quick, seconds, seed), limit, yield_target)
+    study = _with_first_limit(way.study(script), limit, yield_target)
     if grades:
-        own = questions_of(("allocation",), tuple(study.questions), "tolalloc allocate")[0]
+        own = questions_of(("allocation",), study.questions, "tolalloc allocate")[0]
         graded = replace(own, grades=True) if isinstance(own, Allocation) else own
         study = replace(study, questions=(*(q for q in study.questions if q.kind != "allocation"), graded))
-    place = _Place.of(out, f"{study.name}-allocate")
-    _run(study, ("allocation",), place, _Way(fresh, scheduler, paper if pdf else "", verbose, as_json))
-
-
-def _asked(script: Path, quick: bool, seconds: float | None, seed: int | None) -> Study:
-    """Return the study of a script with what the command line changes."""
-    study = load_study(script)
-    if seed is not None:
-        study = replace(study, seed=seed)
-    if quick:
-        study = study.with_effort("quick")
-    return study if seconds is None else study.with_effort(replace(study.effort, seconds=seconds))
+    _run(study, ("allocation",), "-allocate", way)
 
 
 def _with_first_limit(study: Study, limit: float | None, yield_target: float | None) -> Study:
-    """Return the study with another first limit or yield.
-
-    Raises
-    ------
-    InputError
-        The study has no limits, or the first one has two sides.
-    """
+    """Return the study with another first limit or yield."""
     if limit is None and yield_target is None:
         return study
     if not study.limits:
@@ -156,61 +140,46 @@ def _with_first_limit(study: Study, limit: float | None, yield_target: float | N
     return replace(study, limits={**study.limits, leading: changed})
 
 
-@dataclass(frozen=True)
-class _Way:
-    """How a run goes and what it gives beside its folder."""
+def _places(named: Path | None, name: str) -> tuple[Path, Path | None]:
+    """Return the folder of a run and the last finished one before it: where none is named, the next numbered in runs.
 
-    fresh: bool
-    scheduler: str  # Whose workers solve the units; empty for this process
-    paper: str  # On which the report is printed; empty if it is not
-    verbose: bool  # Whether every sentence is said
-    as_json: bool
+    So a study runs again after an edit.
+    """
+    from tolalloc.reports.finished_run import finished
+    from tolalloc.reports.folder import RUNS, numbered
 
-
-@dataclass(frozen=True)
-class _Place:
-    """Where a run is written, and the run before it."""
-
-    folder: Path
-    before: Path | None  # The last finished run of the same name; none where a folder was named
-
-    @classmethod
-    def of(cls, named: Path | None, name: str) -> _Place:
-        """Return the named folder; else the next numbered one in runs, so that the study runs again after an edit."""
-        from tolalloc.reports.finished_run import finished
-        from tolalloc.reports.folder import RUNS, numbered
-
-        if named:
-            return cls(named, None)
-        *earlier, folder = numbered(RUNS / name)
-        last = finished(earlier)[-1:]
-        return cls(folder, last[0].folder if last else None)
-
-    def tell_changes(self) -> None:
-        """Say what changed since the run before; nothing where one of the two is no ranking and no allocation."""
-        from tolalloc.reports.tellers.comparison import ComparisonTeller
-        from tolalloc.running.progress import SILENT
-        from tolalloc.study.inquiries.compare import Compare
-
-        if self.before:
-            with suppress(InputError):
-                asked = Compare(first=self.before, second=self.folder)
-                found = asked.solve(asked.prepare(), SILENT)
-                for sentence in ComparisonTeller(found.result, found.header).since:
-                    say(sentence)
+    if named:
+        return named, None
+    *earlier, folder = numbered(RUNS / name)
+    last = finished(earlier)[-1:]
+    return folder, last[0].folder if last else None
 
 
-def _run(study: Study, kinds: tuple[str, ...], place: _Place, way: _Way) -> None:
-    """Run some questions of a study, write its folder and say the answers."""
+def _tell_changes(before: Path, folder: Path) -> None:
+    """Say what changed since the run before; nothing where one of the two is no ranking and no allocation."""
+    from tolalloc.reports.tellers.comparison import ComparisonTeller
+    from tolalloc.running.progress import SILENT
+    from tolalloc.study.inquiries.compare import Compare
+
+    with suppress(InputError):
+        asked = Compare(first=before, second=folder)
+        found = asked.solve(asked.prepare(), SILENT)
+        for sentence in ComparisonTeller(found.result, found.header).since:
+            say(sentence)
+
+
+def _run(study: Study, kinds: tuple[str, ...], ending: str, way: _Way) -> None:
+    """Run some questions of a study, write its folder, named after it unless given, and say the answers."""
     from tolalloc.reports.pdf import require_printable, write_pdf
     from tolalloc.study.questions import questions_of
     from tolalloc.study.study import cache_beside
     from tolalloc.study.study import run as run_study
 
-    folder = place.folder
-    questions = questions_of(kinds, tuple(study.questions), f"study {study.name}")
-    if way.paper:
-        require_printable(way.paper)
+    folder, before = _places(way.out, f"{study.name}{ending}")
+    paper = way.paper if way.pdf else ""
+    questions = questions_of(kinds, study.questions, f"study {study.name}")
+    if paper:
+        require_printable(paper)
     announce_kernel(study.model)
     try:
         with solvers(way.scheduler) as solved_by, shown_progress() as progress:
@@ -221,10 +190,10 @@ def _run(study: Study, kinds: tuple[str, ...], place: _Place, way: _Way) -> None
         raise StoppedError(
             f"Stopped: no report was written. {what if kept.is_dir() else 'Nothing was kept.'}"
         ) from None
-    if way.paper:
+    if paper:
         with shown_progress() as progress:
             progress.begin("printing")
-            write_pdf(folder / "report.html", folder / "report.pdf", way.paper)
+            write_pdf(folder / "report.html", folder / "report.pdf", paper)
         note(f"Printed: {folder / 'report.pdf'}")
     if way.as_json:
         print_json({"folder": str(folder), **found.document.summary})
@@ -243,7 +212,8 @@ def _run(study: Study, kinds: tuple[str, ...], place: _Place, way: _Way) -> None
             say(warning, warns=True)
         if (more := len(warnings) - _WARNINGS) > 0:
             say(f"{more} more {'note' if more == 1 else 'notes'} in the report, or with --verbose.", warns=True)
-        place.tell_changes()
+        if before:
+            _tell_changes(before, folder)
     note(f"Report: {folder / 'report.html'}")
 
 
@@ -269,7 +239,7 @@ def _show(answer: Answer[Any]) -> None:
     tables = []
     if answer.tables:
         frame = answer.to_frame()
-        columns = [column for column in answer.shown if column in frame.columns] or list(frame.columns[:6])
+        columns = [column for column in answer.teller.shown if column in frame.columns] or list(frame.columns[:6])
         part = f", first {_ROWS} of {len(frame)} rows" if len(frame) > _ROWS else ""
         tables = [(frame[columns].head(_ROWS), f"{answer.header.name}: {answer.kind}{part}")]
     tell(answer, False, *tables)

@@ -119,11 +119,6 @@ def schema(kind: str) -> dict[str, Any]:
     ------
     UnknownNameError
         There is no such kind.
-
-    Examples
-    --------
-    >>> schema("reducer")["properties"]["crank_count"]["maximum"]
-    6
     """
     if kind not in KINDS:
         raise UnknownNameError.among("schema", "kind", kind, KINDS)
@@ -215,13 +210,7 @@ class Likeness:
 
 
 def preset_of(family: str, like: str) -> str:
-    """Return the preset of a new reducer: the one that is named, or the first of the family.
-
-    Raises
-    ------
-    UnknownNameError
-        No such family, or one that does not have the preset.
-    """
+    """Return the preset of a new reducer: the one that is named, or the first of the family."""
     names = {name.lower().replace(" ", "-"): own.new.presets for name, own in FAMILIES.items()}
     if family and family not in names:
         raise UnknownNameError.among("new reducer", "family", family, names)
@@ -376,13 +365,7 @@ class NewFolder:
         return tuple(self.like.samples[kind] for kind in self.samples)
 
     def write(self) -> tuple[Reducer, tuple[Source, ...]]:
-        """Write the folder, whole or not at all, and return its reducer and its sources.
-
-        Raises
-        ------
-        InputError
-            Something is there already, or the folder cannot be made.
-        """
+        """Write the folder, whole or not at all, and return its reducer and its sources."""
         if self.place.exists():
             raise InputError(f"{self.place}: is there already; choose another name, nothing is overwritten.")
         above = self.place.absolute().parent

@@ -30,16 +30,9 @@ def map_chunks(
 ) -> Iterator[tuple[slice, Answer]]:
     """Yield the rows of each chunk and its answer, in the order of the samples.
 
-    Parameters
-    ----------
-    solve
-        Function of one chunk; picklable where the mapper sends it to other processes.
-    x
-        All samples.
-    mapper
-        ``map`` solves in this process, its threads sharing each chunk. The ``map`` of a
-        `concurrent.futures.ProcessPoolExecutor` started with `one_thread`, or of another executor that keeps the order,
-        gives the same bits: a sample's answer does not depend on its chunk.
+    ``map`` solves in this process, its threads sharing each chunk. The ``map`` of a
+    `concurrent.futures.ProcessPoolExecutor` started with `one_thread`, or of another executor that keeps the order,
+    gives the same bits: a sample's answer does not depend on its chunk. What solves a chunk must be picklable then.
     """
     rows = [slice(start, start + SAMPLES_AT_ONCE) for start in range(0, x.shape[0], SAMPLES_AT_ONCE)]
     yield from zip(rows, mapper(solve, (x[part] for part in rows)), strict=True)

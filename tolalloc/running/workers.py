@@ -28,8 +28,6 @@ AHEAD = 3
 class Workers:
     """A mapper, as `tolalloc.running.chunks.map_chunks` takes it, whose chunks the workers of a scheduler solve.
 
-    Notes
-    -----
     A worker that is lost has its chunks solved by another one; a chunk that is solved twice has the same bits, because
     it follows from what it is sent alone. Answers are taken in the order of the chunks, in whatever order they arrive.
     """

@@ -37,10 +37,6 @@ class Answer(Generic[Result]):
         The numbers, frozen, with units.
     told_by
         What tells of it; the teller of its kind unless given.
-
-    Notes
-    -----
-    What is shown is made once, when it is first asked for. A notebook shows the first sentence, table and figure.
     """
 
     kind: str
@@ -105,15 +101,6 @@ class Answer(Generic[Result]):
         """All figures by name."""
         return self.document.figures
 
-    @property
-    def shown(self) -> tuple[str, ...]:
-        """Columns of the first table that a terminal shows."""
-        return self.teller.shown
-
-    def add_files(self, folder: Path) -> None:
-        """Add files of its own to a written report."""
-        self.teller.add_files(folder)
-
     def to_frame(self, name: str = "") -> pd.DataFrame:
         """Return a table by name, the first one unless named.
 
@@ -149,7 +136,7 @@ class Answer(Generic[Result]):
 
         path = Path(folder)
         with claimed(path) as beside:
-            self.add_files(beside)
+            self.teller.add_files(beside)
             write_document(self.document, beside)
         return path
 

@@ -5,7 +5,7 @@ A study is given as such or as the path of its script.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -93,12 +93,8 @@ def _times(prepared: Prepared) -> tuple[CheckedTime, ...]:
     from tolalloc.study.duration import durations
 
     study = prepared.study
-    efforts = {"quick": study.with_effort("quick"), **({} if study.quick else {"full": study})}
-    return tuple(
-        CheckedTime(effort=effort, kind=own.kind, units=own.units, seconds=own.seconds, sentence=own.sentence)
-        for effort, asked in efforts.items()
-        for own in durations(replace(prepared, study=asked))
-    )
+    efforts = [study.with_effort("quick"), *([] if study.quick else [study])]
+    return tuple(own for asked in efforts for own in durations(replace(prepared, study=asked)))
 
 
 def whatif(
@@ -166,54 +162,41 @@ def series(
         Two studies of one name, or a script that cannot be read.
     """
     read = [_with_modules(study) for study in studies]
-    asked = [(study.with_effort(effort), in_force) for study, in_force in read]
-    members = []
-    for member in run_series(asked, Path(folder), progress or SILENT, fresh=fresh, solved_by=solved_by):
-        members.append(member)
-        if told:
-            told(member)
-    header = Header(name="series", model="", currency=common_currency(own.found for own in members if own.found))
-    return Answer(kind="series", header=header, result=tuple(members))
-
-
-def run_series(
-    studies: Iterable[tuple[Study, InForce]],
-    folder: Path,
-    progress: Progress,
-    *,
-    fresh: bool = False,
-    solved_by: Mapper = map,
-) -> Iterator[Member]:
-    """Yield what becomes of every study, each in a folder of its own name; one that is finished there is read.
-
-    A study is run while its own modules are in force. Where its folder holds an answer to an earlier state of the
-    study, or it is to begin afresh, the new answer has the next numbered folder. A study that cannot be run does not
-    stop the others. All share the solved units beside their folders.
-
-    Raises
-    ------
-    InputError
-        Two studies of one name.
-    """
-    known = tuple(studies)
+    known = [(study.with_effort(effort), in_force) for study, in_force in read]
     names = [study.name for study, _ in known]
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"series: {names.count(name)} studies are named {name!r}; each needs a name of its own.")
+    members = []
     for study, in_force in known:
-        *earlier, own = numbered(folder / study.name)
-        try:
-            with in_force():
-                current = () if fresh else (found for own in reversed(earlier) if (found := _finished(study, own)))
-                finished = next(iter(current), None)
-                if finished is None:
-                    if earlier and not fresh and (unknown := Prepared(study=study).unknown):
-                        progress.tell(f"{study.name} is run again: {unknown}.")
-                    run(study, own, progress=progress, fresh=fresh, solved_by=solved_by)
-            found = finished or read_run(own)
-            yield Member(name=study.name, folder=found.folder, found=found)
-        except TolallocError as error:
-            yield Member(name=study.name, folder=own, fault=str(error))
+        members.append(_member(study, in_force, Path(folder), progress or SILENT, fresh, solved_by))
+        if told:
+            told(members[-1])
+    header = Header(name="series", model="", currency=common_currency(own.found for own in members if own.found))
+    return Answer(kind="series", header=header, result=tuple(members))
+
+
+def _member(
+    study: Study, in_force: InForce, folder: Path, progress: Progress, fresh: bool, solved_by: Mapper
+) -> Member:
+    """Return what becomes of a study, run while its own modules are in force; one that is finished is read.
+
+    Where its folder holds an answer to an earlier state of the study, or it is to begin afresh, the new answer has the
+    next numbered folder. A study that cannot be run does not stop the others.
+    """
+    *earlier, own = numbered(folder / study.name)
+    try:
+        with in_force():
+            current = () if fresh else (found for last in reversed(earlier) if (found := _finished(study, last)))
+            finished = next(iter(current), None)
+            if finished is None:
+                if earlier and not fresh and (unknown := Prepared(study=study).unknown):
+                    progress.tell(f"{study.name} is run again: {unknown}.")
+                run(study, own, progress=progress, fresh=fresh, solved_by=solved_by)
+        found = finished or read_run(own)
+        return Member(name=study.name, folder=found.folder, found=found)
+    except TolallocError as error:
+        return Member(name=study.name, folder=own, fault=str(error))
 
 
 def _finished(study: Study, folder: Path) -> FinishedRun | None:

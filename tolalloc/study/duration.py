@@ -14,6 +14,7 @@ from tolalloc.allocation.search.settings_scan import units_of_scan
 from tolalloc.allocation.space.tail import tail_units
 from tolalloc.capability.experiment import Experiment
 from tolalloc.drawings.seeds import SeedTree
+from tolalloc.reports.tellers.check import CheckedTime
 from tolalloc.sensitivity.effort import BY_SOURCE
 from tolalloc.sensitivity.inverse import fewest_units
 from tolalloc.sensitivity.surrogate.control_variate import units_to_learn
@@ -31,25 +32,10 @@ _CONFIRMATIONS = (0.3, 16.0)
 four designs of each of four lines [-]."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Duration:
-    """What a question will take."""
-
-    kind: str  # Its name
-    units: tuple[int, int]  # About how many units it solves, at least and at most [-]
-    seconds: tuple[float, float]  # About how long that takes here, once everything is compiled [s]
-
-    @property
-    def sentence(self) -> str:
-        """The same in words."""
-        least, most = (_in_words(seconds) for seconds in self.seconds)
-        return f"{self.kind}: about {self.units[0]:,} to {self.units[1]:,} units, {least} to {most} here."
-
-
-def durations(prepared: Prepared) -> tuple[Duration, ...]:
+def durations(prepared: Prepared) -> tuple[CheckedTime, ...]:
     """Return what the ranking and the allocation of a study will take, those of them that it asks."""
-    found = []
-    for question in prepared.study.asked:
+    found, effort = [], "quick" if prepared.study.quick else "full"
+    for question in prepared.study.questions:
         if isinstance(question, Ranking):
             parts = _of_ranking(question, prepared)
         elif isinstance(question, Allocation):
@@ -58,7 +44,7 @@ def durations(prepared: Prepared) -> tuple[Duration, ...]:
             continue
         least, most = (sum(part.units[at] for part in parts) for at in (0, 1))
         lower, upper = (sum((part.units[at] * part.seconds for part in parts), 0.0) for at in (0, 1))
-        found.append(Duration(kind=question.kind, units=(least, most), seconds=(lower, upper)))
+        found.append(CheckedTime(effort=effort, kind=question.kind, units=(least, most), seconds=(lower, upper)))
     return tuple(found)
 
 
@@ -136,14 +122,3 @@ def _seconds(prepared: Prepared, outputs: tuple[str, ...], *, uncertain: bool = 
     start = time.perf_counter()
     response(x)
     return (time.perf_counter() - start) / _TIMED
-
-
-def _in_words(seconds: float) -> str:
-    """Return a time as a person says it.
-
-    >>> _in_words(0.4), _in_words(42.0), _in_words(300.0), _in_words(9000.0)
-    ('1 s', '42 s', '5.0 min', '2.5 h')
-    """
-    if seconds < 90:
-        return f"{max(seconds, 1):.0f} s"
-    return f"{seconds / 60:.1f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

@@ -6,7 +6,7 @@ import inspect
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import MISSING, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from numbers import Integral
 from pathlib import Path
@@ -56,29 +56,6 @@ Neglected = Annotated[
 ProcessesName = Annotated[str, Word("Process capability library that rows of the table may name: shipped name or CSV.")]
 
 
-def named_reducer(reducer: str | None, *written: Path | None, argument: str = "reducer") -> str:
-    """Return the reducer that was asked for, the default one unless given.
-
-    No file, of those that are to be written, is about a reducer that nobody named.
-
-    Raises
-    ------
-    InputError
-        A file is to be written and no reducer was given; the message says the argument, or the option of a command.
-    """
-    if reducer is not None:
-        return reducer
-    if any(written):
-        from tolalloc.reducers.reducer.files import PRESETS
-
-        presets = ", ".join(sorted(file.name.split(".")[0] for file in PRESETS.glob("*.reducer.toml")))
-        raise InputError(
-            f"{argument} is missing: where a file is written the reducer must be named; allowed is a preset "
-            f"({presets}) or a TOML file."
-        )
-    return DEFAULT_REDUCER
-
-
 @dataclass(frozen=True, kw_only=True)
 class Inquiry(NamedFields, ABC, Generic[Prepared]):
     """A question that is asked without a study.
@@ -104,39 +81,21 @@ class Inquiry(NamedFields, ABC, Generic[Prepared]):
         cls.called = f"tolalloc {getattr(cls, 'word', cls.__name__)}"
 
     def __post_init__(self) -> None:
-        """Take every field as what its annotation says: a path also as text, a number also as a whole one.
-
-        Raises
-        ------
-        InputError
-            A field of another kind, or a value that its rule does not allow.
-        """
+        """Take every field as what its annotation says: a path also as text, a number also as a whole one."""
         for name, kind in _kinds(type(self)).items():
             object.__setattr__(self, name, _taken(self.called, name, kind, getattr(self, name)))
         super().__post_init__()
 
     @abstractmethod
     def prepare(self) -> Prepared:
-        """Return what is solved, all files read and all values checked; nothing long runs.
-
-        Raises
-        ------
-        TolallocError
-            One sentence on what is wrong.
-        """
+        """Return what is solved, all files read and all values checked; nothing long runs."""
 
     def room(self, prepared: Prepared) -> str:  # noqa: ARG002
         """Return the compiled room that it solves with, empty for none."""
         return self.kernel
 
     def apart_from(self, report: Path | None) -> None:
-        """Refuse files that must not stand in the folder of a report; nothing unless an inquiry says otherwise.
-
-        Raises
-        ------
-        InputError
-            A file that would stand in the folder.
-        """
+        """Refuse files that must not stand in the folder of a report; nothing unless an inquiry says otherwise."""
 
     @abstractmethod
     def solve(self, prepared: Prepared, progress: Progress) -> Answer[Any]:
@@ -147,19 +106,22 @@ class Inquiry(NamedFields, ABC, Generic[Prepared]):
         return ()
 
     def with_reducer(self, *written: Path | None, argument: str = "reducer") -> Self:
-        """Return it with the default reducer if it asks for one and none is given; see `named_reducer`.
+        """Return it with the default reducer if it asks for one and none is given.
 
-        Parameters
-        ----------
-        written
-            Files that are written besides its own, such as the report.
-        argument
-            What a message calls the reducer.
+        No file, of its own or of others that are written such as the report, is about a reducer that nobody named; a
+        message says the argument, or the option of a command.
         """
-        if not any(own.name == "reducer" for own in fields(self)):
+        if getattr(self, "reducer", DEFAULT_REDUCER) is not None:
             return self
-        files = (*written, *(getattr(self, name) for name in self.written))
-        named: dict[str, Any] = {"reducer": named_reducer(vars(self)["reducer"], *files, argument=argument)}
+        if any(written) or any(getattr(self, name) for name in self.written):
+            from tolalloc.reducers.reducer.files import PRESETS
+
+            presets = ", ".join(sorted(file.name.split(".")[0] for file in PRESETS.glob("*.reducer.toml")))
+            raise InputError(
+                f"{argument} is missing: where a file is written the reducer must be named; allowed is a preset "
+                f"({presets}) or a TOML file."
+            )
+        named: dict[str, Any] = {"reducer": DEFAULT_REDUCER}
         return replace(self, **named)
 
     def ask(self, progress: Progress | None = None) -> Answer[Any]:
@@ -210,15 +172,9 @@ def door(inquiry: type[Inquiry[Any]]) -> Callable[..., Answer[Any]]:
             raise (error.as_option(f"ta.{inquiry.word}", field) if field else error) from None
 
     hints = get_type_hints(inquiry)
-    empty = inspect.Parameter.empty
     parameters = [
-        inspect.Parameter(
-            own.name,
-            inspect.Parameter.POSITIONAL_OR_KEYWORD if at < inquiry.by_position else inspect.Parameter.KEYWORD_ONLY,
-            default=empty if own.default is MISSING else own.default,
-            annotation=hints[own.name],
-        )
-        for at, own in enumerate(fields(inquiry))
+        own.replace(kind=own.POSITIONAL_OR_KEYWORD if at < inquiry.by_position else own.kind, annotation=hints[name])
+        for at, (name, own) in enumerate(inspect.signature(inquiry).parameters.items())
     ]
     ask.__name__ = ask.__qualname__ = inquiry.word
     ask.__doc__ = inquiry.__doc__

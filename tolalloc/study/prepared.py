@@ -29,7 +29,6 @@ from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.tellers.check import missed_sentence
 from tolalloc.running.chunks import Mapper
-from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.effort import RankingEffort
 from tolalloc.study.problem import COMMON, Limit, Problem
 
@@ -52,7 +51,7 @@ class Prepared:
     @property
     def place(self) -> str:
         """Where the study stands, for messages."""
-        return f"study {self.study.name}"
+        return self.study.place
 
     @cached_property
     def _stated(self) -> ErrorModel:
@@ -78,13 +77,7 @@ class Prepared:
 
     @cached_property
     def assemblies(self) -> tuple[tuple[Compensator, ...], ...]:
-        """What may act at assembly, every combination of classes and sizes; the first one is that of today.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            A source that is not there or cannot be sorted or shimmed, or too many combinations.
-        """
+        """What may act at assembly, every combination of classes and sizes; the first one is that of today."""
         choices = all_choices(self.study.compensators, self.place)
         return tuple(in_force(own, self._stated.sources, self.place) for own in choices)
 
@@ -120,13 +113,7 @@ class Prepared:
 
     @cached_property
     def requirements(self) -> tuple[Requirement, ...]:
-        """What the study limits, the leading output first.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            No limit, or limits of no output.
-        """
+        """What the study limits, the leading output first."""
         if not self.study.limits:
             raise InputError(f"{self.place}: limits is empty; limit one output at least, the leading one first.")
         for name in self.study.limits:
@@ -134,9 +121,8 @@ class Prepared:
                 raise UnknownNameError.among(self.place, "limit of", name, self.model.outputs)
         asked = {name: limit for name, limit in self.study.limits.items() if limit is not None}
         for name in self.study.limits.keys() - asked.keys() - self.model.own_limits.keys():
-            raise InputError.at(
-                self.place, f"limits[{name!r}]", None, "ta.Limit(...): the model has no limit of its own to lift there"
-            )
+            allowed = "ta.Limit(...): the model has no limit of its own to lift there"
+            raise InputError.at(self.place, f"limits[{name!r}]", None, allowed)
         if not asked:
             raise InputError(f"{self.place}: every limit is None; limit one output at least, the leading one first.")
         own_joint = self.study.joint if isinstance(self.study.joint, AtYield) else None
@@ -210,18 +196,12 @@ class Prepared:
     @property
     def _sharing(self) -> int:
         """Questions that share a time: the rankings and allocations of the study [-]."""
-        kinds = [getattr(question, "kind", "") for question in self.study.asked]
+        kinds = [getattr(question, "kind", "") for question in self.study.questions]
         return max(sum(kind in ("ranking", "allocation") for kind in kinds), 1)
 
     @cached_property
     def currency(self) -> str:
-        """What costs are in, by the headers of tolerance table and process costs; empty where they are cost units.
-
-        Raises
-        ------
-        InputError
-            The two state different ones.
-        """
+        """What costs are in, by the headers of tolerance table and process costs; empty where they are cost units."""
         drawing = self.study.drawing
         own, made = (drawing.currency, currency_of_costs(drawing.costs)) if drawing else ("", "")
         if own and made and own != made:
@@ -235,7 +215,7 @@ class Prepared:
             return ""
         study = self.study
         content = (
-            (study.name, study.seed, study.largest_failed_share, study.effort, study.asked),
+            (study.name, study.seed, study.largest_failed_share, study.effort, study.questions),
             (dict(study.limits), study.joint),
             self.model.content,
             self.errors.sources,
@@ -304,9 +284,3 @@ class Prepared:
                 *self.study.effort.notes(self.model),
             ),
         )
-
-    def header_after(self, record: RunRecord) -> Header:
-        """Return the header with what a run has counted: how its units ended, and what each stage took."""
-        header = self.header
-        assumptions = tuple(dict.fromkeys(header.assumptions))
-        return replace(header, assumptions=assumptions, statuses=record.counts, stages=record.stages)

@@ -84,12 +84,6 @@ class Limit(NamedFields):
         return Limits(upper=self.upper, lower=self.lower)
 
 
-def _places(until: str) -> int:
-    """Return how many places a text speaks of."""
-    said = until.split()[-1]
-    return int(said) if said.isdigit() else _NUMBERS.index(said) + 1
-
-
 @dataclass(frozen=True, kw_only=True)
 class Effort(NamedFields):
     """How much a study may compute.
@@ -108,16 +102,6 @@ class Effort(NamedFields):
     until
         ``"order of the first three"``, any number of places: the blocks of a ranking grow until that order is stable,
         within a limit.
-
-    Raises
-    ------
-    InputError
-        A field of another kind.
-
-    Examples
-    --------
-    >>> Effort(until="order of the first five").places
-    5
     """
 
     called: ClassVar[str] = "effort"
@@ -133,7 +117,10 @@ class Effort(NamedFields):
     @property
     def places(self) -> int | None:
         """First places whose order a ranking must settle; None where nothing is asked of it [-]."""
-        return None if self.until is None else _places(self.until)
+        if self.until is None:
+            return None
+        said = self.until.split()[-1]
+        return int(said) if said.isdigit() else _NUMBERS.index(said) + 1
 
     def notes(self, model: Model) -> tuple[str, ...]:
         """Return what a reader must know of the time that was asked for."""
@@ -219,6 +206,7 @@ class Problem(NamedFields):
         "Sequence[Compensator]",
         each("several of ta.Sorting(...), ta.Shim(...) and ta.Indexing(...)", a(Compensator)),
     ] = ()
+    questions: Sequence[Any] = ()
 
     def __post_init__(self) -> None:
         if isinstance(self.effort, str):
@@ -241,11 +229,6 @@ class Problem(NamedFields):
     def _place(cls, named: Mapping[str, Any]) -> str:
         """Return who is meant; a name that is none is not said."""
         return f"{cls.called} {named['name']}" if _is_name(named.get("name")) else cls.called
-
-    @property
-    def asked(self) -> tuple[object, ...]:
-        """What is asked; nothing yet."""
-        return ()
 
     @property
     def quick(self) -> bool:

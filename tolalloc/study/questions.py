@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from inspect import signature
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeVar
@@ -81,8 +81,9 @@ class Ranking(Question):
             largest_failed_share=study.largest_failed_share,
             by=self.by,
         )
-        result = rank(asked, record)
-        return Answer(kind=self.kind, header=prepared.header_after(record), result=result)
+        result, header = rank(asked, record), prepared.header
+        header = replace(header, assumptions=tuple(dict.fromkeys(header.assumptions)))
+        return _answer(self.kind, header, record, result)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,11 +96,6 @@ class Difference(Question):
         Source, or a pattern of several as ``disc*.pitch``, and its full zone [µm].
     units
         Random units of either drawing [-].
-
-    Examples
-    --------
-    >>> Difference(zones={"pin.diameter": 3.0}).units
-    1024
     """
 
     kind: ClassVar[str] = "difference"
@@ -175,14 +171,8 @@ class Allocation(Question):
             effort=prepared.allocation_effort,
             seed=study.seed,
             largest_failed_share=study.largest_failed_share,
-            grades=self.grades,
-            fixed_first=self.fixed_first,
-            front=self.front,
-            what_if=self.what_if,
-            unit_price=self.unit_price,
-            quality_loss=self.quality_loss,
-            boxes=self.boxes,
             place=prepared.place,
+            **vars(self),
         )
         asked = AssembledQuestion(question=question, choices=prepared.assemblies)
         return _answer(self.kind, prepared.header, record, allocate_assembled(asked, record, study.name))
@@ -228,14 +218,8 @@ def _answer(kind: str, header: Header, record: RunRecord, result: Result) -> Ans
     return Answer(kind=kind, header=replace(header, statuses=record.counts, stages=record.stages), result=result)
 
 
-def questions_of(kinds: tuple[str, ...], asked: tuple[Question, ...], place: str) -> tuple[Question, ...]:
-    """Return the questions of a study that are meant by their kinds; one that it does not ask has its defaults.
-
-    Raises
-    ------
-    UnknownNameError
-        A kind that is no question.
-    """
+def questions_of(kinds: tuple[str, ...], asked: Sequence[Question], place: str) -> tuple[Question, ...]:
+    """Return the questions of a study that are meant by their kinds; one that it does not ask has its defaults."""
     known: dict[str, Any] = {"ranking": Ranking, "allocation": Allocation}
     own = {question.kind: question for question in asked}
     for kind in kinds:

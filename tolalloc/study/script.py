@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from traceback import extract_tb
 from types import ModuleType
 from typing import TYPE_CHECKING
 
@@ -63,13 +64,7 @@ def _belongs_to(name: str, folder: Path) -> bool:
 
 
 def load_study(path: Path) -> Study:
-    """Return the study that a script defines, and leave its modules in force for the rest of the process.
-
-    Raises
-    ------
-    InputError
-        The script is missing, broken, or defines no study.
-    """
+    """Return the study of `load_script`, and leave its modules in force for the rest of the process."""
     script = load_script(path)
     sys.path.insert(0, str(script.folder))
     sys.modules.update(script.modules)
@@ -118,11 +113,7 @@ def load_script(path: Path) -> StudyScript:
 def _broken(path: Path, error: Exception) -> str:
     """Return why a script cannot be read, with its line where it is known."""
     reason = " ".join(str(error).split())
-    trace, line = error.__traceback__, 0
-    while trace:
-        if trace.tb_frame.f_code.co_filename == str(path):
-            line = trace.tb_lineno
-        trace = trace.tb_next
-    place = f"{path}, line {line}" if line else f"{path}"
+    lines = [own.lineno for own in extract_tb(error.__traceback__) if own.filename == str(path)]
+    place = f"{path}, line {lines[-1]}" if lines else f"{path}"
     hint = "; is it truncated?" if isinstance(error, SyntaxError) else "."
     return f"{place}: the script cannot be read as a study ({type(error).__name__}: {reason}){hint}"

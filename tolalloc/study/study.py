@@ -131,11 +131,6 @@ class Study(Problem):
                     "ask what reads it."
                 )
 
-    @property
-    def asked(self) -> tuple[object, ...]:
-        """What is asked."""
-        return tuple(self.questions)
-
     def __repr__(self) -> str:
         asked = ", ".join(question.kind for question in self.questions)
         limits = ", ".join(self.limits) or "none"
@@ -162,7 +157,7 @@ class Study(Problem):
             Told how far the work has come; silent unless given.
         """
         if isinstance(question, str):
-            question = questions_of((question,), tuple(self.questions), self.place)[0]
+            question = questions_of((question,), self.questions, self.place)[0]
         prepared = Prepared(study=self.with_effort(effort))
         return question.answer(prepared, _record(prepared, question, progress))
 
@@ -250,7 +245,7 @@ def run(
         if study.model is not None:
             prepared.model.release()  # drawing the figures takes as much memory
         for answer in answers.values():
-            answer.add_files(beside)
+            answer.teller.add_files(beside)
         write_document(document, beside)
     if fault:
         raise type(fault)(f"{fault} What was answered before, {' and '.join(answers)}, stands in {folder}.") from fault

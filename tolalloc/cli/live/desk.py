@@ -15,7 +15,7 @@ from pathlib import Path
 from threading import Event, Lock, Thread
 from typing import Any, cast
 
-from tolalloc.cli.live.session import LiveDesign, LiveUnits, Session, names_in
+from tolalloc.cli.live.session import LiveDesign, Session, names_in
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import table_text
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
@@ -74,13 +74,7 @@ class Job:
 
     @classmethod
     def asked(cls, kind: str, study: Study, settings: tuple[str, ...] = ()) -> Job:
-        """Ask a question of a study, at the quick effort.
-
-        Raises
-        ------
-        InputError
-            The page does not ask such a question.
-        """
+        """Ask a question of a study, at the quick effort."""
         if kind not in KINDS:
             raise InputError.at("page", "question", kind, " or ".join(KINDS))
         job = cls(kind=kind, study=study, settings=settings)
@@ -118,7 +112,7 @@ class Job:
 
     def _run(self) -> None:
         try:
-            asked = questions_of((self.kind,), tuple(self.study.questions), self.study.place)
+            asked = questions_of((self.kind,), self.study.questions, self.study.place)
             quick = replace(self.study.with_effort("quick"), questions=asked)
             self.most = max((own.units[1] for own in durations(Prepared(study=quick))), default=0)
             answer = self.study.ask(self.kind, "quick", self)
@@ -151,66 +145,6 @@ def _found(answer: Any, settings: tuple[str, ...]) -> dict[str, Any]:
     return {**drawn, **found}
 
 
-@dataclass(frozen=True, kw_only=True)
-class Saving:
-    """Where designs of a session are written: beside the study's script, never over a file."""
-
-    session: Session
-    script: Path
-
-    def study(self, design: LiveDesign, name: str = "", locked: frozenset[str] = frozenset()) -> Study:
-        """Return the study at a design, with further sources locked."""
-        before = self.session.prepared.study
-        if before.drawing is None:
-            raise InputError(f"study {before.name}: it has no drawing that could change.")
-        sources = (replace(own, locked=own.locked or own.name in locked) for own in self.session.sources(design))
-        drawing = before.drawing.with_sources(sources)
-        return cast("Study", before.changed(drawing, self._settings(design), name))
-
-    def save(self, design: LiveDesign, name: str) -> dict[str, Any]:
-        """Write the tolerance table and the study of a design, and return their names.
-
-        Raises
-        ------
-        InputError
-            A name that cannot be that of a new Python module, or files that are there already.
-        """
-        if not (isinstance(name, str) and _NAME.fullmatch(name)):
-            raise InputError.at("page", "name", name, "60 letters, digits and _, a letter first")
-        table, script = (self.script.parent / f"{name}{ending}" for ending in (".tolerances.csv", ".py"))
-        for path in (table, script):
-            if path.exists():
-                raise InputError(f"{path.name}: is there already in the folder of the study; choose another name.")
-        # A script imports what lies beside it first: a saved numpy.py would take the place of NumPy.
-        if name in {"tolalloc", *sys.stdlib_module_names, *packages_distributions()}:
-            raise InputError.at("page", "name", name, "what no installed Python module is called")
-        drawing, currency = self.study(design, name).drawing, self.session.prepared.currency
-        sources = tuple(map(_with_range, drawing.sources if drawing else ()))
-        write_new(table, table_text(sources, table.parent, currency))
-        self._require_readable(table, design)
-        before = self.session.prepared.study.name
-        values = self._settings(design)
-        text = _SCRIPT.format(before=before, module=self.script.stem, table=table.name, settings=values, name=name)
-        write_new(script, text)
-        # As it may be pasted into a command line, from whatever folder.
-        quoted = f'"{script}"' if os.name == "nt" else shlex.quote(str(script))
-        return {"table": table.name, "script": script.name, "command": f"tolalloc run {quoted}"}
-
-    def _require_readable(self, table: Path, design: LiveDesign) -> None:
-        """Take a table back that no study would read, such as one with a zone that the model does not believe."""
-        try:
-            changed = self.session.prepared.study.changed(table, self._settings(design))
-            _ = (prepared := Prepared(study=changed)).model, prepared.space
-        except TolallocError:
-            table.unlink()
-            raise
-
-    def _settings(self, design: LiveDesign) -> dict[str, float]:
-        """Return the settings and operating conditions that differ from the study's own."""
-        known = zip(self.session.prepared.model.settings, design.settings, strict=True)
-        return {own.name: value for own, value in known if value != own.value} | dict(design.operating)
-
-
 def _with_range(source: Source) -> Source:
     """Return a source whose smallest and largest zone take in the one that was tried."""
     if source.zone <= 0:
@@ -239,20 +173,14 @@ class Desk:
             "scaled": self._scaled,
             "scene": self._scene,
             "sweep": self._sweep,
-            "save": lambda sent: self._saving.save(self._read(sent), sent.get("name", "")),
+            "save": lambda sent: self._save(self._read(sent), sent.get("name", "")),
             "ask": self._ask,
             "state": lambda sent: job.state if (job := self._jobs.get(self._tab(sent))) else {},
             "stop": self._stop,
         }
 
     def answer(self, name: str, sent: dict[str, Any]) -> dict[str, Any]:
-        """Return the answer to a request.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            A request that is none, or a field of it that is not allowed.
-        """
+        """Return the answer to a request."""
         if name not in self._asked:
             raise UnknownNameError.among("page", "request", name, self._asked)
         return self._asked[name](sent)
@@ -268,7 +196,7 @@ class Desk:
     def _design(self, sent: dict[str, Any]) -> dict[str, Any]:
         design = self._read(sent)
         self._newest(sent)  # what older designs still solve is not wanted any more
-        found = LiveUnits(session=self.session).unit(design, sent.get("unit", 0))
+        found = self.session.unit(design, sent.get("unit", 0))
         return {**self.session.priced(design), **found}
 
     def _units(self, sent: dict[str, Any]) -> dict[str, Any]:
@@ -282,18 +210,55 @@ class Desk:
 
     def _scene(self, sent: dict[str, Any]) -> dict[str, Any]:
         swept = (str(sent["source"]), sent.get("share", 0.0)) if "source" in sent else None
-        return LiveUnits(session=self.session).scene(self._read(sent), sent.get("unit", 0), swept)
+        return self.session.scene(self._read(sent), sent.get("unit", 0), swept)
 
     def _sweep(self, sent: dict[str, Any]) -> dict[str, Any]:
-        return LiveUnits(session=self.session).swept(self._read(sent), sent.get("unit", 0), str(sent.get("source")))
+        return self.session.swept(self._read(sent), sent.get("unit", 0), str(sent.get("source")))
 
-    @property
-    def _saving(self) -> Saving:
-        return Saving(session=self.session, script=self.script)
+    def _study(self, design: LiveDesign, name: str = "", locked: frozenset[str] = frozenset()) -> Study:
+        """Return the study at a design, with further sources locked."""
+        before = self.session.prepared.study
+        if before.drawing is None:
+            raise InputError(f"study {before.name}: it has no drawing that could change.")
+        sources = (replace(own, locked=own.locked or own.name in locked) for own in self.session.sources(design))
+        drawing = before.drawing.with_sources(sources)
+        return cast("Study", before.changed(drawing, self._settings(design), name))
+
+    def _settings(self, design: LiveDesign) -> dict[str, float]:
+        """Return the settings and operating conditions that differ from the study's own."""
+        known = zip(self.session.prepared.model.settings, design.settings, strict=True)
+        return {own.name: value for own, value in known if value != own.value} | dict(design.operating)
+
+    def _save(self, design: LiveDesign, name: str) -> dict[str, Any]:
+        """Write tolerance table and study of a design beside the script, never over a file, and return their names."""
+        if not (isinstance(name, str) and _NAME.fullmatch(name)):
+            raise InputError.at("page", "name", name, "60 letters, digits and _, a letter first")
+        table, script = (self.script.parent / f"{name}{ending}" for ending in (".tolerances.csv", ".py"))
+        for path in (table, script):
+            if path.exists():
+                raise InputError(f"{path.name}: is there already in the folder of the study; choose another name.")
+        # A script imports what lies beside it first: a saved numpy.py would take the place of NumPy.
+        if name in {"tolalloc", *sys.stdlib_module_names, *packages_distributions()}:
+            raise InputError.at("page", "name", name, "what no installed Python module is called")
+        drawing, before = self._study(design, name).drawing, self.session.prepared
+        sources, values = tuple(map(_with_range, drawing.sources if drawing else ())), self._settings(design)
+        write_new(table, table_text(sources, table.parent, before.currency))
+        try:  # a table that no study would read, such as one with a zone that the model does not believe, is taken back
+            _ = (prepared := Prepared(study=before.study.changed(table, values))).model, prepared.space
+        except TolallocError:
+            table.unlink()
+            raise
+        text = _SCRIPT.format(
+            before=before.study.name, module=self.script.stem, table=table.name, settings=values, name=name
+        )
+        write_new(script, text)
+        # As it may be pasted into a command line, from whatever folder.
+        quoted = f'"{script}"' if os.name == "nt" else shlex.quote(str(script))
+        return {"table": table.name, "script": script.name, "command": f"tolalloc run {quoted}"}
 
     def _ask(self, sent: dict[str, Any]) -> dict[str, Any]:
         held = names_in(sent, "locked", [own.name for own in self.session.prepared.errors.active])
-        study = self._saving.study(self._read(sent), locked=held)
+        study = self._study(self._read(sent), locked=held)
         names = tuple(own.name for own in self.session.prepared.model.settings)
         tab = self._tab(sent)
         with self._lock:

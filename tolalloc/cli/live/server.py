@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from importlib.resources import files
 from io import BufferedReader
 from pathlib import Path
 from socket import SocketIO
@@ -35,13 +34,7 @@ MOST_CONNECTIONS = 64
 PATIENCE = 10.0
 """Time that a connection may take to say a whole request, and to take its answer [s]."""
 _KINDS = {"js": "text/javascript", "css": "text/css", "html": "text/html"}
-_OWN, _SHARED = (
-    (
-        *("live.html", "live.css", "live.js", "zones.js", "designs.js", "picture.js", "requests.js", "verdict.js"),
-        *("cost.js", "cursor.js", "ghosts.js", "question.js"),
-    ),
-    ("page.css", "chart.js", "mechanism.css", "mechanism.js"),
-)
+_SHARED = ("page.css", "chart.js", "mechanism.css", "mechanism.js")
 _POLICY = "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'"
 
 
@@ -86,13 +79,7 @@ class LiveServer:
 
     @cached_property
     def http(self) -> ThreadingHTTPServer:
-        """The server of the standard library, at its port.
-
-        Raises
-        ------
-        InputError
-            The port is taken or none.
-        """
+        """The server of the standard library, at its port."""
         handler = type("Handler", (_Handler,), {"live": self, "free": BoundedSemaphore(MOST_AT_ONCE)})
         try:
             return _BoundedServer(("127.0.0.1", self.port), handler)
@@ -112,7 +99,8 @@ class LiveServer:
     @cached_property
     def pages(self) -> dict[str, bytes]:
         """Path → what stands there; nothing else is served."""
-        own = {name: (files("tolalloc.cli.live") / "page" / name).read_text(encoding="utf-8") for name in _OWN}
+        page = Path(__file__).with_name("page")
+        own = {path.name: path.read_text(encoding="utf-8") for path in page.iterdir() if path.suffix[1:] in _KINDS}
         shared = {name: asset(name) for name in _SHARED}
         found = {f"/{name}": text.encode() for name, text in (own | shared).items()}
         return {"/": found.pop("/live.html"), **found}

@@ -65,11 +65,6 @@ class LiveDesign:
         """Return the design of a record ``{"zones": {source: µm}, "settings": {name: value}}``.
 
         Operating conditions stand among the settings.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            What is no such record, a source or setting that the study does not have, a value that is not allowed.
         """
         zones, settings = (_numbers(sent, key) for key in ("zones", "settings"))
         present = {own.name: own.zone for own in prepared.errors.active}
@@ -109,13 +104,7 @@ def _numbers(sent: Any, key: str) -> Mapping[str, float]:
 
 
 def names_in(sent: Mapping[str, Any], key: str, known: Collection[str]) -> frozenset[str]:
-    """Return the names that a request lists, none where it lists none.
-
-    Raises
-    ------
-    InputError, UnknownNameError
-        What is no list, or a name that is not known.
-    """
+    """Return the names that a request lists, none where it lists none."""
     found = sent.get(key, [])
     if not isinstance(found, list):
         raise InputError.at("page", key, found, "a list of names")
@@ -123,39 +112,6 @@ def names_in(sent: Mapping[str, Any], key: str, known: Collection[str]) -> froze
         if name not in known:
             raise UnknownNameError.among("page", key, str(name), known)
     return frozenset(found)
-
-
-def judged(
-    prepared: Prepared, model: Model, outputs: tuple[str, ...], values: Float[np.ndarray, "unit output"]
-) -> dict[str, Any]:
-    """Return the yield of all limits, and of each output its quantiles, its share and its histogram.
-
-    Parameters
-    ----------
-    prepared
-        The study.
-    model
-        What answered, whose own limits are in force.
-    outputs
-        Names of the outputs, in the order of the values.
-    values
-        Outputs of every unit, NaN where a unit has none [as the names state].
-    """
-    read = [(own.in_force(model), values[:, outputs.index(own.output)]) for own in prepared.requirements]
-    kept = np.all([own.limits.kept_by(found) for own, found in read], axis=0)
-    inside = proportion(len(values), int(np.count_nonzero(~kept)))
-    limited = model.own_limits
-    return {
-        "units": len(values),
-        "lost": int(np.count_nonzero(np.isnan(values).any(axis=1))),
-        "yield": [inside.estimate, inside.low, inside.high],
-        "target": prepared.target,
-        # share of units that do not work at all, for every limit that the model has of its own
-        "broken": {
-            own.output: float((~own.limits.kept_by(found)).mean()) for own, found in read if own.output in limited
-        },
-        "outputs": [_output(own, found, kept) for own, found in read],
-    }
 
 
 def _output(
@@ -193,7 +149,7 @@ class Session:
     """A study that is open.
 
     Every design is tried on the random units that ``tolalloc whatif`` takes, so that the page and the command say the
-    same.
+    same. They count from 1; unit 0 has exact parts.
     """
 
     prepared: Prepared
@@ -214,13 +170,7 @@ class Session:
         return tuple(dict.fromkeys(own.output for own in self.prepared.requirements))
 
     def model(self, design: LiveDesign) -> Model:
-        """Return the model at the settings and under the conditions of a design.
-
-        Raises
-        ------
-        InputError
-            A condition that is not allowed, such as a torque of 0.
-        """
+        """Return the model at the settings and under the conditions of a design."""
         prepared, source = self.prepared, self.prepared.study.model
         model = prepared.model
         if design.operating and source is not None:
@@ -233,13 +183,7 @@ class Session:
         return model.at(np.array(design.settings))
 
     def sources(self, design: LiveDesign) -> tuple[Source, ...]:
-        """Return the sources that vary, at the zones of a design and with their costs.
-
-        Raises
-        ------
-        InputError
-            A zone that no process holds.
-        """
+        """Return the sources that vary, at the zones of a design and with their costs."""
         return repriced(self.prepared.space, dict(design.zones))
 
     def deviations(self, design: LiveDesign, units: slice) -> Float[np.ndarray, "unit column"]:
@@ -263,17 +207,31 @@ class Session:
         return made.name if made else "as drawn"
 
     def units(self, design: LiveDesign, count: object, wanted: Callable[[], bool]) -> dict[str, Any] | None:
-        """Return what random units of a design say; nothing if they are not wanted any more.
-
-        Raises
-        ------
-        InputError
-            A number of units that is none.
-        """
+        """Return what random units of a design say; nothing if they are not wanted any more."""
         if not (type(count) is int and 1 <= count <= MOST):
             raise InputError.at("page", "units", count, f"a whole number up to {MOST}")
         values = self._solved(design, count, wanted)
-        return None if values is None else judged(self.prepared, self.model(design), self.outputs, values[:count])
+        return None if values is None else self._judged(design, values[:count])
+
+    def _judged(self, design: LiveDesign, values: Float[np.ndarray, "unit output"]) -> dict[str, Any]:
+        """Return the yield of all limits, and of each output its quantiles, its share and its histogram.
+
+        A unit without an output has NaN there; limits of the model's own are those in force at the design.
+        """
+        model = self.model(design)
+        read = [(own.in_force(model), values[:, self.outputs.index(own.output)]) for own in self.prepared.requirements]
+        kept = np.all([own.limits.kept_by(found) for own, found in read], axis=0)
+        inside = proportion(len(values), int(np.count_nonzero(~kept)))
+        broken = [(own, found) for own, found in read if own.output in model.own_limits]
+        return {
+            "units": len(values),
+            "lost": int(np.count_nonzero(np.isnan(values).any(axis=1))),
+            "yield": [inside.estimate, inside.low, inside.high],
+            "target": self.prepared.target,
+            # share of units that do not work at all, for every limit that the model has of its own
+            "broken": {own.output: float((~own.limits.kept_by(found)).mean()) for own, found in broken},
+            "outputs": [_output(own, found, kept) for own, found in read],
+        }
 
     def _solved(
         self, design: LiveDesign, count: int, wanted: Callable[[], bool]
@@ -307,7 +265,7 @@ class Session:
             values = self._solved(scaled, FIRST, wanted)
             if values is None:
                 return None
-            outputs = judged(self.prepared, self.model(scaled), self.outputs, values[:FIRST])["outputs"]
+            outputs = self._judged(scaled, values[:FIRST])["outputs"]
             cost = sum(own.cost for own in self.sources(scaled))
             quantiles = [[item["value"] for item in own["quantiles"]] for own in outputs]
             found.append({"factor": factor, "cost": cost, "quantiles": quantiles})
@@ -357,6 +315,108 @@ class Session:
             "currency": self.prepared.currency or COST_UNITS,
         }
 
+    def unit(self, design: LiveDesign, number: int) -> dict[str, Any]:
+        """Return outputs and pictures of a unit."""
+        x = self._columns(design, number)
+        values = self._values(design, x[np.newaxis])[0]
+        figures = self._pictured(design, _label(number), x)
+        return {
+            "unit": number,
+            "values": [
+                {"name": short(name), "unit": unit_of(name), "value": value}
+                for name, value in zip(self.outputs, numbers(values), strict=True)
+            ],
+            "figures": [chart(figure) for figure in figures],
+        }
+
+    def _pictured(self, design: LiveDesign, label: str, x: Float[np.ndarray, " column"]) -> tuple[Figure, ...]:
+        """Return the pictures of a unit, with the limit of the curve's height around the middle of the curve."""
+        portrait = portrait_of(self.model(design))
+        figures = portrait.pictured({label: (np.array(design.settings), x)})
+        limits = {own.output: own.limits.upper for own in self.prepared.requirements}
+        limit, values = limits.get(portrait.curve_height), [item for own in figures[:1] for item in own.series[-1].y]
+        if limit is None or not np.isfinite(values).any():
+            return figures
+        middle = (np.nanmin(values) + np.nanmax(values)) / 2
+        name = f"limit {limit:g} {unit_of(portrait.curve_height)} peak to peak"
+        ends = ((float(middle - limit / 2), ""), (float(middle + limit / 2), name))
+        return replace(figures[0], horizontal=ends), *figures[1:]
+
+    def scene(self, design: LiveDesign, number: int, swept: tuple[str, float] | None = None) -> dict[str, Any]:
+        """Return a unit as a moving picture needs it; nothing where the model has none.
+
+        What may be swept is a source, to where its error stands in its zone, from -1 to 1 [-].
+        """
+        names = tuple(own.name for own in self.prepared.errors.active)
+        x, label = self._columns(design, number), _label(number)
+        if swept:
+            source, share = swept
+            if not (is_number(share) and abs(share) <= 1):
+                raise InputError.at("page", "share", share, "a number from -1 to 1")
+            x, label = self._at_shares(design, number, source, np.array([share]))[0], f"{label}, {source} moved"
+        return {"scene": portrait_of(self.model(design)).scene(np.array(design.settings), x, label, names)}
+
+    def swept(self, design: LiveDesign, number: int, source: str) -> dict[str, Any]:
+        """Return the leading output of a unit while one of its errors goes from one end of its zone to the other."""
+        shares = np.linspace(-1.0, 1.0, _SWEPT)
+        tried = self._at_shares(design, number, source, shares)
+        values = self._values(design, tried)[:, 0]
+        labels = [f"{source} at {100 * share:.0f} % of its zone" for share in shares]
+        curves = [self._pictured(design, label, row) for label, row in zip(labels, tried, strict=True)]
+        leading = self.outputs[0]
+        figure = Figure(
+            name="sweep",
+            title=f"{short(leading)} while {source} goes through its zone, all else of the unit as it is",
+            x_label=f"{source} over its zone [-]",
+            y_label=f"{short(leading)} [{unit_of(leading)}]",
+            series=(Series(label=source, kind="line", x=list(shares), y=list(values)),),
+        )
+        known = values[np.isfinite(values)]
+        return {
+            "source": source,
+            "figure": chart(figure),
+            "spread": float(known.max() - known.min()) if known.size else None,
+            "curves": [[chart(own) for own in figures] for figures in curves],
+        }
+
+    def _at_shares(
+        self, design: LiveDesign, number: int, source: str, shares: Float[np.ndarray, " share"]
+    ) -> Float[np.ndarray, "share column"]:
+        """Return the deviations of a unit with one of its errors at places of its zone [m, angles rad]."""
+        errors, sources = self.prepared.errors, {own.name: own for own in self.sources(design)}
+        if source not in sources:
+            raise UnknownNameError.among("page", "source", source, sources)
+        own = np.array([name == source for name in errors.source_of_column])
+        tried = np.tile(self._columns(design, number), (len(shares), 1))
+        tried[:, own] = sources[source].middles + np.outer(shares, self._full(sources[source], number, own))
+        return tried
+
+    def _columns(self, design: LiveDesign, number: int) -> Float[np.ndarray, " column"]:
+        """Return the deviations of a unit [m, angles rad]."""
+        if not (type(number) is int and 0 <= number <= MOST):
+            raise InputError.at("page", "unit", number, f"a whole number up to {MOST}, 0 for exact parts")
+        if number:
+            return np.asarray(self.deviations(design, slice(number - 1, number))[0])
+        errors, zones = self.prepared.errors, np.array([own.zone for own in self.sources(design)])
+        return np.asarray(errors.deviations(np.zeros((1, len(errors.columns))), zones)[0])
+
+    def _full(self, source: Source, number: int, at: np.ndarray) -> Float[np.ndarray, " own_column"]:
+        """Return the deviations with which the source fills its zone, in the direction of the unit [m, angles rad]."""
+        zones = np.ones(len(self.prepared.errors.active))
+        own = self.prepared.errors.deviations(self.standard[max(number, 1) - 1 : max(number, 1)], zones)[0, at]
+        centred = own - source.middles
+        measure = float(limited_measure(source, own[np.newaxis])[0]) or 1.0
+        half = source.zone / 2 if source.feature is Feature.SIZE else source.zone
+        return np.asarray(centred * half / measure)
+
+    def _values(self, design: LiveDesign, x: Float[np.ndarray, "unit column"]) -> Float[np.ndarray, "unit output"]:
+        evaluation = self.model(design).reading(self.outputs)(x)
+        return np.where(evaluation.good[:, np.newaxis], evaluation.values, np.nan)
+
+
+def _label(number: int) -> str:
+    return f"unit {number}" if number else "exact parts"
+
 
 def _setting(own: Setting, word: str, steps: int = _STEPS) -> dict[str, Any]:
     step = (own.upper - own.lower) / steps
@@ -385,136 +445,3 @@ def _described(source: Source, processes: tuple[Process, ...]) -> dict[str, Any]
         "locked": source.locked,
         "cost": source.cost,
     }
-
-
-@dataclass(frozen=True, kw_only=True)
-class LiveUnits:
-    """The random units of a session, one at a time; unit 0 has exact parts, the others count from 1."""
-
-    session: Session
-
-    def unit(self, design: LiveDesign, number: int) -> dict[str, Any]:
-        """Return outputs and pictures of a unit.
-
-        Raises
-        ------
-        InputError
-            There is no such unit.
-        """
-        x = self._columns(design, number)
-        values = self._values(design, x[np.newaxis])[0]
-        label = f"unit {number}" if number else "exact parts"
-        figures = self._pictured(design, label, x)
-        return {
-            "unit": number,
-            "values": [
-                {"name": short(name), "unit": unit_of(name), "value": value}
-                for name, value in zip(self.session.outputs, numbers(values), strict=True)
-            ],
-            "figures": [chart(figure) for figure in figures],
-        }
-
-    def _pictured(self, design: LiveDesign, label: str, x: Float[np.ndarray, " column"]) -> tuple[Figure, ...]:
-        """Return the pictures of a unit, with the limit of the curve's height around the middle of the curve."""
-        portrait = portrait_of(self.session.model(design))
-        figures = portrait.pictured({label: (np.array(design.settings), x)})
-        limits = {own.output: own.limits.upper for own in self.session.prepared.requirements}
-        limit, values = limits.get(portrait.curve_height), [item for own in figures[:1] for item in own.series[-1].y]
-        if limit is None or not np.isfinite(values).any():
-            return figures
-        middle = (np.nanmin(values) + np.nanmax(values)) / 2
-        name = f"limit {limit:g} {unit_of(portrait.curve_height)} peak to peak"
-        ends = ((float(middle - limit / 2), ""), (float(middle + limit / 2), name))
-        return replace(figures[0], horizontal=ends), *figures[1:]
-
-    def scene(self, design: LiveDesign, number: int, swept: tuple[str, float] | None = None) -> dict[str, Any]:
-        """Return a unit as a moving picture needs it; nothing where the model has none.
-
-        Parameters
-        ----------
-        design
-            The design.
-        number
-            Number of the unit [-].
-        swept
-            A source and where its error stands in its zone, from -1 to 1; as the unit has it unless given [-].
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            There is no such unit or source.
-        SolveError
-            It does not come to rest somewhere.
-        """
-        names = tuple(own.name for own in self.session.prepared.errors.active)
-        x, label = self._columns(design, number), f"unit {number}" if number else "exact parts"
-        if swept:
-            source, share = swept
-            if not (is_number(share) and abs(share) <= 1):
-                raise InputError.at("page", "share", share, "a number from -1 to 1")
-            x, label = self._at_shares(design, number, source, np.array([share]))[0], f"{label}, {source} moved"
-        return {"scene": portrait_of(self.session.model(design)).scene(np.array(design.settings), x, label, names)}
-
-    def swept(self, design: LiveDesign, number: int, source: str) -> dict[str, Any]:
-        """Return the leading output of a unit while one of its errors goes from one end of its zone to the other.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            There is no such unit or source.
-        """
-        shares = np.linspace(-1.0, 1.0, _SWEPT)
-        tried = self._at_shares(design, number, source, shares)
-        values = self._values(design, tried)[:, 0]
-        labels = [f"{source} at {100 * share:.0f} % of its zone" for share in shares]
-        curves = [self._pictured(design, label, row) for label, row in zip(labels, tried, strict=True)]
-        leading = self.session.outputs[0]
-        figure = Figure(
-            name="sweep",
-            title=f"{short(leading)} while {source} goes through its zone, all else of the unit as it is",
-            x_label=f"{source} over its zone [-]",
-            y_label=f"{short(leading)} [{unit_of(leading)}]",
-            series=(Series(label=source, kind="line", x=list(shares), y=list(values)),),
-        )
-        known = values[np.isfinite(values)]
-        return {
-            "source": source,
-            "figure": chart(figure),
-            "spread": float(known.max() - known.min()) if known.size else None,
-            "curves": [[chart(own) for own in figures] for figures in curves],
-        }
-
-    def _at_shares(
-        self, design: LiveDesign, number: int, source: str, shares: Float[np.ndarray, " share"]
-    ) -> Float[np.ndarray, "share column"]:
-        """Return the deviations of a unit with one of its errors at places of its zone [m, angles rad]."""
-        errors, sources = self.session.prepared.errors, {own.name: own for own in self.session.sources(design)}
-        if source not in sources:
-            raise UnknownNameError.among("page", "source", source, sources)
-        own = np.array([name == source for name in errors.source_of_column])
-        tried = np.tile(self._columns(design, number), (len(shares), 1))
-        tried[:, own] = sources[source].middles + np.outer(shares, self._full(sources[source], number, own))
-        return tried
-
-    def _columns(self, design: LiveDesign, number: int) -> Float[np.ndarray, " column"]:
-        """Return the deviations of a unit [m, angles rad]."""
-        if not (type(number) is int and 0 <= number <= MOST):
-            raise InputError.at("page", "unit", number, f"a whole number up to {MOST}, 0 for exact parts")
-        if number:
-            return np.asarray(self.session.deviations(design, slice(number - 1, number))[0])
-        errors, zones = self.session.prepared.errors, np.array([own.zone for own in self.session.sources(design)])
-        return np.asarray(errors.deviations(np.zeros((1, len(errors.columns))), zones)[0])
-
-    def _full(self, source: Source, number: int, at: np.ndarray) -> Float[np.ndarray, " own_column"]:
-        """Return the deviations with which the source fills its zone, in the direction of the unit [m, angles rad]."""
-        session = self.session
-        zones = np.ones(len(session.prepared.errors.active))
-        own = session.prepared.errors.deviations(session.standard[max(number, 1) - 1 : max(number, 1)], zones)[0, at]
-        centred = own - source.middles
-        measure = float(limited_measure(source, own[np.newaxis])[0]) or 1.0
-        half = source.zone / 2 if source.feature is Feature.SIZE else source.zone
-        return np.asarray(centred * half / measure)
-
-    def _values(self, design: LiveDesign, x: Float[np.ndarray, "unit column"]) -> Float[np.ndarray, "unit output"]:
-        evaluation = self.session.model(design).reading(self.session.outputs)(x)
-        return np.where(evaluation.good[:, np.newaxis], evaluation.values, np.nan)

@@ -34,9 +34,25 @@ class CheckedTime:
 
     effort: str  # Quick or full
     kind: str  # Name of the question
-    units: tuple[int, int]  # Units that it solves, at least and at most [-]
-    seconds: tuple[float, float]  # How long that takes here [s]
-    sentence: str  # The same in words
+    units: tuple[int, int]  # About how many units it solves, at least and at most [-]
+    seconds: tuple[float, float]  # About how long that takes here, once everything is compiled [s]
+
+    @property
+    def sentence(self) -> str:
+        """The same in words."""
+        least, most = (_in_words(seconds) for seconds in self.seconds)
+        return f"{self.kind}: about {self.units[0]:,} to {self.units[1]:,} units, {least} to {most} here."
+
+
+def _in_words(seconds: float) -> str:
+    """Return a time as a person says it.
+
+    >>> _in_words(0.4), _in_words(42.0), _in_words(300.0), _in_words(9000.0)
+    ('1 s', '42 s', '5.0 min', '2.5 h')
+    """
+    if seconds < 90:
+        return f"{max(seconds, 1):.0f} s"
+    return f"{seconds / 60:.1f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
 
 
 @dataclass(frozen=True, kw_only=True)

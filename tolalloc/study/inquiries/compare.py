@@ -27,13 +27,7 @@ class Compare(Inquiry[Comparison]):
     second: Annotated[Path | None, Word("Folder of another one, B; the last one in runs unless given.")] = None
 
     def prepare(self) -> Comparison:
-        """Return what both folders say.
-
-        Raises
-        ------
-        InputError
-            A folder that holds no finished run; one folder alone; none, where runs holds less than two.
-        """
+        """Return what both folders say."""
         if self.first and self.second:
             return Comparison(first=read_run(self.first), second=read_run(self.second))
         if self.first or self.second:
