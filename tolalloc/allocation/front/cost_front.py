@@ -60,7 +60,8 @@ class FrontSearch:
         for side, floor in ((tighter, drawn.cost), (sorted(by for by in shares if by > 1), 0.0)):
             start = drawn
             for share in side:
-                best = self._cheapest(share * limit, start, floor * (1 - _SAME))
+                # Of a wider limit it is known that the design of the limit before keeps it.
+                best = self._cheapest(share * limit, start, floor * (1 - _SAME)) or (start if share > 1 else None)
                 if best is None:
                     missed.append(share * limit)
                     continue

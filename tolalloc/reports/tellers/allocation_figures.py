@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from tolalloc.allocation.front.cost_front import CostFront
 from tolalloc.allocation.front.what_if import SettingTrade
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.reading.units import unit_of

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from tolalloc.allocation.front.cost_front import CostFront
 from tolalloc.allocation.front.price_region import COST_CHANGE, SAME
 from tolalloc.allocation.front.uncertain_region import COVERED, UncertainRegion
 from tolalloc.allocation.result import AllocationResult, limit_price, limit_step, unit_quantile

@@ -22,12 +22,15 @@ from tolalloc.reading.units import unit_of
 from tolalloc.reports.columns import Column, Table
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.tellers.allocation_sentences import designs, searches
+from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import quantity, short
 
 _Limited = tuple[int, OneSidedConstraint, Check]
 """The place of a limited side among all of them, the side, and the requirement that limits it."""
 _Named = tuple[str, VerifiedDesign]
 """What a design is called, and the design."""
+
+_say = Sentences("allocation")
 
 
 def requirements_table(result: AllocationResult) -> Table[_Limited]:
