@@ -203,8 +203,8 @@ def residual_gap(
     -----
     li2018's formulas are lost, and its "difference of two curves", taken literally, is least without any shift; this
     is a well-posed reading [A]: least mean gap (`tolalloc.reducers.cycloid.clearance.formula_gap`) with a radial
-    clearance of j or more and a gap of 0 or more everywhere. It is a linear program, `closed_form`. Gaps are the linear
-    formula's, good for amounts up to 50 µm.
+    clearance of j or more and a gap of 0 or more everywhere. It is a linear program, whose closed form stands in
+    `studies/published/li2018_closed_form.py`. Gaps are the linear formula's, good for amounts up to 50 µm.
 
     Mean over φ of Δr_rp·(1 − S) − Δr_p·(C − q·S) ≥ 0, Δr_rp − Δr_p ≥ j (own derivation).
     """
@@ -224,24 +224,6 @@ def residual_gap(
         upper=np.full(2, largest),
         radial_clearance=radial_clearance,
         require_gap=True,
-    )
-
-
-def closed_form(stage: CycloidStage, radial_clearance: float) -> Modification:
-    """Return the optimum of `residual_gap` with a radial clearance j, Δr_rp = j/(1 − q) and Δr_p = j·q/(1 − q).
-
-    Notes
-    -----
-    With v = Δr_rp − Δr_p ≥ j and u = q·Δr_rp − Δr_p ≥ 0 the gap at one φ is
-    [v·((1 − S) − q(C − qS)) + u·((C − qS) − (1 − S))]/(1 − q). Both factors are never negative: the first is the gap
-    itself at u = 0, and C is concave from 1 at S = 0 to q at S = 1, so it lies above its chord 1 − (1 − q)S. So both v
-    and u are best at their least, whatever the work interval and the number of its points. It holds for 0 < q < 1,
-    which every stage that can be ground has, and as long as both amounts lie in the box of the problem.
-    """
-    ratio = stage.flank_ratio
-    return Modification(
-        equidistant=radial_clearance / (1 - ratio),
-        shift=radial_clearance * ratio / (1 - ratio),
     )
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.reducers.equivalent.columns import Columns, columns_of
-from tolalloc.reducers.equivalent.interfaces import PinContact, dense_rows, pin_contact
-from tolalloc.reducers.equivalent.springs import HARMONICS, Coordinates, Positions, SpringGroup, harmonic_waves
+from tolalloc.reducers.equivalent.interfaces import PinContact, pin_contact
+from tolalloc.reducers.equivalent.springs import Coordinates, Positions, SpringGroup, harmonic_waves
 from tolalloc.reducers.families.known import family_of
 from tolalloc.reducers.reducer.design import Reducer
 
@@ -54,17 +54,6 @@ class CondensedAngles(NamedTuple):
 def bilateral_groups(at: Positions) -> list[SpringGroup]:
     """Return all spring groups but the pin contact."""
     return family_of(at.reducer).groups(at)
-
-
-def spring_groups(
-    reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"], orders: tuple[int, ...] = HARMONICS
-) -> list[SpringGroup]:
-    """Return all spring groups with all their columns, pin contact last: plain and large, for proofs.
-
-    Rows δ = a·q + b·ε, theory page (5) to (18), liu2020 as read there.
-    """
-    at = Positions(reducer, carrier_angle, orders)
-    return [*bilateral_groups(at), dense_rows(at)]
 
 
 def error_columns(reducer: Reducer, orders: tuple[int, ...]) -> Columns:
@@ -202,7 +191,7 @@ def condense(reducer: Reducer, orders: tuple[int, ...], angle: Float[np.ndarray,
     Examples
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> found = condense(load_reducer("rv20e_liu2020"), HARMONICS, np.zeros(1))
+    >>> found = condense(load_reducer("rv20e_liu2020"), (1, 2, 4), np.zeros(1))
     >>> whole = np.linalg.eigvalsh(found.stiffness[0])  # of two discs; the mechanism turns without resistance
     >>> whole.size, bool(abs(whole[0]) < 1e-9 * whole[-1])
     (6, True)
