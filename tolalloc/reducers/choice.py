@@ -218,7 +218,7 @@ class ReducerChoice:
         kernel, assumptions = bind(self.reducer, errors, self.torque, place, self.neglected, self.unit)
         turned, flank, radial = ((own[0] * MICROMETRE, own[1] * MICROMETRE) if own else None for own in self._ranges)
         return ReducerModel(
-            kernel=kernel.at_disc_temperature(self.disc_temperature),
+            kernel=replace(kernel, disc_temperature=self.disc_temperature),
             middles=tuple(errors.middles.tolist()),
             load_cases=self.load_cases,
             flank=flank,

@@ -77,8 +77,6 @@ def crowned_contact(
 
     K = F/δ of the law, C, C(ρ−r)/(ρ+r) or c/ln(cλ/F) [N/m].
 
-    References
-    ----------
     Own derivation, theory page (31); within 7 % of Hertz's ellipse under the logarithmic law.
     """
     stage, shape = reducer.cycloid_stage, np.broadcast_shapes(pin_angle.shape, force.shape)
@@ -430,8 +428,6 @@ def pressed(discs: PressedDiscs, phase: Float[np.ndarray, " phase"]) -> LoadedCo
 
     Theory page equation (37). All discs turn by the same angle; a single one carries the whole torque.
 
-    References
-    ----------
     Own derivation; Li Lixing's method, xi2015, takes the curvature at φ0 for all.
 
     Examples
@@ -504,8 +500,6 @@ def pin_moment(reducer: Reducer, torque: float) -> float:
 
     T_pins = T·(1 − 1/i)·zc/zp; exact without friction and tilt.
 
-    References
-    ----------
     Own derivation, from the balance of moments about the housing's centre.
     """
     stage = reducer.cycloid_stage

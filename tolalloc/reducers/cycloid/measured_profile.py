@@ -196,8 +196,6 @@ def aligned(
     Gauss–Newton steps: a movement by (x, y) and a turn by ψ about the disc's centre let a point stand out by
     −n·(x, y) − ψ·r_d·S less. What is taken out is no error of the disc any more.
 
-    References
-    ----------
     Own derivation, least squares; levers r_d·S of theory page (14).
     """
     start, scale = place, stage.disc_pitch_radius

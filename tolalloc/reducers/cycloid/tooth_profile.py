@@ -40,6 +40,11 @@ class Normals:
     lever: Angles
 
 
+def pole_distance(shortening: float, pin_angle: Angles) -> Float[np.ndarray, "*angles"]:
+    """Return √s, s = 1 + K1² − 2·K1·cos φ, the distance of pin and pole over R_p [-]."""
+    return np.asarray(np.sqrt(1 + shortening**2 - 2 * shortening * np.cos(pin_angle)))
+
+
 def normals(shortening: float, pin_angle: Angles) -> Normals:
     """Return the normals at pins, theory page equations (13) and (14); for 0 < K1 < 1.
 
@@ -51,8 +56,7 @@ def normals(shortening: float, pin_angle: Angles) -> Normals:
     liu2020 for the angle a (its α_jk); xi2015, equation (3), for S and cos κ. Exact for 0 < K1 < 1, where
     cos²κ + K1²·S² = 1.
     """
-    cosine, sine = np.cos(pin_angle), np.sin(pin_angle)
-    root = np.sqrt(1 + shortening**2 - 2 * shortening * cosine)
+    cosine, sine, root = np.cos(pin_angle), np.sin(pin_angle), pole_distance(shortening, pin_angle)
     return Normals(
         towards_crank=(shortening - cosine) / root,
         towards_tangent=-sine / root,

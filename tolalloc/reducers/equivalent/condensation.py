@@ -184,8 +184,6 @@ def condense(reducer: Reducer, orders: tuple[int, ...], angle: Float[np.ndarray,
 
     S = K_dd − K_dr·K_rr⁻¹·K_rd, F = L_d − K_dr·K_rr⁻¹·L_r; exact, N/m and N per error [m].
 
-    References
-    ----------
     Own derivation, static condensation of liu2020's equations; theory page (19) to (21).
 
     Examples

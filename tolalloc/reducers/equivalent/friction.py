@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.reducers.cycloid.tooth_profile import normals
+from tolalloc.reducers.cycloid.tooth_profile import normals, pole_distance
 from tolalloc.reducers.equivalent.hysteresis import DRAWN, LOST_MOTION, HysteresisLoop, loop_torques
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import SINGLE, Forces, Solved, angles_of_pins
@@ -89,12 +89,10 @@ def sliding_ways(reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"]) -
     A disc turns against the housing about its pole, which lies on the contact's normal. A pin that turns in its groove
     instead of staying there slides in the groove by the same way under the same force.
 
-    References
-    ----------
     Own derivation, theory page (69): R_p·√S is the distance of pin and pole, S = 1 + K1² − 2K1·cos φ.
     """
-    stage, angle = reducer.cycloid_stage, angles_of_pins(reducer, carrier_angle)
-    root = np.sqrt(1.0 + stage.shortening**2 - 2.0 * stage.shortening * np.cos(angle))
+    stage = reducer.cycloid_stage
+    root = pole_distance(stage.shortening, angles_of_pins(reducer, carrier_angle))
     return np.asarray(stage.pin_circle_radius * root - stage.pin_radius)
 
 
@@ -120,8 +118,6 @@ def friction_torques(solved: Solved) -> dict[str, Float[np.ndarray, "sample angl
     T_f = Σ µ·F·way; Coulomb's friction, no seals and no grease (`IdleTorque`); mesh µ·H_v·F·r_b1·(i − 1), of a centre
     gear µ·H_v·F·r_b4·i besides, i the turns of the sun.
 
-    References
-    ----------
     Own derivation by virtual work; H_v Ohlendorf's, bearings µ·P·d/2 as SKF's.
 
     Examples
@@ -210,8 +206,6 @@ def friction_loop(
 ) -> FrictionLoop:
     """Return the loop with friction at the carrier angles [rad].
 
-    References
-    ----------
     Own derivation, theory page (72) to (74).
     """
     if unknown := model.reducer.friction_dimensions.unknown:
@@ -276,8 +270,6 @@ def twist_of_friction(solved: list[Solved]) -> TwistOfFriction:
 
     Δθ = Σ (ΔF/ΔT)·Δway, exact; sliding f = µ·ΣF·|Δs|/Δθ.
 
-    References
-    ----------
     Own derivation, theory page (73).
 
     Examples

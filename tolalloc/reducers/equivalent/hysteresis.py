@@ -100,8 +100,6 @@ def hysteresis_loop(
 
     θ(T) of the equilibria (5) at T = ±share·T_rated, twist in rad; without friction.
 
-    References
-    ----------
     Own derivation; lost motion at ±3 % of the rated torque as catalogues define it.
     """
     torque = loop_torques(model.reducer, shares)
@@ -181,8 +179,6 @@ def own_load_loop(
 
     A spring is displaced by F/K − w(F) along its force F, repeated until the twist changes by less than 1e-8 of it.
 
-    References
-    ----------
     Own derivation, theory page (75).
 
     Examples

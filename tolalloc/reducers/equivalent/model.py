@@ -239,7 +239,7 @@ class EquivalentModel:
 
     def extremes(self, errors: Float[np.ndarray, "sample column"], torque: float) -> TurnExtremes:
         """Return the refined extremes of every sample over one output turn."""
-        return self._searched(errors, torque, np.empty((errors.shape[0], 0)))
+        return self.extremes_and_curve(errors, torque, 0)[0]
 
     def extremes_within(
         self, errors: Float[np.ndarray, "sample column"], torque: float, window: tuple[float, float]
@@ -284,16 +284,12 @@ class EquivalentModel:
         )
 
     def extremes_and_curve(
-        self, errors: Float[np.ndarray, "sample column"], torque: float
+        self, errors: Float[np.ndarray, "sample column"], torque: float, angles: int | None = None
     ) -> tuple[TurnExtremes, Float[np.ndarray, "sample angle"]]:
-        """Return the extremes, and the transmission error at the coarse angles that they were looked for from [rad]."""
-        curve = np.empty((errors.shape[0], self.search.coarse))
-        return self._searched(errors, torque, curve), curve
+        """Return the extremes, and the transmission error at the coarse angles that they were looked for from [rad].
 
-    def _searched(
-        self, errors: Float[np.ndarray, "sample column"], torque: float, curve: Float[np.ndarray, "sample angle"]
-    ) -> TurnExtremes:
-        """Return the extremes, the curve filled as far as there is room."""
+        At the first so many of them, or at all.
+        """
         from tolalloc.reducers.equivalent.solvers.extremes import solve_extremes
 
         samples, search = errors.shape[0], self.search
@@ -304,12 +300,12 @@ class EquivalentModel:
             np.empty(samples, np.int64),
             np.empty(samples, np.uint8),
             np.empty(samples),
-            curve,
+            np.empty((samples, search.coarse if angles is None else angles)),
         )
         solve_extremes(self._discs, self._tables, self._given(errors, torque), search, found)
         self._mark_out_of_range(np.abs(found.extreme).max(axis=1), found.status)
         found.extreme[found.status != CONVERGED] = np.nan
-        return TurnExtremes(
+        extremes = TurnExtremes(
             largest=found.extreme[:, 0],
             smallest=found.extreme[:, 1],
             carrier_angle=(found.position - search.first) * search.node_step,
@@ -318,6 +314,7 @@ class EquivalentModel:
             status=found.status,
             residual=found.residual,
         )
+        return extremes, found.curve
 
     def peak_to_peak_derivatives(
         self, errors: Float[np.ndarray, "sample column"], torque: float

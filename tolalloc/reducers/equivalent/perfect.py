@@ -83,12 +83,13 @@ def preload(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) 
     >>> f"{float(preload(model, exact_unit(model)).pin_force[0]):.2g}"  # 0.01 % of the rated torque alone [N]
     '0.23'
     """
-    return _preload_of(model.reducer, _without_torque(model, errors))
+    return _preload_of(_without_torque(model, errors))
 
 
-def _preload_of(reducer: Reducer, solved: Solved) -> Preload:
+def _preload_of(solved: Solved) -> Preload:
     """Return what presses, from equilibria and forces without torque."""
-    found, ways = solved.forces.pins, sliding_ways(reducer, TURN_ANGLES)
+    reducer, found = solved.equilibria.reducer, solved.forces.pins
+    ways = sliding_ways(reducer, TURN_ANGLES)
     return Preload(
         pin_force=np.asarray(found.max(axis=(1, 2, 3))),
         friction_torque=reducer.friction.pins * np.einsum("sadp,adp->sa", found, ways).max(axis=1),
@@ -98,12 +99,8 @@ def _preload_of(reducer: Reducer, solved: Solved) -> Preload:
 
 def _without_torque(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) -> Solved:
     """Return equilibria and forces over an output turn under the torque at which backlash is read."""
-    torque = _least_torque(model.reducer)
+    torque = -BACKLASH * model.reducer.load.rated_torque
     return Solved.of(model.at_torque(torque).equilibria(errors, torque, TURN_ANGLES))
-
-
-def _least_torque(reducer: Reducer) -> float:
-    return -BACKLASH * reducer.load.rated_torque
 
 
 Derived = tuple[Preload, Float[np.ndarray, "sample column"]]
@@ -148,10 +145,9 @@ def _derived(
     weights: Float[np.ndarray, "sample disc pin"],
 ) -> Derived:
     """Return what presses, and the derivatives of the weighted sum of the forces at one angle of every sample."""
-    torque = _least_torque(model.reducer)
-    errors = solved.equilibria.errors
+    errors, torque = solved.equilibria.errors, solved.equilibria.torque
     found = model.at_torque(torque).pin_force_derivatives(errors, torque, TURN_ANGLES, at, weights)
-    return _preload_of(model.reducer, solved), found.by_error
+    return _preload_of(solved), found.by_error
 
 
 @lru_cache(maxsize=256)
@@ -180,8 +176,6 @@ def twist_shares(reducer: Reducer) -> tuple[TwistShare, ...]:
 
     T·θ = Σ F²/K over all springs, K of parts in series shared as 1/K_part; at rated torque, shares of 1.
 
-    References
-    ----------
     Own derivation, theory page (68).
 
     Examples

@@ -12,14 +12,14 @@ from jaxtyping import Float
 
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import MICROMETRE
-from tolalloc.reducers.cycloid.tooth_profile import path_curvature
+from tolalloc.reducers.cycloid.tooth_profile import path_curvature, pole_distance
 from tolalloc.reducers.equivalent.friction import sliding_ways
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import Solved, angles_of_pins
 from tolalloc.reducers.equivalent.perfect import PHASES, perfect_reducer
 from tolalloc.reducers.load_case import LoadCase, require_duty
-from tolalloc.reducers.reducer.design import CycloidStage, Reducer, thermal_shift
+from tolalloc.reducers.reducer.design import Reducer, thermal_shift
 from tolalloc.reducers.reducer.form import LARGEST_FREE, FlankForm, PartForm
 
 STEP = 1.0 * MICROMETRE
@@ -116,7 +116,7 @@ def flank_depth_per_force(reducer: Reducer, angle: Float[np.ndarray, "*angles"])
     [0.001, 0.01, 0.016]
     """
     stage = reducer.cycloid_stage
-    rolling = stage.pin_radius / (stage.pin_circle_radius * _root(stage, angle))
+    rolling = stage.pin_radius / (stage.pin_circle_radius * pole_distance(stage.shortening, angle))
     bend = 1.0 + stage.pin_radius * path_curvature(stage, angle)
     return np.asarray(reducer.friction.wear / stage.face_width * np.abs(1.0 - rolling) / bend)
 
@@ -133,11 +133,6 @@ def pin_depth_per_work(reducer: Reducer) -> float:
     stage = reducer.cycloid_stage
     area = 2.0 * pi * stage.pin_radius * stage.face_width * reducer.disc_count
     return reducer.friction.wear / area
-
-
-def _root(stage: CycloidStage, angle: Float[np.ndarray, "*angles"]) -> Float[np.ndarray, "*angles"]:
-    """Return √S, the distance of pin and pole over R_p [-]."""
-    return np.asarray(np.sqrt(1.0 + stage.shortening**2 - 2.0 * stage.shortening * np.cos(angle)))
 
 
 @lru_cache(maxsize=32)  # every question about the same drawing asks again

@@ -86,14 +86,10 @@ class KernelResponse:
         """Return the response of the same reducer with another tooth modification."""
         return replace(self, fixed={**self.fixed, **modification.deviations})
 
-    def at_disc_temperature(self, warmer: float) -> KernelResponse:
-        """Return the response of the same reducer whose discs are warmer than the ring by so much [K]."""
-        return replace(self, disc_temperature=warmer)
-
     def under(self, case: LoadCase) -> KernelResponse:
         """Return the response of the same reducer under a load case, which keeps what it does not state."""
-        kernel = self if case.disc_temperature is None else self.at_disc_temperature(case.disc_temperature)
-        kernel = replace(kernel, window=case.window)
+        warmer = self.disc_temperature if case.disc_temperature is None else case.disc_temperature
+        kernel = replace(self, window=case.window, disc_temperature=warmer)
         if case.torque is None:
             return kernel
         own = self.model

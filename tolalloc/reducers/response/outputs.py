@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -104,18 +103,11 @@ def _load(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]
     solved = Solved.of(model.at_torque(torque).equilibria(errors, torque, TURN_ANGLES))
     every = outputs_of(model.reducer)
     own = [every[name][1](solved) for name in _FORCES[model.reducer.family]]
-    values = np.stack([*own, *_pin_stress(solved)], axis=1)
-    return values, np.asarray(solved.equilibria.status.max(axis=1))
-
-
-def _pin_stress(solved: Solved) -> tuple[Float[np.ndarray, " chunk"], Float[np.ndarray, " chunk"]]:
-    """Return the largest line load [N/mm] and the largest Hertz pressure [MPa] of pins and teeth.
-
-    Both at the deeper end of a tooth whose disc is tilted; the force spreads evenly where no disc is.
-    """
+    # At the deeper end of a tooth whose disc is tilted; the force spreads evenly where no disc is.
     line_load = peak_line_load(solved.equilibria, solved.forces)
     pressure = unit_pressure(solved.equilibria) * np.sqrt(line_load)
-    return line_load.max(axis=(1, 2, 3)) * MILLIMETRE, pressure.max(axis=(1, 2, 3)) / MEGAPASCAL
+    own += [line_load.max(axis=(1, 2, 3)) * MILLIMETRE, pressure.max(axis=(1, 2, 3)) / MEGAPASCAL]
+    return np.stack(own, axis=1), np.asarray(solved.equilibria.status.max(axis=1))
 
 
 def _preload(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
@@ -124,11 +116,7 @@ def _preload(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_column
 
 
 def _radial_clearance(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
-    return _clearance_of(kernel.model, errors)
-
-
-def _clearance_of(model: EquivalentModel, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
-    clearance = radial_clearance(model, errors)[:, np.newaxis] / MICROMETRE
+    clearance = radial_clearance(kernel.model, errors)[:, np.newaxis] / MICROMETRE
     status = np.where(np.isfinite(clearance[:, 0]), Status.CONVERGED, Status.NOT_FINITE)
     return clearance, status.astype(np.uint8)
 
@@ -273,9 +261,8 @@ class OutputsResponse:
         """Return the outputs of one chunk and the worst status of every sample."""
         errors = self.kernel.errors(x)
         answers = [reading.read(self.kernel, errors) for reading in self.readings]
-        return np.concatenate([values for values, _ in answers], axis=1), np.asarray(
-            np.max([status for _, status in answers], axis=0)
-        )
+        worst = np.max([status for _, status in answers], axis=0)
+        return np.concatenate([values for values, _ in answers], axis=1), np.asarray(worst)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -312,7 +299,8 @@ class LoadCasesResponse:
         return np.asarray((combined.weights(own) * own).sum(axis=1))
 
 
-def _loop_derivatives(output: str, model: EquivalentModel, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
+def _loop_derivatives(output: str, kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
+    model = kernel.model
     if output != TORSIONAL_STIFFNESS:
         share = hysteresis.LOST_MOTION if output == LOST_MOTION else hysteresis.BACKLASH
         (width, slope), status = _width(model, errors, share)
@@ -333,34 +321,32 @@ def _width(
     width, slope = np.zeros(len(errors)), np.zeros(errors.shape)
     status = np.full(len(errors), Status.CONVERGED, np.uint8)
     for side in (1, -1):
-        twist, found = model.at_torque(side * torque).rotation_derivatives(
-            errors, side * torque, hysteresis.TURN_ANGLES
-        )
+        twist, found = model.at_torque(side * torque).rotation_derivatives(errors, side * torque, TURN_ANGLES)
         width += side * twist.mean(axis=1)
         slope += side * found.by_error.reshape(*twist.shape, -1).mean(axis=1)
         np.maximum(status, found.status.reshape(twist.shape).max(axis=1), out=status)
     return (width, slope), status
 
 
-def _preload_derivatives(
-    output: Literal["pin_force", "friction_torque"],
-    model: EquivalentModel,
-    errors: Float[np.ndarray, "chunk all_columns"],
-) -> Derived:
-    derived = pin_force_derivatives if output == "pin_force" else friction_torque_derivatives
-    found, slopes = derived(model, errors)
-    return getattr(found, output), slopes, found.status
+def _pin_force_derivatives(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
+    found, slopes = pin_force_derivatives(kernel.model, errors)
+    return found.pin_force, slopes, found.status
 
 
-def _clearance_derivatives(model: EquivalentModel, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
-    clearance, status = _clearance_of(model, errors)
-    return clearance[:, 0], radial_clearance_derivatives(model, errors) / MICROMETRE, status
+def _friction_torque_derivatives(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
+    found, slopes = friction_torque_derivatives(kernel.model, errors)
+    return found.friction_torque, slopes, found.status
 
 
-_DERIVED: dict[str, Callable[[EquivalentModel, Float[np.ndarray, "chunk all_columns"]], Derived]] = {
+def _clearance_derivatives(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
+    clearance, status = _radial_clearance(kernel, errors)
+    return clearance[:, 0], radial_clearance_derivatives(kernel.model, errors) / MICROMETRE, status
+
+
+_DERIVED: dict[str, Callable[[KernelResponse, Float[np.ndarray, "chunk all_columns"]], Derived]] = {
     **{name: partial(_loop_derivatives, name) for name in (LOST_MOTION, BACKLASH, TORSIONAL_STIFFNESS)},
-    PRELOAD: partial(_preload_derivatives, "pin_force"),
-    FRICTION_TORQUE: partial(_preload_derivatives, "friction_torque"),
+    PRELOAD: _pin_force_derivatives,
+    FRICTION_TORQUE: _friction_torque_derivatives,
     RADIAL_CLEARANCE: _clearance_derivatives,
 }
 
@@ -388,4 +374,4 @@ def output_derivatives(
 
 
 def _derived(kernel: KernelResponse, output: str, x: Float[np.ndarray, "chunk column"]) -> Derived:
-    return _DERIVED[output](kernel.model, kernel.errors(x))
+    return _DERIVED[output](kernel, kernel.errors(x))
