@@ -437,12 +437,10 @@ class ReducerModel(Model):
             raise ValueError(reason)
         from tolalloc.reducers.equivalent.peak_bounds import PeakBounds
 
-        def errors(
-            x: Float[np.ndarray, "unit column"], settings: Float[np.ndarray, " setting"]
-        ) -> Float[np.ndarray, "unit all_columns"]:
-            return (self.at(settings) if settings.size else self).kernel.errors(x)
-
-        return PeakBounds.of(self.kernel.model, self.kernel.torque, units, designs, errors)
+        return PeakBounds.of(
+            *(self.kernel.model, self.kernel.torque, units, designs),
+            errors=lambda x, settings: (self.at(settings) if settings.size else self).kernel.errors(x),
+        )
 
     @property
     def _peak_with_stiffness(self) -> StiffnessResponse:

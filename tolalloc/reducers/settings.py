@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 from tolalloc.models.settings import Setting
-from tolalloc.reading.named_fields import number
+from tolalloc.reading.named_fields import is_number, number
 
 FLANK = "flank clearance [µm]"
 RADIAL = "radial clearance [µm]"
@@ -18,6 +19,12 @@ TEMPERATURE = number(
     f"−{FARTHEST_TEMPERATURE:g} to {FARTHEST_TEMPERATURE:g} K", least=-FARTHEST_TEMPERATURE, most=FARTHEST_TEMPERATURE
 )
 """Rule of a difference of temperature between discs and ring."""
+
+
+def is_range(value: Any, farthest: float) -> bool:
+    """Return whether a value is two numbers, neither beyond the farthest to either side, the smaller one first."""
+    pair = isinstance(value, Sequence) and len(value) == 2 and all(map(is_number, value))
+    return pair and -farthest <= value[0] <= value[1] <= farthest
 
 
 def clearance_settings(present: Sequence[float], bounds: Iterable[tuple[float, float] | None]) -> tuple[Setting, ...]:

@@ -321,11 +321,10 @@ def units_text(units: Sequence[BuiltUnit], path: str | Path, comments: Sequence[
                 f"{path}: units {units[0].name} and {unit.name} do not both state {column}; units of one table state "
                 "the same columns."
             )
-    angle = [_is_angle(column) for column in columns]
-    headers = [f"{column} [{'µrad' if turns else 'µm'}]" for column, turns in zip(columns, angle, strict=True)]
-    factors = [MICRORADIAN if turns else MICROMETRE for turns in angle]
+    written = {own: ("µrad", MICRORADIAN) if _is_angle(own) else ("µm", MICROMETRE) for own in columns}
+    headers = [f"{column} [{name}]" for column, (name, _) in written.items()]
     rows = (
-        [unit.name, *(float(unit.deviations[column]) / factor for column, factor in zip(columns, factors, strict=True))]
+        [unit.name, *(float(unit.deviations[column]) / factor for column, (_, factor) in written.items())]
         for unit in units
     )
     return table_text(["unit", *headers], rows, comments)

@@ -45,9 +45,7 @@ def linear_clearance(
 ) -> Float[np.ndarray, "*angles"]:
     """Return the material removed along the normal, Δr_rp − Δr_p·cos κ + δ·r_d·|S|, theory page equation (35) [m].
 
-    First order in the amounts: good to 0.3 µm up to `LARGE`.
-
-    Good to 0.3 µm on the working flanks up to amounts of about 50 µm; cos κ and S of `normals`.
+    First order in the amounts: good to 0.3 µm on the working flanks up to `LARGE`; cos κ and S of `normals`.
 
     References
     ----------
@@ -85,14 +83,6 @@ def formula_gap(stage: CycloidStage, modification: Modification, pin_angle: Angl
     References
     ----------
     xi2015, equation (3).
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> stage, amounts = load_reducer("rv40e_xi2015").cycloid_stage, Modification(equidistant=-2e-6, shift=-8e-6)
-    >>> found = formula_gap(stage, amounts, np.array([0.0, np.arccos(stage.shortening), pi]))
-    >>> [f"{abs(gap):.3f}" for gap in 1e6 * found]  # root, φ0 and tip [µm]
-    ['6.000', '0.000', '6.000']
     """
     into = normals(stage.shortening, pin_angle)
     shift = into.along_radius - stage.flank_ratio * into.lever
@@ -188,7 +178,6 @@ def clearance_of(profile: ToothProfile, exact: bool | None = None) -> FlankClear
     """Return the clearance of a sound profile and where the first pin truly touches.
 
     Distances are exact by default only where the modification is too large for the linear formula.
-
     """
     from scipy.optimize import brentq
 

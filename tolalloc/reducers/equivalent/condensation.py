@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.reducers.equivalent.columns import Columns, columns_of
 from tolalloc.reducers.equivalent.interfaces import PinContact, pin_contact
 from tolalloc.reducers.equivalent.springs import Coordinates, Positions, SpringGroup, harmonic_waves
 from tolalloc.reducers.families.known import family_of
@@ -54,11 +53,6 @@ class CondensedAngles(NamedTuple):
 def bilateral_groups(at: Positions) -> list[SpringGroup]:
     """Return all spring groups but the pin contact."""
     return family_of(at.reducer).groups(at)
-
-
-def error_columns(reducer: Reducer, orders: tuple[int, ...]) -> Columns:
-    """Return the error columns of a reducer with harmonic deviations of the given orders [-]."""
-    return columns_of(reducer, bilateral_groups(Positions(reducer, np.zeros(1), orders)), orders)
 
 
 def rotation_scale(reducer: Reducer, coordinates: Coordinates) -> Float[np.ndarray, " coordinate"]:

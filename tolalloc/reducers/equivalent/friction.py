@@ -30,15 +30,7 @@ def _interpolated(
     levels: Float[np.ndarray, " level"] | Float[np.ndarray, "sample level"],
     values: Float[np.ndarray, " level"] | Float[np.ndarray, "sample level"],
 ) -> Float[np.ndarray, "sample step"]:
-    """Return the values of every sample between its levels, straight from one to the next and constant beyond.
-
-    y = y_k + (x − x_k)·(y_(k+1) − y_k)/(x_(k+1) − x_k), own derivation; levels ascend.
-
-    Examples
-    --------
-    >>> _interpolated(np.array([[0.5, 3.0]]), np.array([0.0, 1.0]), np.array([10.0, 20.0])).tolist()
-    [[15.0, 20.0]]
-    """
+    """Return the values of every sample between its ascending levels, straight between two and constant beyond."""
     samples = at.shape[0]
     every = (np.broadcast_to(given, (samples, given.shape[-1])) for given in (levels, values))
     return np.stack([np.interp(*row) for row in zip(at, *every, strict=True)])
@@ -204,10 +196,7 @@ class FrictionLoop:
 def friction_loop(
     model: EquivalentModel, errors: Float[np.ndarray, "sample column"], carrier_angle: Float[np.ndarray, " angle"]
 ) -> FrictionLoop:
-    """Return the loop with friction at the carrier angles [rad].
-
-    Own derivation, theory page (72) to (74).
-    """
+    """Return the loop with friction at the carrier angles [rad]; own derivation, theory page (72) to (74)."""
     if unknown := model.reducer.friction_dimensions.unknown:
         raise ValueError(f"{model.reducer.name}: no dimensions of {', '.join(unknown)}")
     levels = loop_torques(model.reducer, DRAWN)

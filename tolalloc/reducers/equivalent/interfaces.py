@@ -67,9 +67,7 @@ def _tilt(part: str, **other: Any) -> ErrorSource:
 def sun_support(at: Positions) -> SpringGroup:
     """Return the two support springs of the sun gear, theory page equation (6).
 
-    ``sun.assembly`` is (a_SX, a_SY), fixed in the housing [m].
-
-    δ = Xs − a_SX, Ys − a_SY.
+    ``sun.assembly`` is (a_SX, a_SY), fixed in the housing [m]; δ = Xs − a_SX, Ys − a_SY.
 
     References
     ----------
@@ -171,11 +169,6 @@ def lever(radius: float, direction: Float[np.ndarray, " angle"]) -> Float[np.nda
     """Return the movement, per radian of its part, of a point at a radius and direction [m/rad].
 
     r·(−sin, cos) of the direction, own derivation: the derivative of the point's place.
-
-    Examples
-    --------
-    >>> lever(0.027, np.zeros(1)).tolist()  # a point to the right goes up
-    [[-0.0, 0.027]]
     """
     return radius * np.stack([-np.sin(direction), np.cos(direction)], axis=-1)
 
@@ -286,9 +279,7 @@ CRANK_CARRIER = Interface(
 def carrier_support(at: Positions) -> SpringGroup:
     """Return the two springs of the carrier's bearing in the housing, theory page equation (12).
 
-    ``carrier.assembly`` is (a_cx, a_cy), fixed in the housing [m].
-
-    δ = Xca − a_cx, Yca − a_cy [m].
+    ``carrier.assembly`` is (a_cx, a_cy), fixed in the housing [m]; δ = Xca − a_cx, Yca − a_cy.
 
     References
     ----------
@@ -298,7 +289,7 @@ def carrier_support(at: Positions) -> SpringGroup:
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> group = carrier_support(Positions(load_reducer("rv20e_liu2020"), np.zeros(1)))
-    >>> group.columns, group.error[0].tolist()  # δ = Xca − a_cx, Yca − a_cy
+    >>> group.columns, group.error[0].tolist()
     (('carrier.assembly.x', 'carrier.assembly.y'), [[-1.0, -0.0], [-0.0, -1.0]])
     """
     return support(at, at.coordinates.carrier, "carrier bearing", "carrier_bearing", "carrier")

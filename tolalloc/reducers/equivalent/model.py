@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int, Integer, UInt8, UInt16
 
-from tolalloc.reducers.equivalent.columns import Columns
-from tolalloc.reducers.equivalent.condensation import CondensedAngles, condense, error_columns
+from tolalloc.reducers.equivalent.columns import Columns, columns_of
+from tolalloc.reducers.equivalent.condensation import CondensedAngles, bilateral_groups, condense
 from tolalloc.reducers.equivalent.solvers.records import (
     CONVERGED,
     NOT_CONVERGED,
@@ -27,7 +27,7 @@ from tolalloc.reducers.equivalent.solvers.records import (
     SolverDesign,
     design_of,
 )
-from tolalloc.reducers.equivalent.springs import HARMONICS
+from tolalloc.reducers.equivalent.springs import HARMONICS, Positions
 from tolalloc.reducers.reducer.design import Reducer, at_torque
 from tolalloc.reducers.reducer.form import PartForm
 
@@ -150,7 +150,8 @@ class EquivalentModel:
     @cached_property
     def error_columns(self) -> Columns:
         """The error columns and the values that they move."""
-        return error_columns(self.reducer, self.orders)
+        groups = bilateral_groups(Positions(self.reducer, np.zeros(1), self.orders))
+        return columns_of(self.reducer, groups, self.orders)
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -73,12 +73,10 @@ class Forces:
 
 
 def forces(equilibria: Equilibria) -> Forces:
-    """Return the forces in all interfaces.
+    """Return the forces in all interfaces, NaN where nothing converged.
 
-    Stiffness times compression of every row, theory page equation (5); pins by their law, equations (30) and (31),
-    elements with play by equation (28).
-
-    F = k·δ, own derivation; NaN where nothing converged.
+    Stiffness times compression of every row, F = k·δ, theory page equation (5); pins by their law, equations (30) and
+    (31), elements with play by equation (28).
     """
     from tolalloc.reducers.equivalent.solvers.turn import solve_forces
 
@@ -104,11 +102,11 @@ class Orders:
     phase: Float[np.ndarray, "sample order"]  # Angle by which the wave, written as a cosine, leads [rad]
     angles: int  # Angles that they are read from [-]
 
-    def main(self, count: int, sample: int = 0) -> list[tuple[float, float, float]]:
-        """Return the strongest orders of one sample that are some, with amplitude and phase [rad], strongest first."""
-        own = self.amplitude[sample]
+    def main(self, count: int) -> list[tuple[float, float, float]]:
+        """Return the strongest orders of the first sample that are some, with amplitude and phase [rad]."""
+        own = self.amplitude[0]
         strongest = [at for at in np.argsort(-own)[:count] if own[at] > _ROUNDING * own.max()]
-        return [(float(self.order[at]), float(own[at]), float(self.phase[sample, at])) for at in strongest]
+        return [(float(self.order[at]), float(own[at]), float(self.phase[0, at])) for at in strongest]
 
 
 def _waves(
@@ -125,12 +123,6 @@ def fitted_waves(
     """Return orders of curves, cosine less i times sine amplitudes, by least squares: at any angles, of open turns too.
 
     min Σ(y − y₀ − Re Σ w·e^(inθ))², own derivation; every order that is strong must be among them.
-
-    Examples
-    --------
-    >>> angle = np.linspace(0.0, 6.0, 20)
-    >>> fitted_waves(angle, 2.0 * np.cos(1.37 * angle)[np.newaxis], np.array([1.37])).round(9).tolist()
-    [[(2+0j)]]
     """
     turn = np.exp(1j * np.outer(angle, order))
     basis = np.hstack([np.ones((angle.size, 1)), turn.real, turn.imag])
@@ -195,15 +187,7 @@ class Solved:
 
 
 def load_share(pins: Float[np.ndarray, "sample angle disc pin"]) -> Float[np.ndarray, "sample disc"]:
-    """Return the share of all pin force that each disc carries, mean over the turn [-].
-
-    Σ_disc F/Σ F, own derivation.
-
-    Examples
-    --------
-    >>> load_share(np.array([[[[100.0, 200.0], [0.0, 100.0]]]])).tolist()  # two discs with two pins
-    [[0.75, 0.25]]
-    """
+    """Return the share of all pin force that each disc carries over the turn, Σ_disc F/Σ F, own derivation [-]."""
     total = pins.sum(axis=(1, 3))
     return np.asarray(total / total.sum(axis=1, keepdims=True))
 
@@ -363,13 +347,9 @@ def peak_line_load(equilibria: Equilibria, forces: Forces) -> Float[np.ndarray, 
 
 
 def unit_pressure(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]:
-    """Return Hertz's peak pressure under a line load of 1 N/m; it grows with the root of the line load [Pa].
+    """Return Hertz's peak pressure under a line load of 1 N/m, √(E*/(πR)) per √(N/m), as `peak_pressure` [Pa].
 
-    p = √(E*/(πR)) per √(N/m).
-
-    References
-    ----------
-    Hertz's line contact, as `peak_pressure`.
+    It grows with the root of the line load.
     """
     reducer, pin_angle = equilibria.reducer, angles_of_pins(equilibria.reducer, equilibria.carrier_angle)
     even = np.full_like(pin_angle, reducer.cycloid_stage.face_width)
@@ -416,8 +396,7 @@ def contact_pattern(
     disc
         Number of the disc, 1 for the first [-].
     carrier_angle
-        Carrier angle; unless given, the coarse angle of the model's search at which the disc's line load is largest
-        [rad].
+        Unless given, the coarse angle of the model's search at which the disc's line load is largest [rad].
     positions
         Places along the width [-].
 

@@ -258,18 +258,9 @@ class PeakBounds:
         designs: Float[np.ndarray, "design variable"],
         errors: Callable[[Float[np.ndarray, "unit column"], Float[np.ndarray, " setting"]], Float[np.ndarray, "..."]],
     ) -> PeakBounds:
-        """Return the bounds of units, sharpest near some designs.
+        """Return the bounds of units, sharpest near some designs, scales [-] and settings.
 
-        Parameters
-        ----------
-        model, torque
-            The equivalent model and the torque on its carrier [N·m].
-        units
-            Random units over the scales.
-        designs
-            Scales [-] and settings of the designs whose extreme angles are taken.
-        errors
-            From deviations and settings, in which they are linear, all columns of the model [m, angles rad].
+        The errors are all columns of the model, from deviations and settings, in which they are linear [m, angles rad].
         """
         count, groups, variables = len(units.standard), units.groups, designs.shape[1]
         every = np.concatenate([np.zeros((1, variables)), np.eye(variables)])

@@ -33,10 +33,7 @@ def exact_unit(model: EquivalentModel) -> Float[np.ndarray, "1 column"]:
 
 
 def exact_loop(reducer: Reducer) -> HysteresisLoop:
-    """Return torque against twist of the unit whose parts are exact.
-
-    Loop of `hysteresis_loop` with all errors 0 and the modification, own derivation.
-    """
+    """Return torque against twist of the unit whose parts are exact and whose teeth are modified as drawn."""
     model = EquivalentModel(reducer)
     return hysteresis_loop(model, exact_unit(model), TURN_ANGLES)
 
@@ -44,15 +41,9 @@ def exact_loop(reducer: Reducer) -> HysteresisLoop:
 def perfect_reducer(reducer: Reducer, torque: float) -> Solved:
     """Return equilibria and forces of exact parts over one pin pitch of the crank.
 
-    Its modification and the stiffness of its parts under the torque are in force. While the carrier turns by a pin
-    pitch over the teeth of a disc, the crank direction meets every phase of the pins, and all else repeats.
-
-    Parameters
-    ----------
-    torque
-        Torque on the carrier, negative where it resists the rotation [N·m].
-
-    Own derivation: everything repeats after 2π/(zp·zc) of the carrier, over which 72 equilibria are solved.
+    Its modification and the stiffness of its parts under the torque on the carrier, negative where it resists the
+    rotation [N·m], are in force. While the carrier turns by a pin pitch over the teeth of a disc, 2π/(zp·zc), the crank
+    direction meets every phase of the pins, and all else repeats: own derivation.
     """
     model, stage = EquivalentModel(at_torque(reducer, torque)), reducer.cycloid_stage
     span = 2.0 * pi / (stage.pin_count * stage.disc_teeth)
@@ -152,10 +143,7 @@ def _derived(
 
 @lru_cache(maxsize=256)
 def rated_pin_force(reducer: Reducer) -> float:
-    """Return the largest force of a pin of exact parts under their rated torque [N].
-
-    Largest force of `perfect_reducer`, own derivation; sign of the torque: it resists.
-    """
+    """Return the largest force of a pin of exact parts under their rated torque, which resists [N]; own derivation."""
     return float(perfect_reducer(reducer, -reducer.load.rated_torque).forces.pins.max())
 
 

@@ -25,11 +25,8 @@ _STANDS_OFF = Characteristic("coaxiality", "how far the shaft stands off is draw
 def shaft_support(at: Positions) -> SpringGroup:
     """Return the two springs of the input shaft's bearings, theory page equation (89).
 
-    ``shaft.assembly`` is (a_x, a_y), fixed in the housing [m].
-
-    δ = X − a_x, Y − a_y [m].
-
-    Own derivation, as liu2020's of the sun.
+    ``shaft.assembly`` is (a_x, a_y), fixed in the housing [m]; δ = X − a_x, Y − a_y, own derivation, as liu2020's of
+    the sun.
     """
     return support(at, at.coordinates.input, "shaft bearing", "shaft_support", "shaft")
 

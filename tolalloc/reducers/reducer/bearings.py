@@ -333,6 +333,8 @@ class Friction:
 class FrictionDimensions:
     """Dimensions from which friction follows; none where a file states a stiffness instead."""
 
+    contacts: ClassVar[tuple[str, ...]] = tuple(CONTACTS)  # Kinds of contact that have a coefficient of friction
+
     crank_disc_bearing: RollingBearing | None = None  # One journal's
     crank_carrier_bearing: RollingBearing | None = None  # Both of one crankshaft as rows of one
     carrier_bearing: RollingBearing | None = None
@@ -348,25 +350,17 @@ class FrictionDimensions:
         known = all(ratio is not None and ratio <= LARGEST_CONTACT_RATIO for ratio in meshes)
         return bearings if known else (*bearings, "gear_mesh")
 
-    @property
-    def contacts(self) -> tuple[str, ...]:
-        """Kinds of contact that have a coefficient of friction."""
-        return tuple(CONTACTS)
-
 
 @dataclass(frozen=True, kw_only=True)
 class SingleStageFriction(FrictionDimensions):
     """Those of a single stage, whose file states no bearing by its dimensions: pins and teeth alone are known."""
 
+    contacts: ClassVar[tuple[str, ...]] = ("pins",)
+
     @property
     def unknown(self) -> tuple[str, ...]:
         """Kinds of contact whose friction does not follow from what the file states."""
         return ("eccentric_bearing", "output_pin", "carrier_bearing")
-
-    @property
-    def contacts(self) -> tuple[str, ...]:
-        """Kinds of contact that have a coefficient of friction."""
-        return ("pins",)
 
 
 def loss_factor(first_teeth: int, second_teeth: int, contact_ratio: float) -> float:
@@ -387,13 +381,9 @@ def friction_assumptions(friction: Friction, dimensions: FrictionDimensions) -> 
     """Return what the numbers on friction take for granted, and what they leave out."""
     coefficients = ", ".join(f"{CONTACTS[name]} {friction.coefficients[name]:g}" for name in dimensions.contacts)
     unknown = ", ".join(CONTACTS.get(name, name.replace("_", " ")) for name in dimensions.unknown)
-    known = f"friction of {unknown}: not known, because the file states a stiffness and no dimensions"
+    left_out = f"friction of {unknown}: not known, because the file states a stiffness and no dimensions"
     return (
         f"coefficients of friction: {coefficients}; the same at every speed and temperature",
         "friction: Coulomb's, at the forces without friction; no churning of gears and discs, no flanges of rollers",
-        *(
-            [f"friction of {unknown}: not known, because the file states a stiffness and no dimensions"]
-            if unknown
-            else []
-        ),
+        *([left_out] if unknown else []),
     )

@@ -133,9 +133,8 @@ def checked_correlation(
             raise InputError.at(place, entry, float(value), f"{matrix[column, row]:g}, as in the mirrored place")
     smallest = float(np.linalg.eigvalsh(matrix)[0]) if size else 0.0
     if smallest < -ROUNDING:
-        raise InputError.at(
-            place, "smallest eigenvalue of correlation", smallest, "0 or more, else no such values exist"
-        )
+        allowed = "0 or more, else no such values exist"
+        raise InputError.at(place, "smallest eigenvalue of correlation", smallest, allowed)
     return matrix
 
 

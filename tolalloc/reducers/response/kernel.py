@@ -247,14 +247,8 @@ class StiffnessResponse:
 def principal_axes(covariance: Float[np.ndarray, "stiffness stiffness"]) -> Float[np.ndarray, "axis stiffness"]:
     """Return one standard deviation along every principal axis of a covariance, upwards on the whole [-].
 
-    Axes √λ·q of C·q = λ·q with λ > 0 (own derivation): C is the sum of their squares.
-
-    Examples
-    --------
-    Two stiffnesses that are uncertain together, by 30 % each, have one axis.
-
-    >>> principal_axes(np.full((2, 2), 0.09)).round(3).tolist()
-    [[0.3, 0.3]]
+    Axes √λ·q of C·q = λ·q with λ > 0 (own derivation): C is the sum of their squares. Two stiffnesses that are
+    uncertain together have one axis.
     """
     variance, axes = np.linalg.eigh(covariance)
     kept = variance > _LEAST_AXIS * max(variance[-1], 0.0)

@@ -145,10 +145,7 @@ _REQUIREMENTS = {
 
 
 def requirements_of(reducer: Reducer) -> tuple[Reading, ...]:
-    """Return what a requirement may limit without friction.
-
-    Transmission error, torque against twist, rated load, preload, gap at tip and root.
-    """
+    """Return what a requirement may limit without friction."""
     return _REQUIREMENTS[reducer.family]
 
 
@@ -181,14 +178,9 @@ def _waves(
 
 
 def orders_reading(orders: tuple[float, ...]) -> Reading:
-    """Return the reading of the waves of the transmission error, cosine and sine of every order.
+    """Return the reading of the waves of the transmission error, cosine and sine of every order [arcsec].
 
-    The waves are those of `tolalloc.reducers.equivalent.outputs.fitted_waves`, own derivation [arcsec].
-
-    Examples
-    --------
-    >>> orders_reading((2,)).outputs
-    ('order 2 cosine [arcsec]', 'order 2 sine [arcsec]')
+    The waves are those of `tolalloc.reducers.equivalent.outputs.fitted_waves`, own derivation.
     """
 
     def read(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
@@ -202,11 +194,6 @@ def with_orders(readings: tuple[Reading, ...], orders: tuple[float, ...]) -> tup
     """Return the readings and that of the waves, which are read off the curve that a peak-to-peak is searched on.
 
     As `orders_reading`, own derivation; the curve's angles are those of the coarse search.
-
-    Examples
-    --------
-    >>> [name for reading in with_orders((), (3,)) for name in reading.outputs]
-    ['order 3 cosine [arcsec]', 'order 3 sine [arcsec]']
     """
 
     def read(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
