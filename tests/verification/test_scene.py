@@ -63,7 +63,7 @@ def test_parts_stand_where_the_kinematics_of_the_model_put_them(seed):
     at = Positions(reducer, angle)
 
     def place(part, number, radius):
-        return radius * np.exp(1j * np.array([scene.angle(part, own, number) for own in angle]))
+        return radius * np.exp(1j * np.array([scene.start[part][number] + scene.turns[part] * own for own in angle]))
 
     outline = scene.outline
     circle, eccentricity = reducer.crank_circle_radius / MILLIMETRE, reducer.cycloid_stage.eccentricity / MILLIMETRE

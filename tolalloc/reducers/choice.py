@@ -193,12 +193,12 @@ class ReducerChoice:
         # Without a range a clearance is not chosen by an allocation; whoever states one may state any.
         known = clearance_settings(present, (own or (-_FARTHEST, _FARTHEST) for own in self._ranges))
         require_settings(place, known, clearances)
+        changed = replace(self, torque=torque, disc_temperature=warmer)
         if not clearances:
-            return replace(self, torque=torque, disc_temperature=warmer)
+            return changed
         turned, flank, radial = (clearances.get(setting.name, setting.value) * MICROMETRE for setting in known)
         modification = Modification.from_clearances(flank, radial, stage, turned)
-        reducer = replace(self.reducer, modification=modification)
-        return replace(self, torque=torque, disc_temperature=warmer, reducer=reducer)
+        return replace(changed, reducer=replace(self.reducer, modification=modification))
 
     def shared_lines(self, stated: Mapping[str, Hashable]) -> Mapping[str, str]:
         """Return the line of the drawing of every source: discs, cranks, planets, bores and journals are alike."""

@@ -31,6 +31,7 @@ from tolalloc.reducers.response.kernel import (
     SEEN,
     KernelResponse,
     OutputsWithStiffness,
+    Samples,
     StiffnessResponse,
     principal_axes,
     stiffness_source,
@@ -263,7 +264,7 @@ class ReducerModel(Model):
         """What is read off torque against twist, what presses without torque, and the gap at tip and root."""
         return self._everywhere(DIFFERENTIABLE)
 
-    def derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+    def derivatives(self, output: str, x: Samples) -> SettingDerivatives:
         """Return the peak-to-peak, or an output of `differentiable`, of every sample with its derivatives."""
         if output in self._combined:
             return self._combined_derivatives(self._combined[output], x)
@@ -282,9 +283,7 @@ class ReducerModel(Model):
             by_setting=found.by_modification[:, : len(self._amounts)] @ self._modification_by_clearance * MICROMETRE,
         )
 
-    def _combined_derivatives(
-        self, combined: OverLoadCases, x: Float[np.ndarray, "sample column"]
-    ) -> SettingDerivatives:
+    def _combined_derivatives(self, combined: OverLoadCases, x: Samples) -> SettingDerivatives:
         """Return the derivatives of what is made of an output under several load cases."""
         parts = [self.derivatives(name, x) for name in combined.of]
         values = np.hstack([part.evaluation.values for part in parts])
@@ -298,7 +297,7 @@ class ReducerModel(Model):
             by_setting=np.asarray(by_setting),
         )
 
-    def _output_derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+    def _output_derivatives(self, output: str, x: Samples) -> SettingDerivatives:
         evaluation, slopes = output_derivatives(self.kernel, output, x)
         columns = self.kernel.model.columns
         varied, amounts = ([columns.index(name) for name in names] for names in (self.columns, self._amounts))
@@ -437,9 +436,9 @@ class ReducerModel(Model):
             raise ValueError(reason)
         from tolalloc.reducers.equivalent.peak_bounds import PeakBounds
 
+        own = self.kernel
         return PeakBounds.of(
-            *(self.kernel.model, self.kernel.torque, units, designs),
-            errors=lambda x, settings: (self.at(settings) if settings.size else self).kernel.errors(x),
+            own.model, own.torque, units, designs, lambda x, at: (self.at(at) if at.size else self).kernel.errors(x)
         )
 
     @property
@@ -489,7 +488,7 @@ class ReducerModel(Model):
         """Largest pin force of exact parts with the modification in force under their rated torque [N]."""
         return rated_pin_force(self.reducer_in_force)
 
-    def examined(self, x: Float[np.ndarray, "sample column"]) -> Mapping[str, float]:
+    def examined(self, x: Samples) -> Mapping[str, float]:
         """Return how many random units are preloaded or have no radial clearance, by how much, and what turns them."""
         found, rated = preload(self.kernel.model, self.kernel.errors(x)), self.rated_pin_force
         solved = found.status == 0

@@ -243,10 +243,6 @@ class Scene:
         """Source of the drawing → id of its place."""
         return {source: place.id for place in self.places for source in place.sources}
 
-    def angle(self, part: str, carrier_angle: float, number: int = 0) -> float:
-        """Return where a part stands at a carrier angle: an entry of `start`, its number from 0 [rad]."""
-        return float(self.start[part][number] + self.turns[part] * carrier_angle)
-
 
 def scene_of(
     model: EquivalentModel,

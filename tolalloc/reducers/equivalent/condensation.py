@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.reducers.equivalent.interfaces import PinContact, pin_contact
-from tolalloc.reducers.equivalent.springs import Coordinates, Positions, SpringGroup, harmonic_waves
+from tolalloc.reducers.equivalent.springs import AtAngles, Coordinates, Positions, SpringGroup, harmonic_waves
 from tolalloc.reducers.families.known import family_of
 from tolalloc.reducers.reducer.design import Reducer
 
@@ -171,7 +171,7 @@ def _condense_some(at: Positions) -> CondensedAngles:
     )
 
 
-def condense(reducer: Reducer, orders: tuple[int, ...], angle: Float[np.ndarray, " angle"]) -> CondensedAngles:
+def condense(reducer: Reducer, orders: tuple[int, ...], angle: AtAngles) -> CondensedAngles:
     """Return the condensed model of a reducer at the carrier angles.
 
     Theory page, equations (19)–(21).

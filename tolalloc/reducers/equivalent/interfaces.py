@@ -17,6 +17,7 @@ from tolalloc.reducers.cycloid.loaded_contact import contact_stiffness
 from tolalloc.reducers.cycloid.tooth_profile import Normals, normals
 from tolalloc.reducers.equivalent.sources import ErrorSource, Nominal
 from tolalloc.reducers.equivalent.springs import (
+    AtAngles,
     Positions,
     SpringGroup,
     SpringRows,
@@ -165,7 +166,7 @@ GEAR_MESH = Interface(
 )
 
 
-def lever(radius: float, direction: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle 2"]:
+def lever(radius: float, direction: AtAngles) -> Float[np.ndarray, "angle 2"]:
     """Return the movement, per radian of its part, of a point at a radius and direction [m/rad].
 
     r·(−sin, cos) of the direction, own derivation: the derivative of the point's place.
@@ -173,7 +174,7 @@ def lever(radius: float, direction: Float[np.ndarray, " angle"]) -> Float[np.nda
     return radius * np.stack([-np.sin(direction), np.cos(direction)], axis=-1)
 
 
-def _tilted(height: float, direction: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle 2 2"]:
+def _tilted(height: float, direction: AtAngles) -> Float[np.ndarray, "angle 2 2"]:
     """Return how far a point at a height moves, per tilt (x, y) of its part, which has turned [m/rad]."""
     return turned(direction) @ (height * np.array([[0.0, 1.0], [-1.0, 0.0]]))
 

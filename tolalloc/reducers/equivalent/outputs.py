@@ -20,9 +20,9 @@ from tolalloc.reducers.cycloid.solvers import LAWS, LINEAR
 from tolalloc.reducers.cycloid.tooth_profile import pin_angles
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.interfaces import pin_contact
-from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel
+from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel, Errors
 from tolalloc.reducers.equivalent.solvers.records import design_of
-from tolalloc.reducers.equivalent.springs import Positions, harmonic_waves
+from tolalloc.reducers.equivalent.springs import AtAngles, Positions, harmonic_waves
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.form import PartForm
 
@@ -103,7 +103,7 @@ class Orders:
     angles: int  # Angles that they are read from [-]
 
     def main(self, count: int) -> list[tuple[float, float, float]]:
-        """Return the strongest orders of the first sample that are some, with amplitude and phase [rad]."""
+        """Return the strongest orders of the first sample, with amplitude and phase [rad], strongest first."""
         own = self.amplitude[0]
         strongest = [at for at in np.argsort(-own)[:count] if own[at] > _ROUNDING * own.max()]
         return [(float(self.order[at]), float(own[at]), float(self.phase[0, at])) for at in strongest]
@@ -118,7 +118,7 @@ def _waves(
 
 
 def fitted_waves(
-    angle: Float[np.ndarray, " angle"], curve: Float[np.ndarray, "row angle"], order: Real[np.ndarray, " order"]
+    angle: AtAngles, curve: Float[np.ndarray, "row angle"], order: Real[np.ndarray, " order"]
 ) -> Complex[np.ndarray, "row order"]:
     """Return orders of curves, cosine less i times sine amplitudes, by least squares: at any angles, of open turns too.
 
@@ -161,7 +161,7 @@ def turn_orders(
     return Orders(order=order, amplitude=amplitude, phase=np.angle(found), angles=first)
 
 
-def _spread(count: int, turns: int) -> list[Float[np.ndarray, " angle"]]:
+def _spread(count: int, turns: int) -> list[AtAngles]:
     """Return equally spaced angles of turns, other ones in every turn, in parts whose tables are small [rad]."""
     while gcd(count, turns) > 1:
         count += 1
@@ -222,9 +222,7 @@ def outputs_of(reducer: Reducer) -> dict[str, Quantity]:
     }
 
 
-def radial_clearance(
-    model: EquivalentModel, errors: Float[np.ndarray, "sample column"]
-) -> Float[np.ndarray, " sample"]:
+def radial_clearance(model: EquivalentModel, errors: Errors) -> Float[np.ndarray, " sample"]:
     """Return the smallest gap between all pins and teeth where the normal is radial, negative where they overlap [m].
 
     Minus the compression of the pin rows at no displacement, where a pin stands in the crank direction (root) or
@@ -242,9 +240,7 @@ def radial_clearance(
     return np.asarray(-np.max([own.pin.max(axis=1) + own.tooth.max(axis=1) for own in discs], axis=0))
 
 
-def radial_clearance_derivatives(
-    model: EquivalentModel, errors: Float[np.ndarray, "sample column"]
-) -> Float[np.ndarray, "sample column"]:
+def radial_clearance_derivatives(model: EquivalentModel, errors: Errors) -> Errors:
     """Return the derivatives of `radial_clearance` by every error column [m/m, m/rad].
 
     Those of the gap between the pin and the tooth that stand out most, which is linear in the errors: own derivation.
@@ -279,7 +275,7 @@ class _StandingOut:
     number: Integer[np.ndarray, " place"]  # Position of the tooth [-]
 
 
-def _standing_out(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) -> list[_StandingOut]:
+def _standing_out(model: EquivalentModel, errors: Errors) -> list[_StandingOut]:
     """Return the same of every disc."""
     mapped, layout, orders = model.error_columns, model.error_columns.layout, model.orders
     values = np.asarray((mapped.matrix @ errors.T).T) + mapped.map.nominal
@@ -356,7 +352,7 @@ def unit_pressure(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]
     return peak_pressure(reducer.cycloid_stage, reducer.contact_modulus, pin_angle, even)
 
 
-def angles_of_pins(reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle disc pin"]:
+def angles_of_pins(reducer: Reducer, carrier_angle: AtAngles) -> Float[np.ndarray, "angle disc pin"]:
     """Return the angle of every pin from the crank direction of every disc [rad].
 
     φ_k − β_j, theory page (2) and (13), own derivation.
@@ -492,8 +488,8 @@ def attribute(
 
 
 def _contributions(
-    model: EquivalentModel, errors: Float[np.ndarray, "1 column"], torque: float, angle: Float[np.ndarray, " angle"]
-) -> dict[str, Float[np.ndarray, " angle"]]:
+    model: EquivalentModel, errors: Float[np.ndarray, "1 column"], torque: float, angle: AtAngles
+) -> dict[str, AtAngles]:
     """Return what every source adds at the carrier angles [rad]."""
     curve, derivatives = model.rotation_derivatives(errors, torque, angle)
     parts: dict[str, Float[np.ndarray, " angle"]] = {}

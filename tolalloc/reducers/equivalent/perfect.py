@@ -15,7 +15,7 @@ from jaxtyping import Float, Integer, UInt8
 
 from tolalloc.reducers.equivalent.friction import sliding_ways
 from tolalloc.reducers.equivalent.hysteresis import BACKLASH, TURN_ANGLES, HysteresisLoop, hysteresis_loop
-from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.model import Curves, EquivalentModel, Errors
 from tolalloc.reducers.equivalent.outputs import Solved
 from tolalloc.reducers.equivalent.springs import Positions
 from tolalloc.reducers.families.known import family_of
@@ -59,7 +59,7 @@ class Preload:
     status: UInt8[np.ndarray, " sample"]  # Worst status of the turn [-]
 
 
-def preload(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) -> Preload:
+def preload(model: EquivalentModel, errors: Errors) -> Preload:
     """Return what presses in every unit without torque.
 
     A disc turns against the housing about its pole, so at a pin it slides with the output speed times the distance of
@@ -88,7 +88,7 @@ def _preload_of(solved: Solved) -> Preload:
     )
 
 
-def _without_torque(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) -> Solved:
+def _without_torque(model: EquivalentModel, errors: Errors) -> Solved:
     """Return equilibria and forces over an output turn under the torque at which backlash is read."""
     torque = -BACKLASH * model.reducer.load.rated_torque
     return Solved.of(model.at_torque(torque).equilibria(errors, torque, TURN_ANGLES))
@@ -98,7 +98,7 @@ Derived = tuple[Preload, Float[np.ndarray, "sample column"]]
 """What presses in every unit, and the derivatives of one of its two outputs by every error column."""
 
 
-def pin_force_derivatives(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) -> Derived:
+def pin_force_derivatives(model: EquivalentModel, errors: Errors) -> Derived:
     """Return what presses in every unit without torque, and the derivatives of the largest pin force [N/m].
 
     Those of that pin's force at that angle, own derivation, theory page (23): the adjoint of the equilibrium with the
@@ -112,7 +112,7 @@ def pin_force_derivatives(model: EquivalentModel, errors: Float[np.ndarray, "sam
     return _derived(model, solved, at, weights.reshape(-1, *pins.shape[2:]))
 
 
-def friction_torque_derivatives(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) -> Derived:
+def friction_torque_derivatives(model: EquivalentModel, errors: Errors) -> Derived:
     """Return what presses in every unit without torque, and the derivatives of the friction torque [N·m/m].
 
     As `pin_force_derivatives`, own derivation, of the sum of forces times sliding ways at the angle where it is
@@ -124,7 +124,7 @@ def friction_torque_derivatives(model: EquivalentModel, errors: Float[np.ndarray
     return _derived(model, solved, at, by_force[at])
 
 
-def _largest(over_turn: Float[np.ndarray, "sample angle"]) -> Integer[np.ndarray, " sample"]:
+def _largest(over_turn: Curves) -> Integer[np.ndarray, " sample"]:
     """Return where each is largest, anywhere where nothing converged."""
     return np.asarray(np.nan_to_num(over_turn, nan=-inf).argmax(axis=1))
 

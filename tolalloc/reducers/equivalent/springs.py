@@ -15,6 +15,8 @@ from jaxtyping import Float
 
 from tolalloc.reducers.reducer.design import Reducer
 
+AtAngles = Float[np.ndarray, " angle"]
+"""A number at every carrier angle, such as the angle itself [rad]."""
 HARMONICS = (1, 2, 4)
 """Orders of the pitch and run-out deviations that liu2020 prints in Table 4."""
 
@@ -77,15 +79,15 @@ class Positions:
         return Coordinates.of(self.reducer)
 
     @cached_property
-    def crank_angle(self) -> Float[np.ndarray, " angle"]:
+    def crank_angle(self) -> AtAngles:
         """β = −zc·θc [rad]."""
         return -self.reducer.cycloid_stage.disc_teeth * self.carrier_angle
 
-    def disc_direction(self, disc: int) -> Float[np.ndarray, " angle"]:
+    def disc_direction(self, disc: int) -> AtAngles:
         """β_j = β + ψ_j, the direction of a disc's centre [rad]."""
         return self.crank_angle + 2 * np.pi * disc / self.reducer.disc_count
 
-    def crank_position(self, crank: int) -> Float[np.ndarray, " angle"]:
+    def crank_position(self, crank: int) -> AtAngles:
         """P_i = θc + φ_i, the direction of a crank axis, or of an output pin, on the carrier [rad]."""
         return self.carrier_angle + 2 * np.pi * crank / self.reducer.drive_count
 
@@ -94,12 +96,12 @@ class Positions:
         return (disc - (self.reducer.disc_count - 1) / 2) * self.reducer.cycloid_stage.disc_spacing
 
     @cached_property
-    def sun_angle(self) -> Float[np.ndarray, " angle"]:
+    def sun_angle(self) -> AtAngles:
         """θs = i·θc, i the turns of the sun per turn of the carrier [rad]."""
         return self.reducer.sun_ratio * self.carrier_angle
 
     @cached_property
-    def pinion_angle(self) -> Float[np.ndarray, " angle"]:
+    def pinion_angle(self) -> AtAngles:
         """θ of the shaft of the motor, which a pinion on it has [rad]."""
         return self.reducer.ratio * self.carrier_angle
 
@@ -202,7 +204,7 @@ def support(at: Positions, first: int, name: str, stiffness_name: str, part: str
     return rows.group(name, stiffness_name, (part,), places=(place,))
 
 
-def turned(direction: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle 2 2"]:
+def turned(direction: AtAngles) -> Float[np.ndarray, "angle 2 2"]:
     """Return the rotation matrices from a part that has turned by a direction [rad] into the housing's frame.
 
     [[cos, −sin], [sin, cos]], own derivation; counter-clockwise positive.

@@ -17,6 +17,7 @@ from tolalloc.drawings.table_file import plain_number, read_text_table
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
 
+Points = Float[np.ndarray, " point"]
 LARGEST_DEVIATION = 200 * MICROMETRE
 """Largest deviation of a flank that is believed, as that of an amount of the modification [m]."""
 
@@ -92,13 +93,7 @@ def _spline(form: FlankForm) -> Any:
     return BSpline(knots, weight[np.arange(count + 3) % count], 3)
 
 
-def flank_form(
-    angle: Float[np.ndarray, " point"],
-    deviation: Float[np.ndarray, " point"],
-    spaces: int,
-    spans: int | None,
-    place: str,
-) -> FlankForm:
+def flank_form(angle: Points, deviation: Points, spaces: int, spans: int | None, place: str) -> FlankForm:
     """Return the form through points in any order.
 
     Points of one φ are taken as their mean, own derivation. Angles φ [rad], deviations outward positive [m]; the place
@@ -179,9 +174,7 @@ class PartForm:
         return found
 
 
-def read_profile(
-    path: Path, columns: Sequence[str], may: Sequence[str] = ()
-) -> Mapping[str, Float[np.ndarray, " point"]]:
+def read_profile(path: Path, columns: Sequence[str], may: Sequence[str] = ()) -> Mapping[str, Points]:
     """Return a table of numbers by its columns: angles in rad, lengths in m, numbers without a unit as they are.
 
     Other columns may stand there, but need not.

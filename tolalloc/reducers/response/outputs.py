@@ -42,9 +42,10 @@ from tolalloc.reducers.equivalent.outputs import (
 from tolalloc.reducers.equivalent.perfect import friction_torque_derivatives, pin_force_derivatives, preload
 from tolalloc.reducers.load_case import OverLoadCases
 from tolalloc.reducers.reducer.design import Reducer
-from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.reducers.response.kernel import KernelResponse, Samples
 from tolalloc.running.chunks import map_chunks
 
+Errors = Float[np.ndarray, "chunk all_columns"]
 Answer = tuple[Float[np.ndarray, "chunk output"], UInt8[np.ndarray, " chunk"]]
 _SHARE = "share of the pin force on the most loaded disc"
 _RV = ("largest pin force", "largest crank–disc bearing force", _SHARE)
@@ -71,16 +72,16 @@ class Reading:
     read: Callable[[KernelResponse, Float[np.ndarray, "chunk all_columns"]], Answer]
 
 
-def _peak_to_peak(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+def _peak_to_peak(kernel: KernelResponse, errors: Errors) -> Answer:
     found = kernel.extremes(errors)
     return found.peak_to_peak[:, np.newaxis] / ARCSECOND, found.status
 
 
-def _loop(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+def _loop(kernel: KernelResponse, errors: Errors) -> Answer:
     return _found(_read_off(hysteresis_loop(kernel.model, errors, TURN_ANGLES)))
 
 
-def _friction_loop(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+def _friction_loop(kernel: KernelResponse, errors: Errors) -> Answer:
     loop = friction_loop(kernel.model, errors, TURN_ANGLES)
     own = [100.0 * loop.rated.efficiency, loop.lost_motion / ARCMINUTE, loop.hysteresis_loss / ARCMINUTE]
     return _found([*_read_off(loop.plain), *own])
@@ -98,7 +99,7 @@ def _found(columns: list[Float[np.ndarray, " chunk"]]) -> Answer:
     return values, status.astype(np.uint8)
 
 
-def _load(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+def _load(kernel: KernelResponse, errors: Errors) -> Answer:
     model, torque = kernel.model, kernel.load_torque
     solved = Solved.of(model.at_torque(torque).equilibria(errors, torque, TURN_ANGLES))
     every = outputs_of(model.reducer)
@@ -110,12 +111,12 @@ def _load(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]
     return np.stack(own, axis=1), np.asarray(solved.equilibria.status.max(axis=1))
 
 
-def _preload(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+def _preload(kernel: KernelResponse, errors: Errors) -> Answer:
     found = preload(kernel.model, errors)
     return np.stack([found.pin_force, found.friction_torque], axis=1), found.status
 
 
-def _radial_clearance(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+def _radial_clearance(kernel: KernelResponse, errors: Errors) -> Answer:
     clearance = radial_clearance(kernel.model, errors)[:, np.newaxis] / MICROMETRE
     status = np.where(np.isfinite(clearance[:, 0]), Status.CONVERGED, Status.NOT_FINITE)
     return clearance, status.astype(np.uint8)
@@ -183,7 +184,7 @@ def orders_reading(orders: tuple[float, ...]) -> Reading:
     The waves are those of `tolalloc.reducers.equivalent.outputs.fitted_waves`, own derivation.
     """
 
-    def read(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+    def read(kernel: KernelResponse, errors: Errors) -> Answer:
         found = kernel.model.equilibria(errors, kernel.torque)
         return _waves(orders, found.transmission_error), found.status.max(axis=1)
 
@@ -196,7 +197,7 @@ def with_orders(readings: tuple[Reading, ...], orders: tuple[float, ...]) -> tup
     As `orders_reading`, own derivation; the curve's angles are those of the coarse search.
     """
 
-    def read(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+    def read(kernel: KernelResponse, errors: Errors) -> Answer:
         found, curve = kernel.model.extremes_and_curve(errors, kernel.torque)
         return np.hstack([found.peak_to_peak[:, np.newaxis] / ARCSECOND, _waves(orders, curve)]), found.status
 
@@ -229,7 +230,7 @@ class OutputsResponse:
     def _read(self) -> tuple[str, ...]:
         return tuple(name for reading in self.readings for name in reading.outputs)
 
-    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+    def __call__(self, x: Samples) -> Evaluation:
         """Return the outputs of every sample; a sample fails where one of its readings does."""
         values, status = np.empty((x.shape[0], len(self._read))), np.empty(x.shape[0], np.uint8)
         for rows, (answer, worst) in map_chunks(self.alone.read, x, self.kernel.mapper):
@@ -267,7 +268,7 @@ class LoadCasesResponse:
         """Those of every load case."""
         return self.responses[0].columns
 
-    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+    def __call__(self, x: Samples) -> Evaluation:
         """Return the outputs of every sample; a sample fails where one of its load cases does."""
         found = [response(x) for response in self.responses]
         values, place = np.hstack([own.values for own in found]), {name: at for at, name in enumerate(self.read)}
@@ -286,7 +287,7 @@ class LoadCasesResponse:
         return np.asarray((combined.weights(own) * own).sum(axis=1))
 
 
-def _loop_derivatives(output: str, kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
+def _loop_derivatives(output: str, kernel: KernelResponse, errors: Errors) -> Derived:
     model = kernel.model
     if output != TORSIONAL_STIFFNESS:
         share = hysteresis.LOST_MOTION if output == LOST_MOTION else hysteresis.BACKLASH
@@ -300,9 +301,7 @@ def _loop_derivatives(output: str, kernel: KernelResponse, errors: Float[np.ndar
     return stiffness, by_error, np.maximum(first, second)
 
 
-def _width(
-    model: EquivalentModel, errors: Float[np.ndarray, "chunk all_columns"], share: float
-) -> tuple[Width, UInt8[np.ndarray, " chunk"]]:
+def _width(model: EquivalentModel, errors: Errors, share: float) -> tuple[Width, UInt8[np.ndarray, " chunk"]]:
     """Return the width of the loop at a share of the rated torque."""
     torque = share * model.reducer.load.rated_torque
     width, slope = np.zeros(len(errors)), np.zeros(errors.shape)
@@ -315,17 +314,17 @@ def _width(
     return (width, slope), status
 
 
-def _pin_force_derivatives(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
+def _pin_force_derivatives(kernel: KernelResponse, errors: Errors) -> Derived:
     found, slopes = pin_force_derivatives(kernel.model, errors)
     return found.pin_force, slopes, found.status
 
 
-def _friction_torque_derivatives(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
+def _friction_torque_derivatives(kernel: KernelResponse, errors: Errors) -> Derived:
     found, slopes = friction_torque_derivatives(kernel.model, errors)
     return found.friction_torque, slopes, found.status
 
 
-def _clearance_derivatives(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
+def _clearance_derivatives(kernel: KernelResponse, errors: Errors) -> Derived:
     clearance, status = _radial_clearance(kernel, errors)
     return clearance[:, 0], radial_clearance_derivatives(kernel.model, errors) / MICROMETRE, status
 
@@ -342,7 +341,7 @@ DIFFERENTIABLE = tuple(_DERIVED)
 
 
 def output_derivatives(
-    kernel: KernelResponse, output: str, x: Float[np.ndarray, "sample column"]
+    kernel: KernelResponse, output: str, x: Samples
 ) -> tuple[Evaluation, Float[np.ndarray, "sample all_columns"]]:
     """Return one of `DIFFERENTIABLE` of every sample, and its derivatives by all error columns of the model.
 
