@@ -246,7 +246,7 @@ def _zones(gap: Gap, rotation: AtPhases, contact: float) -> Float[np.ndarray, "p
 def _loaded(discs: PressedDiscs, method: str, phase: AtPhases, deflection: AtPhases, force: AtPins) -> LoadedContact:
     """Return the contact whose deflection and forces a method has found.
 
-    AtPhases are angles from the crank direction of disc 1 to the next pin [rad], deflections δ_max [m], forces those of
+    Phases are angles from the crank direction of disc 1 to the next pin [rad], deflections δ_max [m], forces those of
     the pins [N].
 
     Own derivation: the disc has turned by β + δ_max/r_d, β that of the first contact; the torque is r_d·Σ S·F.
