@@ -6,11 +6,12 @@ python studies/li2018_modification.py [--quick] [--out FOLDER]
 from __future__ import annotations
 
 import pandas as pd
+from published.li2018_closed_form import closed_form
 from published.modification_comparison import compared, comparison_document
 
 import tolalloc as ta
 from tolalloc.reading.units import MICROMETRE
-from tolalloc.reducers.modification import ModificationRequest, closed_form, reference, residual_gap
+from tolalloc.reducers.modification import ModificationRequest, reference, residual_gap
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reports.document import Document, Section
 from tolalloc.running.progress import Progress

@@ -25,11 +25,11 @@ import numba
 import numpy as np
 from kernel_speed import SEED, figures, progress, run_benchmark
 from numpy_cores import timed
+from plain_rows import spring_groups
 from scipy.optimize import brentq
 
 from tests.random_cases import random_units
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.reducers.equivalent.condensation import spring_groups
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.springs import Coordinates, Positions
 from tolalloc.reducers.reducer.files import load_reducer

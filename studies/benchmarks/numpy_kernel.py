@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float
 from numpy_tables import Tables, condensed_tables
+from plain_rows import spring_groups
 
-from tolalloc.reducers.equivalent.condensation import spring_groups
 from tolalloc.reducers.equivalent.springs import HARMONICS
 from tolalloc.reducers.reducer.design import Reducer
 

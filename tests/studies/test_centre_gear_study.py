@@ -77,7 +77,7 @@ def test_a_picture_shows_the_centre_gear_in_mesh_with_the_pinion():
     titles = [axes.get_title() for axes in draw_still(record, {"centre.mesh": 0.5}).axes]
     assert titles[2:] == ["carrier, planets and sun", "centre gear and input pinion"]
     for angle in (0.0, 0.0123, 2.0):  # where both meet, a tooth of the one stands in a gap of the other
-        centre, pinion = scene.angle("centre", angle), scene.angle("pinion", angle)
+        centre, pinion = (scene.start[part][0] + scene.turns[part] * angle for part in ("centre", "pinion"))
         assert np.cos(-72 * centre + 24 * (np.pi - pinion)) == pytest.approx(-1.0)
 
 

@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from studies.published.li2018_closed_form import closed_form
 from studies.published.li2018_genetic import LI2018, binary_search
 from tolalloc.reading.units import ARCMINUTE, DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.clearance import clearance_of, formula_gap
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile, flank_angle
-from tolalloc.reducers.modification import closed_form, reference, residual_gap
+from tolalloc.reducers.modification import reference, residual_gap
 from tolalloc.reducers.reducer.files import load_reducer
 
 STAGES = {name: load_reducer(name).cycloid_stage for name in ("rv20e_liu2020", "rv40e_xi2015", "rv80e")}

@@ -189,7 +189,7 @@ def test_torsional_stiffness_of_the_perfect_reducer(rv20e):
 
 def test_modification_gap_on_the_flank_and_at_tip_and_root(rv20e, table4):
     """Table 4's modification opens every pin: 8.0 µm at tip and root, 1.04 µm where cos φ′ = K1."""
-    from tolalloc.reducers.equivalent.condensation import spring_groups
+    from studies.benchmarks.plain_rows import spring_groups
 
     contact = spring_groups(rv20e.reducer, np.array([0.0]))[-1]
     columns = [contact.columns.index(f"modification.{name}") for name in ("equidistant", "shift")]

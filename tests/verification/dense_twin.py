@@ -13,8 +13,8 @@ import numpy as np
 from scipy.optimize import brentq, minimize
 from scipy.special import lambertw
 
+from studies.benchmarks.plain_rows import spring_groups
 from tolalloc.reducers.cycloid.loaded_contact import equivalent_length
-from tolalloc.reducers.equivalent.condensation import spring_groups
 from tolalloc.reducers.equivalent.springs import HARMONICS, Coordinates, SpringGroup
 from tolalloc.reducers.reducer.design import Reducer
 

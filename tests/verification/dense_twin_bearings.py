@@ -14,8 +14,8 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import ellipe
 
+from studies.benchmarks.plain_rows import spring_groups
 from tests.verification.dense_twin import DenseModel, Interface, Response, interface, play_response
-from tolalloc.reducers.equivalent.condensation import spring_groups
 from tolalloc.reducers.equivalent.springs import HARMONICS, SpringGroup
 from tolalloc.reducers.reducer.bearings import BallBearing, RollerBearing, RollingBearing
 from tolalloc.reducers.reducer.design import Clearances, Reducer

@@ -20,11 +20,11 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from studies.benchmarks.plain_rows import spring_groups
 from tests.random_cases import Case, random_case, random_reducer, random_unit, seeds
 from tests.validation_manual import shown
 from tests.verification.dense_twin import DenseModel, dense_model
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.reducers.equivalent.condensation import spring_groups
 from tolalloc.reducers.equivalent.model import EquivalentModel, Status
 from tolalloc.reducers.equivalent.springs import Coordinates
 from tolalloc.reducers.reducer.design import Reducer

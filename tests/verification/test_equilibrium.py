@@ -9,13 +9,13 @@ from functools import cache
 import numpy as np
 import pytest
 
+from studies.benchmarks.plain_rows import spring_groups
 from tests.random_cases import Case, random_case, random_units, seeds, variations
 from tests.validation_manual import shown
 from tests.verification.dense_twin import dense_equilibrium, dense_model, logarithmic_response
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.cycloid.solvers import LOGARITHMIC
 from tolalloc.reducers.cycloid.solvers.pins import pin_force
-from tolalloc.reducers.equivalent.condensation import spring_groups
 from tolalloc.reducers.equivalent.model import EquivalentModel, Status
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
 from tolalloc.reducers.equivalent.springs import Coordinates

@@ -8,11 +8,11 @@ from math import cos
 import numpy as np
 import pytest
 
+from studies.benchmarks.plain_rows import spring_groups
 from tests.builders import LINEAR_STAGE, order_spectrum, reducer_file, unit_with
 from tests.random_cases import random_case, seeds
 from tests.verification.dense_twin import dense_equilibrium
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.reducers.equivalent.condensation import spring_groups
 from tolalloc.reducers.equivalent.hysteresis import BACKLASH, DRAWN, both_directions, hysteresis_loop
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import (

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from studies.benchmarks.plain_rows import spring_groups
 from tests.builders import unit_with
 from tolalloc.reading.units import MEGAPASCAL, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.clearance import exact_clearance
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
-from tolalloc.reducers.equivalent.condensation import spring_groups
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES
 from tolalloc.reducers.equivalent.model import Status
 from tolalloc.reducers.equivalent.outputs import forces, radial_clearance

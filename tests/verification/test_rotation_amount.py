@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import tolalloc as ta
+from studies.benchmarks.plain_rows import dense_rows
 from tests.builders import few_sources, unit_with, units_at_random
 from tests.random_cases import random_cycloid_stage, seeds
 from tests.verification.test_clearance import second_order
@@ -15,7 +16,6 @@ from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import ARCSECOND, MICROMETRE
 from tolalloc.reducers.cycloid.clearance import exact_clearance
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
-from tolalloc.reducers.equivalent.interfaces import dense_rows
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import radial_clearance
 from tolalloc.reducers.equivalent.springs import Positions

@@ -14,7 +14,7 @@ import pytest
 from scipy.optimize import newton
 from scipy.spatial.transform import Rotation
 
-from tolalloc.reducers.equivalent.condensation import spring_groups
+from studies.benchmarks.plain_rows import spring_groups
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import load_reducer
 

@@ -8,6 +8,7 @@ from math import gcd
 import numpy as np
 import pytest
 
+from studies.benchmarks.plain_rows import spring_groups
 from tests.random_cases import random_case
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import SolveError, UnknownNameError
@@ -17,7 +18,6 @@ from tolalloc.reducers.cycloid.solvers import LAWS
 from tolalloc.reducers.cycloid.solvers.pins import pin_forces
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile
 from tolalloc.reducers.equivalent.columns import source_name
-from tolalloc.reducers.equivalent.condensation import spring_groups
 from tolalloc.reducers.equivalent.hysteresis import both_directions
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import forces
@@ -63,7 +63,7 @@ def test_parts_stand_where_the_kinematics_of_the_model_put_them(seed):
     at = Positions(reducer, angle)
 
     def place(part, number, radius):
-        return radius * np.exp(1j * np.array([scene.angle(part, own, number) for own in angle]))
+        return radius * np.exp(1j * np.array([scene.start[part][number] + scene.turns[part] * own for own in angle]))
 
     outline = scene.outline
     circle, eccentricity = reducer.crank_circle_radius / MILLIMETRE, reducer.cycloid_stage.eccentricity / MILLIMETRE

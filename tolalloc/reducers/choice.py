@@ -14,7 +14,6 @@ from tolalloc.drawings.tolerance_table import require_small_zones
 from tolalloc.exceptions import InputError
 from tolalloc.models.settings import require_settings
 from tolalloc.reading.files import found_from_here
-from tolalloc.reading.named_fields import is_number
 from tolalloc.reading.units import MICROMETRE, MILLIMETRE
 from tolalloc.reducers import DISC_TEMPERATURE, TORQUE
 from tolalloc.reducers.equivalent.columns import source_name
@@ -27,7 +26,7 @@ from tolalloc.reducers.reducer.design import Modification, Reducer, at_torque
 from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.reducers.response.kernel import KernelResponse
-from tolalloc.reducers.settings import TEMPERATURE, clearance_settings
+from tolalloc.reducers.settings import TEMPERATURE, clearance_settings, is_range
 from tolalloc.reducers.unit_file import BuiltUnit, load_unit
 
 if TYPE_CHECKING:
@@ -194,21 +193,15 @@ class ReducerChoice:
         # Without a range a clearance is not chosen by an allocation; whoever states one may state any.
         known = clearance_settings(present, (own or (-_FARTHEST, _FARTHEST) for own in self._ranges))
         require_settings(place, known, clearances)
+        changed = replace(self, torque=torque, disc_temperature=warmer)
         if not clearances:
-            return replace(self, torque=torque, disc_temperature=warmer)
+            return changed
         turned, flank, radial = (clearances.get(setting.name, setting.value) * MICROMETRE for setting in known)
         modification = Modification.from_clearances(flank, radial, stage, turned)
-        reducer = replace(self.reducer, modification=modification)
-        return replace(self, torque=torque, disc_temperature=warmer, reducer=reducer)
+        return replace(changed, reducer=replace(self.reducer, modification=modification))
 
     def shared_lines(self, stated: Mapping[str, Hashable]) -> Mapping[str, str]:
-        """Return the line of the drawing of every source: discs are alike, and so are cranks, planets, bores, journals.
-
-        Parameters
-        ----------
-        stated
-            Source → what the table states of it.
-        """
+        """Return the line of the drawing of every source: discs, cranks, planets, bores and journals are alike."""
         return SOURCES.shared_lines(stated)
 
     def bound(self, errors: ErrorModel, place: str) -> ReducerModel:
@@ -218,7 +211,7 @@ class ReducerChoice:
         kernel, assumptions = bind(self.reducer, errors, self.torque, place, self.neglected, self.unit)
         turned, flank, radial = ((own[0] * MICROMETRE, own[1] * MICROMETRE) if own else None for own in self._ranges)
         return ReducerModel(
-            kernel=kernel.at_disc_temperature(self.disc_temperature),
+            kernel=replace(kernel, disc_temperature=self.disc_temperature),
             middles=tuple(errors.middles.tolist()),
             load_cases=self.load_cases,
             flank=flank,
@@ -277,20 +270,10 @@ def reducer(
     ------
     InputError, UnknownNameError
         The file, field and value that are not allowed.
-
-    Examples
-    --------
-    >>> reducer("rv20e_liu2020", stiffness="rv20e_table6").reducer.crank_count
-    2
     """
     ranges = {"flank": flank_clearance, "radial": radial_clearance, "rotation": rotation_clearance}
     for field, own in ranges.items():
-        if own is not None and not (
-            isinstance(own, Sequence)
-            and len(own) == 2
-            and all(map(is_number, own))
-            and -_FARTHEST <= own[0] <= own[1] <= _FARTHEST
-        ):
+        if own is not None and not is_range(own, _FARTHEST):
             allowed = "two numbers from -50 to 50 µm, the smaller one first"
             raise InputError.at(f"reducer {name}", f"{field}_clearance", own, allowed)
     TEMPERATURE.check(f"reducer {name}", "disc_temperature", disc_temperature, of_argument=True)

@@ -44,20 +44,9 @@ class ContactResult:
 def contact_of(
     reducer: Reducer, torque: float, *, law: str = "logarithmic", exact: bool | None = None, phases: int = 72
 ) -> ContactResult:
-    """Return what the reducer's modification does under a torque on the carrier.
+    """Return what the reducer's modification does under a torque on the carrier, of either sign [N·m].
 
-    Parameters
-    ----------
-    reducer
-        The nominal design with its tooth modification.
-    torque
-        Torque on the carrier, of either sign; the pins carry T·(1 − 1/i) of it [N·m].
-    law
-        Contact law of pins and teeth, one of `tolalloc.reducers.cycloid.solvers.LAWS`.
-    exact
-        Whether distances are exact; by default where the modification is too large for the linear formula.
-    phases
-        Phases of the crank within one pin pitch [-].
+    The pins carry T·(1 − 1/i) of the torque. Law, exact distances and phases are those of `assess`.
 
     References
     ----------

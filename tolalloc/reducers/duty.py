@@ -114,9 +114,8 @@ def require_cycle(cases: Sequence[LoadCase], reducer: Reducer) -> None:
             if getattr(case, name) is None:
                 raise InputError(f"{place}: {name} is missing; a duty cycle needs torque and speed of every load case.")
         if case.output_angles is not None:
-            raise InputError.at(
-                place, "output_angles", case.output_angles, "none in a duty cycle, which takes the turn"
-            )
+            allowed = "none in a duty cycle, which takes the turn"
+            raise InputError.at(place, "output_angles", case.output_angles, allowed)
         reducer.torque_on_carrier(case.torque, place)
 
 

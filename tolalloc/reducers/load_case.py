@@ -17,7 +17,7 @@ from tolalloc.reading.files import Record
 from tolalloc.reading.named_fields import NamedFields, Rule, is_number, number, or_none
 from tolalloc.reading.units import DEGREE
 from tolalloc.reducers import EFFICIENCY, PEAK_TO_PEAK, RADIAL_CLEARANCE, TORSIONAL_STIFFNESS
-from tolalloc.reducers.settings import TEMPERATURE
+from tolalloc.reducers.settings import TEMPERATURE, is_range
 
 _RATED = ", rated torque"
 """What an output is called whose load is the rated torque, unless a load case states another."""
@@ -39,13 +39,7 @@ _NAME = Rule(
 _TORQUE = Rule("a torque in N·m, but not 0", lambda value: is_number(value) and isfinite(value) and value != 0)
 _WINDOW = Rule(
     "two angles of the output in degrees, the smaller one first and at most a turn apart, such as (-90, 90)",
-    lambda value: (
-        isinstance(value, Sequence)
-        and len(value) == 2
-        and all(map(is_number, value))
-        and -360 <= value[0] < value[1] <= 360
-        and value[1] - value[0] <= 360
-    ),
+    lambda value: is_range(value, 360.0) and 0 < value[1] - value[0] <= 360,
 )
 _UNITS = {"torque": "N·m", "speed": "rpm", "share": "%", "disc_temperature": "K", "moment": "N·m"}
 
@@ -128,13 +122,6 @@ def at(output: str, case: LoadCase) -> str:
     ------
     InputError
         An output without a unit, or a load case that is none.
-
-    Examples
-    --------
-    >>> at("lost motion [arcmin]", LoadCase("cold", disc_temperature=-5))
-    'lost motion, cold [arcmin]'
-    >>> at("peak pressure, rated torque [MPa]", LoadCase("stop", torque=-800.0))
-    'peak pressure, stop [MPa]'
     """
     return _under("at", output, case, "")
 
@@ -154,11 +141,6 @@ def change(output: str, case: LoadCase) -> str:
     ------
     InputError
         An output without a unit, or a load case that is none.
-
-    Examples
-    --------
-    >>> change("lost motion [arcmin]", LoadCase("old", hours=6000))
-    'lost motion, old less in force [arcmin]'
     """
     return _under("change", output, case, f" {_CHANGE}")
 
@@ -172,11 +154,6 @@ def worst(output: str) -> str:
     ------
     InputError
         An output without a unit.
-
-    Examples
-    --------
-    >>> worst("lost motion [arcmin]")
-    'lost motion, worst load case [arcmin]'
     """
     return _over_all("worst", output, _WORST)
 
@@ -188,11 +165,6 @@ def mean(output: str) -> str:
     ------
     InputError
         An output without a unit.
-
-    Examples
-    --------
-    >>> mean("lost motion [arcmin]")
-    'lost motion, mean of load cases [arcmin]'
     """
     return _over_all("mean", output, _MEAN)
 

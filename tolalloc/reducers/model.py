@@ -24,18 +24,14 @@ from tolalloc.reducers.equivalent.perfect import preload, rated_pin_force
 from tolalloc.reducers.equivalent.wear import wear_of
 from tolalloc.reducers.families.known import family_of
 from tolalloc.reducers.load_case import LoadCase, OverLoadCases, at, combined_outputs
-from tolalloc.reducers.reducer.design import (
-    MODIFICATION_CONVENTION,
-    ROTATION_CONVENTION,
-    Modification,
-    Reducer,
-)
+from tolalloc.reducers.reducer.design import MODIFICATION_CONVENTION, ROTATION_CONVENTION, Modification, Reducer
 from tolalloc.reducers.reducer.idle_torque import IdleTorque
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.reducers.response.kernel import (
     SEEN,
     KernelResponse,
     OutputsWithStiffness,
+    Samples,
     StiffnessResponse,
     principal_axes,
     stiffness_source,
@@ -51,7 +47,7 @@ from tolalloc.reducers.response.outputs import (
     wave_outputs,
     with_orders,
 )
-from tolalloc.reducers.settings import clearance_settings, temperature_condition, torque_condition
+from tolalloc.reducers.settings import clearance_settings
 from tolalloc.reducers.unit_file import BuiltUnit
 from tolalloc.running.chunks import Mapper
 
@@ -64,6 +60,8 @@ _ANGLES = (468, 936)
 """Angles at which the contact is solved without a search between them [-]."""
 _NEARLY_ALL = 0.9973
 """Share of units that stay below the no-load torque which is said of all [-]."""
+_WIDEST_TEMPERATURE = 20.0
+"""Difference of temperature that the live page offers either way [K]."""
 _MOST_COLUMNS = 100
 """Columns beyond which all products of two are more than the samples can tell apart [-]."""
 
@@ -219,9 +217,8 @@ class ReducerModel(Model):
         """Flank and radial clearance, before them the rotation clearance where flanks are turned or may be."""
         present = self.present_clearances
         ranges = (self.turned, self.flank, self.radial)[-len(present) :]
-        return clearance_settings(
-            present, ((own[0] / MICROMETRE, own[1] / MICROMETRE) if own else None for own in ranges)
-        )
+        bounds = ((own[0] / MICROMETRE, own[1] / MICROMETRE) if own else None for own in ranges)
+        return clearance_settings(present, bounds)
 
     @property
     def present_clearances(self) -> tuple[float, ...]:
@@ -267,7 +264,7 @@ class ReducerModel(Model):
         """What is read off torque against twist, what presses without torque, and the gap at tip and root."""
         return self._everywhere(DIFFERENTIABLE)
 
-    def derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+    def derivatives(self, output: str, x: Samples) -> SettingDerivatives:
         """Return the peak-to-peak, or an output of `differentiable`, of every sample with its derivatives."""
         if output in self._combined:
             return self._combined_derivatives(self._combined[output], x)
@@ -286,9 +283,7 @@ class ReducerModel(Model):
             by_setting=found.by_modification[:, : len(self._amounts)] @ self._modification_by_clearance * MICROMETRE,
         )
 
-    def _combined_derivatives(
-        self, combined: OverLoadCases, x: Float[np.ndarray, "sample column"]
-    ) -> SettingDerivatives:
+    def _combined_derivatives(self, combined: OverLoadCases, x: Samples) -> SettingDerivatives:
         """Return the derivatives of what is made of an output under several load cases."""
         parts = [self.derivatives(name, x) for name in combined.of]
         values = np.hstack([part.evaluation.values for part in parts])
@@ -302,7 +297,7 @@ class ReducerModel(Model):
             by_setting=np.asarray(by_setting),
         )
 
-    def _output_derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+    def _output_derivatives(self, output: str, x: Samples) -> SettingDerivatives:
         evaluation, slopes = output_derivatives(self.kernel, output, x)
         columns = self.kernel.model.columns
         varied, amounts = ([columns.index(name) for name in names] for names in (self.columns, self._amounts))
@@ -332,9 +327,13 @@ class ReducerModel(Model):
 
     @property
     def operating_conditions(self) -> tuple[Setting, ...]:
-        """The torque, and the temperature of the discs above the ring."""
-        torque = torque_condition(self.kernel.torque, self.reducer.load.rated_torque)
-        return (torque, temperature_condition(self.kernel.disc_temperature))
+        """The torque up to twice the rated one, the temperature of the discs above the ring, or as far as they are."""
+        torque, warmer, rated = self.kernel.torque, self.kernel.disc_temperature, self.reducer.load.rated_torque
+        most, warmest = max(2 * rated, abs(torque)), max(_WIDEST_TEMPERATURE, abs(warmer))
+        return (
+            Setting(name=TORQUE, value=torque, lower=-most, upper=most, step=rated / 100),
+            Setting(name=DISC_TEMPERATURE, value=warmer, lower=-warmest, upper=warmest, step=0.1),
+        )
 
     @cached_property
     def exact_loop_in_force(self) -> HysteresisLoop:
@@ -389,9 +388,8 @@ class ReducerModel(Model):
         values = {name: value for name, value in own.items() if np.isfinite(value)}
         if self.identified or not values:
             return self
-        assumed = IdentifiedStiffness(
-            source=self.reducer.name, values=values, standard_uncertainty=dict.fromkeys(values, 0.0)
-        )
+        known = dict.fromkeys(values, 0.0)
+        assumed = IdentifiedStiffness(source=self.reducer.name, values=values, standard_uncertainty=known)
         return replace(self, identified=assumed)
 
     def with_uncertain(self, outputs: tuple[str, ...]) -> Response:
@@ -420,16 +418,12 @@ class ReducerModel(Model):
         """Return why nothing is certain of an output: bounds are known of the peak-to-peak without play and tilt."""
         if output != PEAK_TO_PEAK:
             return f"only the peak-to-peak of a reducer has one, and the limit is one of {output}"
-        if self.kernel.model.design.law == LINEAR and any(".tilt" in name for name in self._disc_tilts):
+        standing = (name for name, value in self.kernel.fixed.items() if value)
+        tilted = any(name.startswith("disc") and ".tilt" in name for name in (*self.columns, *standing))
+        if tilted and self.kernel.model.design.law == LINEAR:
             return "discs of this drawing tilt, which moves contacts by no linear law"
         layout = self.kernel.model.error_columns.layout
         return "elements of the reducer have play" if layout.flank > layout.clearance else ""
-
-    @property
-    def _disc_tilts(self) -> tuple[str, ...]:
-        """Columns of tilted discs that vary or stand at something."""
-        standing = (name for name, value in self.kernel.fixed.items() if value)
-        return tuple(name for name in (*self.columns, *standing) if name.startswith("disc"))
 
     def unit_bounds(
         self,
@@ -442,12 +436,10 @@ class ReducerModel(Model):
             raise ValueError(reason)
         from tolalloc.reducers.equivalent.peak_bounds import PeakBounds
 
-        def errors(
-            x: Float[np.ndarray, "unit column"], settings: Float[np.ndarray, " setting"]
-        ) -> Float[np.ndarray, "unit all_columns"]:
-            return (self.at(settings) if settings.size else self).kernel.errors(x)
-
-        return PeakBounds.of(self.kernel.model, self.kernel.torque, units, designs, errors)
+        own = self.kernel
+        return PeakBounds.of(
+            own.model, own.torque, units, designs, lambda x, at: (self.at(at) if at.size else self).kernel.errors(x)
+        )
 
     @property
     def _peak_with_stiffness(self) -> StiffnessResponse:
@@ -464,9 +456,8 @@ class ReducerModel(Model):
         stage, angles = self.reducer.cycloid_stage, self.kernel.model.search.coarse
         multiples = {number * own for number in range(1, _MULTIPLES + 1) for own in (stage.disc_teeth, stage.pin_count)}
         # One turn does not part waves that lie closer than a quarter of one.
-        gears = {
-            round(own, 3) for own in self.reducer.open_orders if min(abs(own - whole) for whole in multiples) > 0.25
-        }
+        own_waves = (own for own in self.reducer.open_orders if min(abs(own - whole) for whole in multiples) > 0.25)
+        gears = {round(own, 3) for own in own_waves}
         own = sorted({1, 2, *multiples, *gears})
         return {order: wave_outputs(order) for order in own if self.reducer.resolves(order, angles)}
 
@@ -497,14 +488,8 @@ class ReducerModel(Model):
         """Largest pin force of exact parts with the modification in force under their rated torque [N]."""
         return rated_pin_force(self.reducer_in_force)
 
-    def examined(self, x: Float[np.ndarray, "sample column"]) -> Mapping[str, float]:
-        """Return how many random units are preloaded or have no radial clearance, by how much, and what turns them.
-
-        Parameters
-        ----------
-        x
-            Deviations of the random units [m, angles rad].
-        """
+    def examined(self, x: Samples) -> Mapping[str, float]:
+        """Return how many random units are preloaded or have no radial clearance, by how much, and what turns them."""
         found, rated = preload(self.kernel.model, self.kernel.errors(x)), self.rated_pin_force
         solved = found.status == 0
         counted = {"units [-]": len(x), "units in equilibrium [-]": int(solved.sum())}

@@ -119,17 +119,7 @@ class Optimum:
 
 
 class BestPoint:
-    """Evaluates points of a problem, counts them and keeps the best.
-
-    Attributes
-    ----------
-    amounts
-        Best amounts up to now [m].
-    objective, violation
-        Objective and missed constraints there [m].
-    evaluations
-        Points that were evaluated [-].
-    """
+    """Evaluates points of a problem, counts them and keeps the best."""
 
     def __init__(self, problem: ModificationProblem) -> None:
         self.problem = problem
@@ -150,12 +140,9 @@ class BestPoint:
 def reference(problem: ModificationProblem) -> Optimum:
     """Return the optimum of a problem: for each equidistant amount the best shift, and of these the best.
 
-    Notes
-    -----
-    Both searches narrow a grid down around its best point, by comparison alone. So kinks, bounds and corners of the
-    constraints need no care, and an optimum is missed only if it hides between the points of the first grid, 33 × 33.
-
-    Own derivation: min over Δr_rp of the min over Δr_p, to 1e-4 of a grid's cell [m].
+    Both searches narrow a grid down around its best point, by comparison alone (own derivation). So kinks, bounds and
+    corners of the constraints need no care, and an optimum is missed only if it hides between the points of the first
+    grid, 33 × 33.
     """
     best = BestPoint(problem)
 
@@ -196,17 +183,16 @@ def residual_gap(
 ) -> ModificationProblem:
     """Return the problem of the least mean gap that is left on the working flank once it is closed at φ0.
 
-    The mean is over n + 1 equally spaced φ of the work interval [rad]. Both amounts are between 0 and a largest one,
-    which is assumed; the default of the work interval is that of song2019, as li2018 prints neither it nor n.
+    Mean over φ of Δr_rp·(1 − S) − Δr_p·(C − q·S) ≥ 0, Δr_rp − Δr_p ≥ j, over n + 1 equally spaced φ of the work
+    interval [rad]. Both amounts are between 0 and a largest one, which is assumed; the default of the work interval is
+    that of song2019, as li2018 prints neither it nor n.
 
     Notes
     -----
     li2018's formulas are lost, and its "difference of two curves", taken literally, is least without any shift; this
     is a well-posed reading [A]: least mean gap (`tolalloc.reducers.cycloid.clearance.formula_gap`) with a radial
-    clearance of j or more and a gap of 0 or more everywhere. It is a linear program, `closed_form`. Gaps are the linear
-    formula's, good for amounts up to 50 µm.
-
-    Mean over φ of Δr_rp·(1 − S) − Δr_p·(C − q·S) ≥ 0, Δr_rp − Δr_p ≥ j (own derivation).
+    clearance of j or more and a gap of 0 or more everywhere, a linear program, whose closed form stands in
+    `studies/published/li2018_closed_form.py`. Gaps are the linear formula's, good for amounts up to 50 µm.
     """
     angle, (first, last) = np.linspace(*interval, intervals + 1), (end / DEGREE for end in interval)
     units = (Modification(equidistant=1.0, shift=0.0), Modification(equidistant=0.0, shift=1.0))
@@ -227,24 +213,6 @@ def residual_gap(
     )
 
 
-def closed_form(stage: CycloidStage, radial_clearance: float) -> Modification:
-    """Return the optimum of `residual_gap` with a radial clearance j, Δr_rp = j/(1 − q) and Δr_p = j·q/(1 − q).
-
-    Notes
-    -----
-    With v = Δr_rp − Δr_p ≥ j and u = q·Δr_rp − Δr_p ≥ 0 the gap at one φ is
-    [v·((1 − S) − q(C − qS)) + u·((C − qS) − (1 − S))]/(1 − q). Both factors are never negative: the first is the gap
-    itself at u = 0, and C is concave from 1 at S = 0 to q at S = 1, so it lies above its chord 1 − (1 − q)S. So both v
-    and u are best at their least, whatever the work interval and the number of its points. It holds for 0 < q < 1,
-    which every stage that can be ground has, and as long as both amounts lie in the box of the problem.
-    """
-    ratio = stage.flank_ratio
-    return Modification(
-        equidistant=radial_clearance / (1 - ratio),
-        shift=radial_clearance * ratio / (1 - ratio),
-    )
-
-
 def rotated_profile_fit(
     stage: CycloidStage,
     shift_sign: int = 1,
@@ -261,20 +229,18 @@ def rotated_profile_fit(
     shift_sign
         1 for a positive and −1 for a negative shift [-].
     metric
-        Distance of the two profiles, `METRICS`; song2019 takes ``same_angle``.
+        Distance of the two profiles, `METRICS`; song2019 takes ``same_angle``, which is mostly slip along the profile
+        and no error of it. ``nearest`` carries the modified profile on beyond root and tip.
     rotation
         δ of the profile to come close to [rad].
     points
         m: the mean is over φ = iπ/m, i = 1…m as in the source's sum, so the tip counts and the root does not [-].
-    radial_clearance, require_gap
-        As in `ModificationProblem` [m].
 
     Notes
     -----
-    ``same_angle`` is mostly slip along the profile, which is no error of the profile. ``nearest`` carries the modified
-    profile on beyond root and tip. Δr_rp goes from 0 to 1 mm and Δr_p from 0 to 1 mm or, by its sign, to −1 mm, a box
-    that is assumed. The source prints Δr_rp − |Δr_p| > 0 as its condition of a radial clearance (equation (11)), which
-    for a negative shift is none; here it is Δr_rp − Δr_p ≥ j for both signs.
+    Δr_rp goes from 0 to 1 mm and Δr_p from 0 to 1 mm or, by its sign, to −1 mm, a box that is assumed. The source
+    prints Δr_rp − |Δr_p| > 0 as its condition of a radial clearance (equation (11)), which for a negative shift is
+    none; here it is Δr_rp − Δr_p ≥ j for both signs.
 
     References
     ----------
@@ -456,16 +422,7 @@ def choose(request: ModificationRequest, reducer: Reducer, torque: float) -> Mod
     References
     ----------
     xi2015, equation (3), for wanted clearances; song2019, equation (10); li2018, whose formulas are lost, as
-    `residual_gap` reads it.
-
-    Amounts of the wanted clearances, or the optimum of song2019 (2019) or li2018 (2018) with Δr_rp − Δr_p ≥ j.
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> found = choose(ModificationRequest(method="li2018"), load_reducer("rv40e_xi2015"), -572.0)
-    >>> [round(float(amount) / 1e-6, 3) for amount in found.best.amounts]  # Δr_rp, Δr_p [µm]
-    [35.968, 20.968]
+    `residual_gap` reads it, each with Δr_rp − Δr_p ≥ j.
     """
     if reducer.form is not None:
         raise InputError.at(

@@ -39,13 +39,7 @@ _NICE = (1.0, 2.0, 5.0)
 
 
 def place_of(source: str) -> str:
-    """Return the id of the place that a source sits at.
-
-    Examples
-    --------
-    >>> place_of("disc2.each_tooth.pitch"), place_of("crank1.journal2.phase"), place_of("carrier.tilt")
-    ('disc2.teeth', 'crank1.journal2', 'carrier')
-    """
+    """Return the id of the place that a source sits at, such as ``disc2.teeth`` of ``disc2.each_tooth.pitch``."""
     kind = SOURCES.of(source)
     if kind is None or not kind.place:
         names = [own.name for own in SOURCES.kinds if own.place]
@@ -249,10 +243,6 @@ class Scene:
         """Source of the drawing → id of its place."""
         return {source: place.id for place in self.places for source in place.sources}
 
-    def angle(self, part: str, carrier_angle: float, number: int = 0) -> float:
-        """Return where a part stands at a carrier angle: an entry of `start`, its number from 0 [rad]."""
-        return float(self.start[part][number] + self.turns[part] * carrier_angle)
-
 
 def scene_of(
     model: EquivalentModel,
@@ -273,10 +263,8 @@ def scene_of(
         Deviations of the unit in the order of the model's columns, the tooth modification among them [m, angles rad].
     torque
         Torque on the carrier; its magnitude resists both directions [N·m].
-    unit
-        Name of the unit.
-    sources
-        Names of the drawing's sources.
+    unit, sources
+        Names of the unit and of the drawing's sources.
     per_crank_turn
         Angles per turn of the cranks [-].
     """
@@ -359,10 +347,6 @@ def _first_tooth(teeth: int, others: int, direction: float) -> float:
 
 def _magnification(reducer: Reducer, *states: States) -> float:
     """Return the largest of 1, 2, 5, 10, … at which no gap is drawn wider than half a pin's radius [-].
-
-    Examples
-    --------
-    A gap of 20 µm beside pins of 2 mm radius is drawn 50 times larger, 1 mm wide.
 
     Own derivation: m = r_rp/(2·largest gap), rounded down to 1, 2 or 5 times a power of ten.
     """

@@ -1,26 +1,30 @@
-"""What may be chosen of a reducer: the clearances that its modification leaves, and conditions that change no part."""
+"""What may be chosen of a reducer: the clearances that its modification leaves, and how warm its discs may be."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 from tolalloc.models.settings import Setting
-from tolalloc.reading.named_fields import number
-from tolalloc.reducers import DISC_TEMPERATURE, TORQUE
+from tolalloc.reading.named_fields import is_number, number
 
 FLANK = "flank clearance [µm]"
 RADIAL = "radial clearance [µm]"
 TURNED = "rotation clearance [µm]"
 _STEP = 0.1
 """Step of a difference by a clearance, to either side [µm]."""
-_WIDEST_TEMPERATURE = 20.0
-"""Difference of temperature that the live page offers either way [K]."""
 FARTHEST_TEMPERATURE = 50.0
 """Largest difference of temperature between discs and ring that is believed, either way [K]."""
 TEMPERATURE = number(
     f"−{FARTHEST_TEMPERATURE:g} to {FARTHEST_TEMPERATURE:g} K", least=-FARTHEST_TEMPERATURE, most=FARTHEST_TEMPERATURE
 )
 """Rule of a difference of temperature between discs and ring."""
+
+
+def is_range(value: Any, farthest: float) -> bool:
+    """Return whether a value is two numbers, neither beyond the farthest to either side, the smaller one first."""
+    pair = isinstance(value, Sequence) and len(value) == 2 and all(map(is_number, value))
+    return pair and -farthest <= value[0] <= value[1] <= farthest
 
 
 def clearance_settings(present: Sequence[float], bounds: Iterable[tuple[float, float] | None]) -> tuple[Setting, ...]:
@@ -32,15 +36,3 @@ def clearance_settings(present: Sequence[float], bounds: Iterable[tuple[float, f
         Setting(name=name, value=value, lower=own[0] if own else value, upper=own[1] if own else value, step=_STEP)
         for name, value, own in zip((TURNED, FLANK, RADIAL)[-len(present) :], present, bounds, strict=True)
     )
-
-
-def torque_condition(present: float, rated: float) -> Setting:
-    """Return the torque as an operating condition, up to twice the rated one either way, or as far as it is [N·m]."""
-    largest = max(2 * rated, abs(present))
-    return Setting(name=TORQUE, value=present, lower=-largest, upper=largest, step=rated / 100)
-
-
-def temperature_condition(present: float) -> Setting:
-    """Return the temperature of the discs above the ring as an operating condition, up to 20 K either way [K]."""
-    largest = max(_WIDEST_TEMPERATURE, abs(present))
-    return Setting(name=DISC_TEMPERATURE, value=present, lower=-largest, upper=largest, step=0.1)

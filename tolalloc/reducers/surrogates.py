@@ -14,7 +14,7 @@ from tolalloc.models.model import Evaluation, KeepsTables, Response
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
-from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.reducers.response.kernel import KernelResponse, Samples
 from tolalloc.running.chunks import map_chunks
 
 
@@ -36,7 +36,7 @@ class Corrected:
         """The output of the response."""
         return self.response.outputs
 
-    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+    def __call__(self, x: Samples) -> Evaluation:
         """Return the corrected answers; a sample that fails stays a failed one."""
         evaluation = self.response(x)
         return replace(evaluation, values=self.offset + self.factor * evaluation.values)
@@ -75,7 +75,7 @@ class ContactCandidate:
         """What a table calls it."""
         return f"contact at {self.angles} angles"
 
-    def fit(self, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, " sample"]) -> Corrected:
+    def fit(self, x: Samples, y: Float[np.ndarray, " sample"]) -> Corrected:
         """Return the model at fewer angles, brought to the answers."""
         keys = [row.tobytes() for row in x]
         new = [at for at, key in enumerate(keys) if key not in self._known]
@@ -104,14 +104,14 @@ class CurveRegression:
     modes: Any  # The fitted principal modes of the curves
     estimator: Any  # The fitted estimator of the modes' amounts
 
-    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+    def __call__(self, x: Samples) -> Evaluation:
         """Return the peak-to-peak of the fitted curves."""
         values = np.empty((x.shape[0], 1))
         for rows, curves in map_chunks(self.curves, x):
             values[rows, 0] = np.ptp(curves, axis=1)
         return Evaluation(values=values, status=np.zeros(x.shape[0], np.uint8))
 
-    def curves(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample angle"]:
+    def curves(self, x: Samples) -> Float[np.ndarray, "sample angle"]:
         """Return the fitted curves [output]."""
         return np.asarray(self.modes.inverse_transform(self.estimator.predict(x)))
 
@@ -132,7 +132,7 @@ class CurveCandidate:
         """What a table calls it."""
         return f"sparse quadratic regression of {self.modes} modes of the curve"
 
-    def fit(self, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, " sample"]) -> Corrected:
+    def fit(self, x: Samples, y: Float[np.ndarray, " sample"]) -> Corrected:
         """Return the regression through the curves of the samples, its peak-to-peak brought to the answers."""
         from sklearn.decomposition import PCA
         from sklearn.multioutput import MultiOutputRegressor

@@ -60,25 +60,16 @@ class TransmissionErrorResult:
 def transmission_error(
     reducer: Reducer, unit: BuiltUnit, torque: float, *, attributed: bool = False
 ) -> TransmissionErrorResult:
-    """Return what a unit does over one output turn.
+    """Return what a unit does over one output turn, and if asked for, which source makes how much of each order.
 
-    Parameters
-    ----------
-    reducer, unit
-        The nominal design and the errors of its parts.
-    torque
-        Torque on the carrier, negative resists the rotation; any but 0, where play leaves the unit undetermined [N·m].
-    attributed
-        Whether it is said which source makes how much of each order.
-
-    Notes
-    -----
-    TE(θc) = θ(θc) − θc, the rotation of the carrier beyond that of ideal gears, in the equilibrium of all springs at
-    every carrier angle θc. Peak-to-peak is between extremes that are refined beyond the equally spaced angles.
+    The torque on the carrier is negative where it resists the rotation, and any but 0, where play leaves the unit
+    undetermined [N·m]. TE(θc) = θ(θc) − θc, the rotation of the carrier beyond that of ideal gears, in the equilibrium
+    of all springs at every carrier angle θc. Peak-to-peak is between extremes that are refined beyond the equally
+    spaced angles.
 
     References
     ----------
-    liu2020, whose unit of Table 4 the example is.
+    liu2020.
     """
     reducer = unit.as_built(reducer)
     model = EquivalentModel(at_torque(reducer, torque), orders=unit.orders or HARMONICS)

@@ -86,13 +86,7 @@ class BuiltUnit:
         return Modification(**{name.rpartition(".")[2]: self.deviations.get(name, stated[name]) for name in stated})
 
     def as_built(self, reducer: Reducer) -> Reducer:
-        """Return the reducer with the form of the unit's measured discs and pins, itself where none is stated.
-
-        Raises
-        ------
-        InputError, UnknownNameError
-            A disc or pin that the reducer does not have, or a profile that is not one of its discs.
-        """
+        """Return the reducer with the form of the unit's measured discs and pins, itself where none is stated."""
         if not (self.profiles or self.roundness):
             return reducer
         stage, form, assumptions = reducer.cycloid_stage, reducer.form or PartForm(), list(reducer.assumptions)
@@ -121,17 +115,10 @@ class BuiltUnit:
         )
 
     def require_no_form(self, place: str) -> None:
-        """Raise if the unit states profiles or roundness where units share one model.
-
-        Raises
-        ------
-        InputError
-            It states them.
-        """
+        """Raise if the unit states profiles or roundness where units share one model."""
         for name in (*self.profiles, *self.roundness):
-            raise InputError.at(
-                place, "unit", self.name, f"one without the form of single parts, and this one states that of {name}"
-            )
+            allowed = f"one without the form of single parts, and this one states that of {name}"
+            raise InputError.at(place, "unit", self.name, allowed)
 
     @property
     def orders(self) -> tuple[int, ...]:
@@ -144,13 +131,12 @@ class BuiltUnit:
         held: dict[str, float] = {}
         for disc in self.profiles:
             teeth = _columns_in_profile(disc)
-            if stated := next(
-                (column for column, value in self.deviations.items() if value and teeth.match(column)), ""
-            ):
-                raise InputError(
-                    f"unit {self.name}: {stated} is stated beside the profile of {disc}, which holds it; allowed is "
-                    "one of the two."
-                )
+            for column, value in self.deviations.items():
+                if value and teeth.match(column):
+                    raise InputError(
+                        f"unit {self.name}: {column} is stated beside the profile of {disc}, which holds it; allowed "
+                        "is one of the two."
+                    )
             held |= {column: 0.0 for column in columns if teeth.match(column)}
         return held
 
@@ -160,14 +146,7 @@ class BuiltUnit:
         """Return the unit as one row of errors in the order of the model's columns [m].
 
         Nominal are the values that the reducer's design gives, such as its modification, for a unit that does not state
-        its own.
-
-        Raises
-        ------
-        UnknownNameError
-            The unit has an error that the model does not know.
-        InputError
-            The model has a column that the unit neither states nor neglects.
+        its own. All must be the model's columns, of which each is stated or neglected.
         """
         names, deviations = tuple(columns), {**self._in_profiles(columns), **(nominal or {}), **self.deviations}
         for column in self.deviations:
@@ -226,19 +205,15 @@ def load_unit(name: str | Path) -> BuiltUnit:
         deviations=deviations,
         neglected=record.neglected,
         assumptions=record.assumptions,
-        profiles={name: _profile(path.parent, own) for name, own in record.profiles.items()},
+        profiles={
+            name: MeasuredProfile(
+                path=path.parent / own.file,
+                datum=radians(own.datum_deg),
+                **own.model_dump(exclude={"file", "datum_deg"}),
+            )
+            for name, own in record.profiles.items()
+        },
         roundness=roundness,
-    )
-
-
-def _profile(folder: Path, record: ProfileRecord) -> MeasuredProfile:
-    return MeasuredProfile(
-        path=folder / record.file,
-        datum=radians(record.datum_deg),
-        aligned=record.aligned,
-        from_drawing=record.from_drawing,
-        spans=record.spans,
-        across=record.across,
     )
 
 
@@ -259,12 +234,8 @@ def unit_names(table: TextTable) -> tuple[str, ...]:
         if not name:
             raise InputError.at(f"{table.path}, row {row}", "unit", name, "a name")
         if name in first_row:
-            raise InputError.at(
-                f"{table.path}, row {row}",
-                "unit",
-                name,
-                f"each name once, and this one stands in row {first_row[name]}",
-            )
+            allowed = f"each name once, and this one stands in row {first_row[name]}"
+            raise InputError.at(f"{table.path}, row {row}", "unit", name, allowed)
         first_row[name] = row
     return tuple(first_row)
 
@@ -279,12 +250,8 @@ def _column(path: Path, header: str) -> tuple[str, float, float]:
     angle = _is_angle(column)
     allowed = ANGLE_UNITS if angle else LENGTH_UNITS
     if unit not in allowed:
-        raise InputError.at(
-            path,
-            f"the unit of column {column!r}",
-            unit,
-            f"{' or '.join(allowed)} in square brackets, as {column!r} is {'an angle' if angle else 'a length'}",
-        )
+        what = f"{' or '.join(allowed)} in square brackets, as {column!r} is {'an angle' if angle else 'a length'}"
+        raise InputError.at(path, f"the unit of column {column!r}", unit, what)
     return (column, MICRORADIAN, LARGEST_ANGLE) if angle else (column, MICROMETRE, LARGEST_LENGTH)
 
 
@@ -354,11 +321,10 @@ def units_text(units: Sequence[BuiltUnit], path: str | Path, comments: Sequence[
                 f"{path}: units {units[0].name} and {unit.name} do not both state {column}; units of one table state "
                 "the same columns."
             )
-    angle = [_is_angle(column) for column in columns]
-    headers = [f"{column} [{'µrad' if turns else 'µm'}]" for column, turns in zip(columns, angle, strict=True)]
-    factors = [MICRORADIAN if turns else MICROMETRE for turns in angle]
+    written = {own: ("µrad", MICRORADIAN) if _is_angle(own) else ("µm", MICROMETRE) for own in columns}
+    headers = [f"{column} [{name}]" for column, (name, _) in written.items()]
     rows = (
-        [unit.name, *(float(unit.deviations[column]) / factor for column, factor in zip(columns, factors, strict=True))]
+        [unit.name, *(float(unit.deviations[column]) / factor for column, (_, factor) in written.items())]
         for unit in units
     )
     return table_text(["unit", *headers], rows, comments)

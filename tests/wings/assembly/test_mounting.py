@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from studies.benchmarks.plain_rows import dense_rows
 from tests.builders import baseline_errors, kernel_of, seeded_units, written
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError, TolallocError, UnknownNameError
 from tolalloc.models.model import Evaluation
 from tolalloc.reading.units import ARCSECOND, MICROMETRE
-from tolalloc.reducers.equivalent.interfaces import crank_disc, dense_rows
+from tolalloc.reducers.equivalent.interfaces import crank_disc
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.springs import Positions
 from tolalloc.reducers.reducer.design import Reducer

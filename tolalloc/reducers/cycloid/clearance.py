@@ -40,14 +40,10 @@ def is_large(stage: CycloidStage, modification: Modification) -> bool:
     return max(abs(amount) for amount in amounts) > LARGE
 
 
-def linear_clearance(
-    stage: CycloidStage, modification: Modification, pin_angle: Angles
-) -> Float[np.ndarray, "*angles"]:
+def linear_clearance(stage: CycloidStage, modification: Modification, pin_angle: Angles) -> Angles:
     """Return the material removed along the normal, Δr_rp − Δr_p·cos κ + δ·r_d·|S|, theory page equation (35) [m].
 
-    First order in the amounts: good to 0.3 µm up to `LARGE`.
-
-    Good to 0.3 µm on the working flanks up to amounts of about 50 µm; cos κ and S of `normals`.
+    First order in the amounts: good to 0.3 µm on the working flanks up to `LARGE`; cos κ and S of `normals`.
 
     References
     ----------
@@ -68,7 +64,7 @@ def linear_clearance(
     return np.asarray(modification.equidistant - modification.shift * into.along_radius + turned)
 
 
-def removed(profile: ToothProfile, pin_angle: Angles) -> Float[np.ndarray, "*angles"]:
+def removed(profile: ToothProfile, pin_angle: Angles) -> Angles:
     """Return the material that a drawing's profile removes, `linear_clearance` less a free form, theory page (83) [m].
 
     Own derivation, first order in amounts and form.
@@ -77,7 +73,7 @@ def removed(profile: ToothProfile, pin_angle: Angles) -> Float[np.ndarray, "*ang
     return found if profile.form is None else found - profile.form.at(pin_angle)
 
 
-def formula_gap(stage: CycloidStage, modification: Modification, pin_angle: Angles) -> Float[np.ndarray, "*angles"]:
+def formula_gap(stage: CycloidStage, modification: Modification, pin_angle: Angles) -> Angles:
     """Return Li Lixing's gap after closing at φ0, Δr_rp(1 − S) − Δr_p(cos κ − q·S) [m].
 
     Right only if Δr_rp·q ≥ Δr_p; otherwise another pin touches first and the formula goes negative.
@@ -85,14 +81,6 @@ def formula_gap(stage: CycloidStage, modification: Modification, pin_angle: Angl
     References
     ----------
     xi2015, equation (3).
-
-    Examples
-    --------
-    >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> stage, amounts = load_reducer("rv40e_xi2015").cycloid_stage, Modification(equidistant=-2e-6, shift=-8e-6)
-    >>> found = formula_gap(stage, amounts, np.array([0.0, np.arccos(stage.shortening), pi]))
-    >>> [f"{abs(gap):.3f}" for gap in 1e6 * found]  # root, φ0 and tip [µm]
-    ['6.000', '0.000', '6.000']
     """
     into = normals(stage.shortening, pin_angle)
     shift = into.along_radius - stage.flank_ratio * into.lever
@@ -132,11 +120,11 @@ def gap_of(profile: ToothProfile, exact: bool) -> Gap:
     """
     stage, lever, form = profile.stage, profile.stage.disc_pitch_radius, profile.form
 
-    def linear(pin_angle: Angles, rotation: Rotation) -> Float[np.ndarray, "*angles"]:
+    def linear(pin_angle: Angles, rotation: Rotation) -> Angles:
         closing = lever * normals(stage.shortening, pin_angle).lever * rotation
         return np.asarray(linear_clearance(stage, profile.modification, pin_angle) - closing)
 
-    def distance(pin_angle: Angles, rotation: Rotation) -> Float[np.ndarray, "*angles"]:
+    def distance(pin_angle: Angles, rotation: Rotation) -> Angles:
         by = np.broadcast_to(rotation, pin_angle.shape).ravel()
         return np.asarray(exact_clearance([profile], pin_angle.ravel(), by)[0].reshape(pin_angle.shape))
 
@@ -188,7 +176,6 @@ def clearance_of(profile: ToothProfile, exact: bool | None = None) -> FlankClear
     """Return the clearance of a sound profile and where the first pin truly touches.
 
     Distances are exact by default only where the modification is too large for the linear formula.
-
     """
     from scipy.optimize import brentq
 

@@ -33,6 +33,8 @@ from tolalloc.reducers.cycloid.tooth_profile import (
 from tolalloc.reducers.reducer.design import CycloidStage, Reducer
 from tolalloc.reducers.reducer.stiffness import Stiffness
 
+AtPhases = Float[np.ndarray, " phase"]
+AtPins = Float[np.ndarray, "phase disc pin"]
 APPROACH = 2.0 / 3.0
 """Constant of the approach F/c·(ln(cL/F) + 2/3) of pin and tooth: Roark's and Li Lixing's, who write it
 2/3 + ln(16·r·ρ/(2a)²) with Hertz's half width a [-]."""
@@ -44,9 +46,7 @@ _SHORTEST = 1e-6  # lever below which a pin at tip or root carries no torque [-]
 _ROUNDING = 1e-12  # difference of amounts that counts as none [m]
 
 
-def contact_stiffness(
-    stage: CycloidStage, stiffness: Stiffness, pin_angle: Angles
-) -> tuple[Float[np.ndarray, "*angles"], Float[np.ndarray, "*angles"]]:
+def contact_stiffness(stage: CycloidStage, stiffness: Stiffness, pin_angle: Angles) -> tuple[Angles, Angles]:
     """Return what `pin_force` takes of pins against the teeth that they meet.
 
     First of the linear laws the stiffness, of the logarithmic one its scale C; bending in series [N/m]. Then ln(λ/1 m)
@@ -77,8 +77,6 @@ def crowned_contact(
 
     K = F/δ of the law, C, C(ρ−r)/(ρ+r) or c/ln(cλ/F) [N/m].
 
-    References
-    ----------
     Own derivation, theory page (31); within 7 % of Hertz's ellipse under the logarithmic law.
     """
     stage, shape = reducer.cycloid_stage, np.broadcast_shapes(pin_angle.shape, force.shape)
@@ -95,7 +93,7 @@ def crowned_contact(
     )
 
 
-def pin_contact_table2(stage: CycloidStage, convex_stiffness: float, pin_angle: Angles) -> Float[np.ndarray, "*angles"]:
+def pin_contact_table2(stage: CycloidStage, convex_stiffness: float, pin_angle: Angles) -> Angles:
     """Return K_djk along the tooth: C(ρ−r)/(ρ+r) on the concave part, C on the convex part [N/m].
 
     With the curvature κ of the pin centre's path it is C/(1 + 2rκ). The printed formula with its signed curvature is
@@ -111,7 +109,7 @@ def pin_contact_table2(stage: CycloidStage, convex_stiffness: float, pin_angle: 
     return np.asarray(convex_stiffness / (1 + 2 * stage.pin_radius * np.maximum(path_curvature(stage, pin_angle), 0.0)))
 
 
-def equivalent_length(stage: CycloidStage, pin_angle: Angles) -> Float[np.ndarray, "*angles"]:
+def equivalent_length(stage: CycloidStage, pin_angle: Angles) -> Angles:
     """Return λ = L·exp(2/3) of the approach F/c·ln(cλ/F), theory page equation (30) [m].
 
     L is the radius of curvature of the path of the pin's centre on the disc: the flank's radius plus r_rp where the
@@ -134,9 +132,7 @@ def equivalent_length(stage: CycloidStage, pin_angle: Angles) -> Float[np.ndarra
     return np.asarray(exp(APPROACH) / np.maximum(bend, 1 / stage.pin_circle_radius))
 
 
-def peak_pressure(
-    stage: CycloidStage, contact_modulus: float, pin_angle: Angles, force: Float[np.ndarray, "*angles"]
-) -> Float[np.ndarray, "*angles"]:
+def peak_pressure(stage: CycloidStage, contact_modulus: float, pin_angle: Angles, force: Angles) -> Angles:
     """Return Hertz's peak pressure √(F·E*/(πb·R)), R from the pin and the tooth's own curvature where it touches [Pa].
 
     E* is that of pin and disc, the angle φ that of the pins from the crank direction [rad], the force theirs [N].
@@ -219,14 +215,14 @@ class PressedDiscs:
         """What the modification leaves, and where the first pin touches."""
         return clearance_of(self.profile, self.exact)
 
-    def pin_angles(self, phase: Float[np.ndarray, " phase"]) -> Float[np.ndarray, "phase disc pin"]:
+    def pin_angles(self, phase: AtPhases) -> AtPins:
         """Return φ of every pin from its disc's crank direction [rad]."""
         stage = self.reducer.cycloid_stage
         turned = 2 * pi * np.arange(self.discs) / self.discs
         return np.stack([pin_angles(stage, phase - direction) for direction in turned], axis=1)
 
 
-def default_phases(reducer: Reducer, count: int = 72) -> Float[np.ndarray, " phase"]:
+def default_phases(reducer: Reducer, count: int = 72) -> AtPhases:
     """Return equally spaced phases over one pin pitch, the first with a pin in the crank direction [rad].
 
     Phase k is 2π·k/(zp·count), own derivation: after one pin pitch everything repeats.
@@ -234,7 +230,7 @@ def default_phases(reducer: Reducer, count: int = 72) -> Float[np.ndarray, " pha
     return 2 * pi / reducer.cycloid_stage.pin_count * np.arange(count) / count
 
 
-def _zones(gap: Gap, rotation: Float[np.ndarray, " phase"], contact: float) -> Float[np.ndarray, "phase 2"]:
+def _zones(gap: Gap, rotation: AtPhases, contact: float) -> Float[np.ndarray, "phase 2"]:
     """Return the first and the last angle of compression, tabulated and then bisected for all phases at once [rad]."""
     table = np.sort(np.append(FLANK, contact))  # a light load may press nothing but the first contact
     shape = (rotation.size, table.size)
@@ -247,13 +243,7 @@ def _zones(gap: Gap, rotation: Float[np.ndarray, " phase"], contact: float) -> F
     return np.stack(edges, axis=1)
 
 
-def _loaded(
-    discs: PressedDiscs,
-    method: str,
-    phase: Float[np.ndarray, " phase"],
-    deflection: Float[np.ndarray, " phase"],
-    force: Float[np.ndarray, "phase disc pin"],
-) -> LoadedContact:
+def _loaded(discs: PressedDiscs, method: str, phase: AtPhases, deflection: AtPhases, force: AtPins) -> LoadedContact:
     """Return the contact whose deflection and forces a method has found.
 
     Phases are angles from the crank direction of disc 1 to the next pin [rad], deflections δ_max [m], forces those of
@@ -281,9 +271,7 @@ def _loaded(
     )
 
 
-def pressed_linear(
-    discs: PressedDiscs, phase: Float[np.ndarray, " phase"], deflection: float | None = None
-) -> LoadedContact:
+def pressed_linear(discs: PressedDiscs, phase: AtPhases, deflection: float | None = None) -> LoadedContact:
     """Return the contact by Li Lixing's method: forces in proportion to the compressions.
 
     Without a deflection δ_max [m] it is iterated until it is the approach under the largest force, by the reducer's
@@ -307,10 +295,10 @@ def pressed_linear(
     gap, closed = gap_of(discs.profile, discs.clearance.exact), discs.clearance
     lever, distance = normals(stage.shortening, angles).lever, gap(angles, closed.rotation)
 
-    def shares(depth: Float[np.ndarray, " phase"]) -> Float[np.ndarray, "phase disc pin"]:
+    def shares(depth: AtPhases) -> AtPins:
         return np.asarray(np.maximum(lever - distance / depth[:, np.newaxis, np.newaxis], 0.0))
 
-    def largest_force(depth: Float[np.ndarray, " phase"]) -> Float[np.ndarray, " phase"]:
+    def largest_force(depth: AtPhases) -> AtPhases:
         return np.asarray(discs.torque / (stage.disc_pitch_radius * (shares(depth) * lever).sum(axis=(1, 2))))
 
     nearest = np.where(lever > _SHORTEST, distance / np.maximum(lever, _SHORTEST), np.inf).min(axis=(1, 2))
@@ -329,11 +317,7 @@ def pressed_linear(
     return _loaded(discs, method, phase, depth, force)
 
 
-def _iterated(
-    discs: PressedDiscs,
-    nearest: Float[np.ndarray, " phase"],
-    largest_force: Callable[[Float[np.ndarray, " phase"]], Float[np.ndarray, " phase"]],
-) -> Float[np.ndarray, " phase"]:
+def _iterated(discs: PressedDiscs, nearest: AtPhases, largest_force: Callable[[AtPhases], AtPhases]) -> AtPhases:
     """Return the deflections that are the approach under their own largest force [m].
 
     The plain iteration swings from too many pins to too few, or to none; so the mean of old and new is taken, and the
@@ -352,7 +336,7 @@ def _iterated(
     raise SolveError(f"{discs.reducer.name}: Li Lixing's iteration did not settle in {_ITERATIONS} steps.")
 
 
-def _approach(reducer: Reducer, force: Float[np.ndarray, " phase"]) -> Float[np.ndarray, " phase"]:
+def _approach(reducer: Reducer, force: AtPhases) -> AtPhases:
     """Return how far pin and tooth at φ0 approach each other under forces [m]."""
     stage, stiffness = reducer.cycloid_stage, reducer.stiffness
     contact, log_length = contact_stiffness(stage, stiffness, np.array([flank_angle(stage)]))
@@ -401,7 +385,7 @@ class _Balance:
         """Return the torques of the pins on the discs [N·m]."""
         return np.asarray((self._lever[phase] * self.forces(deflection, phase)).sum(axis=1))
 
-    def deflection(self) -> Float[np.ndarray, " phase"]:
+    def deflection(self) -> AtPhases:
         """Return the deflections at which the torques balance [m]."""
         from scipy.optimize import elementwise
 
@@ -425,13 +409,11 @@ class _Balance:
         return np.asarray(found.x)
 
 
-def pressed(discs: PressedDiscs, phase: Float[np.ndarray, " phase"]) -> LoadedContact:
+def pressed(discs: PressedDiscs, phase: AtPhases) -> LoadedContact:
     """Return the contact of every pin by the reducer's own law, the rotation bracketed until the torques balance.
 
     Theory page equation (37). All discs turn by the same angle; a single one carries the whole torque.
 
-    References
-    ----------
     Own derivation; Li Lixing's method, xi2015, takes the curvature at φ0 for all.
 
     Examples
@@ -504,8 +486,6 @@ def pin_moment(reducer: Reducer, torque: float) -> float:
 
     T_pins = T·(1 − 1/i)·zc/zp; exact without friction and tilt.
 
-    References
-    ----------
     Own derivation, from the balance of moments about the housing's centre.
     """
     stage = reducer.cycloid_stage

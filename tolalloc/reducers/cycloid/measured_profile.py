@@ -18,8 +18,10 @@ from tolalloc.reading.units import ARCSECOND, DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.cycloid.clearance import removed
 from tolalloc.reducers.cycloid.tooth_profile import ToothProfile, nearest_angles, normals, path_of
 from tolalloc.reducers.reducer.design import CycloidStage
-from tolalloc.reducers.reducer.form import FlankForm, flank_form, read_profile
+from tolalloc.reducers.reducer.form import FlankForm, Points, flank_form, read_profile
 
+Places = Complex[np.ndarray, " point"]
+"""Points of a plane, x + iy [m]."""
 _DENSE = 256  # places of a tooth among which the one nearest to a point is looked for first
 _MOVES = 30  # rigid movements until they no longer change
 _STILL = 1e-13  # movement that changes nothing any more [m]
@@ -132,9 +134,7 @@ class MeasuredProfile:
         return replace(base, deviation=tuple(found.tolist()))
 
 
-def _around(
-    stage: CycloidStage, path: Path, space: Float[np.ndarray, " point"], angle: Float[np.ndarray, " point"]
-) -> Float[np.ndarray, " point"]:
+def _around(stage: CycloidStage, path: Path, space: Points, angle: Points) -> Points:
     """Return φ that goes on clockwise around the disc [rad]."""
     for name, values, wrong, allowed in (
         ("space", space, (space != np.rint(space)) | (space < 1) | (space > stage.disc_teeth), stage.disc_teeth),
@@ -146,9 +146,7 @@ def _around(
     return np.asarray(angle - 2 * pi * (space - 1))
 
 
-def normal_deviations(
-    stage: CycloidStage, place: Complex[np.ndarray, " point"], name: str
-) -> tuple[Float[np.ndarray, " point"], Float[np.ndarray, " point"]]:
+def normal_deviations(stage: CycloidStage, place: Places, name: str) -> tuple[Points, Points]:
     """Return φ around the disc and the exact distance from the theoretical profile of points, outward positive.
 
     Points x + iy from the disc's centre, its zero direction along x [m]. With P on the normal n of the path w of the
@@ -188,16 +186,12 @@ def normal_deviations(
     return np.remainder(angle[0], 2 * pi * teeth), np.asarray(deviation[0])
 
 
-def aligned(
-    stage: CycloidStage, place: Complex[np.ndarray, " point"], name: str
-) -> tuple[Complex[np.ndarray, " point"], Movement]:
+def aligned(stage: CycloidStage, place: Places, name: str) -> tuple[Places, Movement]:
     """Return points moved rigidly so that their squared normal deviations are least, and what was taken out.
 
     Gauss–Newton steps: a movement by (x, y) and a turn by ψ about the disc's centre let a point stand out by
     −n·(x, y) − ψ·r_d·S less. What is taken out is no error of the disc any more.
 
-    References
-    ----------
     Own derivation, least squares; levers r_d·S of theory page (14).
     """
     start, scale = place, stage.disc_pitch_radius

@@ -12,7 +12,7 @@ from jaxtyping import Complex, Float
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import MICROMETRE, MILLIMETRE
 from tolalloc.reducers.reducer.design import CycloidStage, Modification, Reducer
-from tolalloc.reducers.reducer.form import FlankForm
+from tolalloc.reducers.reducer.form import FlankForm, Points
 
 Angles = Float[np.ndarray, "*angles"]
 """Angles φ of pins from the crank direction [rad], and what has their shape."""
@@ -40,6 +40,11 @@ class Normals:
     lever: Angles
 
 
+def pole_distance(shortening: float, pin_angle: Angles) -> Angles:
+    """Return √s, s = 1 + K1² − 2·K1·cos φ, the distance of pin and pole over R_p [-]."""
+    return np.asarray(np.sqrt(1 + shortening**2 - 2 * shortening * np.cos(pin_angle)))
+
+
 def normals(shortening: float, pin_angle: Angles) -> Normals:
     """Return the normals at pins, theory page equations (13) and (14); for 0 < K1 < 1.
 
@@ -51,8 +56,7 @@ def normals(shortening: float, pin_angle: Angles) -> Normals:
     liu2020 for the angle a (its α_jk); xi2015, equation (3), for S and cos κ. Exact for 0 < K1 < 1, where
     cos²κ + K1²·S² = 1.
     """
-    cosine, sine = np.cos(pin_angle), np.sin(pin_angle)
-    root = np.sqrt(1 + shortening**2 - 2 * shortening * cosine)
+    cosine, sine, root = np.cos(pin_angle), np.sin(pin_angle), pole_distance(shortening, pin_angle)
     return Normals(
         towards_crank=(shortening - cosine) / root,
         towards_tangent=-sine / root,
@@ -62,7 +66,7 @@ def normals(shortening: float, pin_angle: Angles) -> Normals:
     )
 
 
-def path_curvature(stage: CycloidStage, pin_angle: Angles) -> Float[np.ndarray, "*angles"]:
+def path_curvature(stage: CycloidStage, pin_angle: Angles) -> Angles:
     """Return the curvature of the pin centre's path on the disc, concave positive, theory page equation (33) [1/m].
 
     κ = (K1(1 + zp)·cos φ − 1 − zp·K1²)/(Rp·s^1.5), s = 1 + K1² − 2K1·cos φ.
@@ -171,9 +175,8 @@ class ToothProfile:
 
         half_tooth = pi / self.stage.disc_teeth
         if not abs(self.modification.rotation) < half_tooth / 4:
-            raise InputError.at(
-                "modification", "rotation", self.modification.rotation, f"below {half_tooth / 4:.3g} rad"
-            )
+            allowed = f"below {half_tooth / 4:.3g} rad"
+            raise InputError.at("modification", "rotation", self.modification.rotation, allowed)
         return brentq(beyond, -pi / 2, pi / 2, args=(0.0,)), brentq(beyond, pi / 2, 3 * pi / 2, args=(half_tooth,))
 
     def points(self, angle: Angles) -> Float[np.ndarray, "*angles 2"]:
@@ -199,7 +202,7 @@ class ToothProfile:
         into = (direction.towards_crank + 1j * direction.towards_tangent) * np.exp(-1j * turned)
         return np.stack([into.real, into.imag], axis=-1)
 
-    def curvature(self, angle: Angles) -> Float[np.ndarray, "*angles"]:
+    def curvature(self, angle: Angles) -> Angles:
         """Return the curvature of the profile without its free form, convex positive [1/m]."""
         path = path_curvature(self.ground, angle)
         return np.asarray(-path / (1 + self.ground.pin_radius * path))
@@ -233,7 +236,7 @@ def require_sound(profile: ToothProfile, place: str) -> None:
 
 
 def nearest_angles(
-    stage: CycloidStage, points: Complex[np.ndarray, " point"], angles: Float[np.ndarray, " point"], amounts: Amounts
+    stage: CycloidStage, points: Complex[np.ndarray, " point"], angles: Points, amounts: Amounts
 ) -> Float[np.ndarray, "n point"]:
     """Return φ of the modified profiles' points that are nearest to points of another with these φ [rad].
 
@@ -281,7 +284,7 @@ class ProfilePoints:
     chord_error: float  # Largest distance of the profile from the straight line between neighbouring points [m]
 
 
-def _flank_angles(profile: ToothProfile, count: int) -> Float[np.ndarray, " point"]:
+def _flank_angles(profile: ToothProfile, count: int) -> Points:
     """Return φ from root to tip such that all chords are about equally wrong [rad]."""
     dense = np.linspace(*profile.edges, _DENSE)
     place = profile.points(dense)
@@ -292,7 +295,7 @@ def _flank_angles(profile: ToothProfile, count: int) -> Float[np.ndarray, " poin
     return np.interp(np.linspace(0.0, weight[-1], count), weight, dense)
 
 
-def _chord_error(profile: ToothProfile, angle: Float[np.ndarray, " point"]) -> float:
+def _chord_error(profile: ToothProfile, angle: Points) -> float:
     """Return the largest distance of the flank from its chords [m]."""
     between = angle[:-1, np.newaxis] + np.diff(angle)[:, np.newaxis] * np.linspace(0.1, 0.9, 9)
     start, end, curve = profile.points(angle[:-1]), profile.points(angle[1:]), profile.points(between)

@@ -11,9 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.reducers.equivalent.columns import Columns, columns_of
-from tolalloc.reducers.equivalent.interfaces import PinContact, dense_rows, pin_contact
-from tolalloc.reducers.equivalent.springs import HARMONICS, Coordinates, Positions, SpringGroup, harmonic_waves
+from tolalloc.reducers.equivalent.interfaces import PinContact, pin_contact
+from tolalloc.reducers.equivalent.springs import AtAngles, Coordinates, Positions, SpringGroup, harmonic_waves
 from tolalloc.reducers.families.known import family_of
 from tolalloc.reducers.reducer.design import Reducer
 
@@ -54,22 +53,6 @@ class CondensedAngles(NamedTuple):
 def bilateral_groups(at: Positions) -> list[SpringGroup]:
     """Return all spring groups but the pin contact."""
     return family_of(at.reducer).groups(at)
-
-
-def spring_groups(
-    reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"], orders: tuple[int, ...] = HARMONICS
-) -> list[SpringGroup]:
-    """Return all spring groups with all their columns, pin contact last: plain and large, for proofs.
-
-    Rows δ = a·q + b·ε, theory page (5) to (18), liu2020 as read there.
-    """
-    at = Positions(reducer, carrier_angle, orders)
-    return [*bilateral_groups(at), dense_rows(at)]
-
-
-def error_columns(reducer: Reducer, orders: tuple[int, ...]) -> Columns:
-    """Return the error columns of a reducer with harmonic deviations of the given orders [-]."""
-    return columns_of(reducer, bilateral_groups(Positions(reducer, np.zeros(1), orders)), orders)
 
 
 def rotation_scale(reducer: Reducer, coordinates: Coordinates) -> Float[np.ndarray, " coordinate"]:
@@ -188,21 +171,19 @@ def _condense_some(at: Positions) -> CondensedAngles:
     )
 
 
-def condense(reducer: Reducer, orders: tuple[int, ...], angle: Float[np.ndarray, " angle"]) -> CondensedAngles:
+def condense(reducer: Reducer, orders: tuple[int, ...], angle: AtAngles) -> CondensedAngles:
     """Return the condensed model of a reducer at the carrier angles.
 
     Theory page, equations (19)–(21).
 
     S = K_dd − K_dr·K_rr⁻¹·K_rd, F = L_d − K_dr·K_rr⁻¹·L_r; exact, N/m and N per error [m].
 
-    References
-    ----------
     Own derivation, static condensation of liu2020's equations; theory page (19) to (21).
 
     Examples
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> found = condense(load_reducer("rv20e_liu2020"), HARMONICS, np.zeros(1))
+    >>> found = condense(load_reducer("rv20e_liu2020"), (1, 2, 4), np.zeros(1))
     >>> whole = np.linalg.eigvalsh(found.stiffness[0])  # of two discs; the mechanism turns without resistance
     >>> whole.size, bool(abs(whole[0]) < 1e-9 * whole[-1])
     (6, True)

@@ -11,13 +11,16 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.reducers.cycloid.tooth_profile import normals
+from tolalloc.reducers.cycloid.tooth_profile import normals, pole_distance
 from tolalloc.reducers.equivalent.hysteresis import DRAWN, LOST_MOTION, HysteresisLoop, loop_torques
-from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.model import Curves, EquivalentModel, Errors
 from tolalloc.reducers.equivalent.outputs import SINGLE, Forces, Solved, angles_of_pins
+from tolalloc.reducers.equivalent.springs import AtAngles
 from tolalloc.reducers.reducer.bearings import CRANK_BEARINGS, FrictionDimensions, loss_factor
 from tolalloc.reducers.reducer.design import Reducer
 
+AtLevels = Float[np.ndarray, "sample level"]
+AtSteps = Float[np.ndarray, "sample step"]
 MESH, PINS = "gear_mesh", "pins"
 
 _STEPS = 81
@@ -26,19 +29,9 @@ where little torque closes the backlash [-]."""
 
 
 def _interpolated(
-    at: Float[np.ndarray, "sample step"],
-    levels: Float[np.ndarray, " level"] | Float[np.ndarray, "sample level"],
-    values: Float[np.ndarray, " level"] | Float[np.ndarray, "sample level"],
-) -> Float[np.ndarray, "sample step"]:
-    """Return the values of every sample between its levels, straight from one to the next and constant beyond.
-
-    y = y_k + (x − x_k)·(y_(k+1) − y_k)/(x_(k+1) − x_k), own derivation; levels ascend.
-
-    Examples
-    --------
-    >>> _interpolated(np.array([[0.5, 3.0]]), np.array([0.0, 1.0]), np.array([10.0, 20.0])).tolist()
-    [[15.0, 20.0]]
-    """
+    at: AtSteps, levels: Float[np.ndarray, " level"] | AtLevels, values: Float[np.ndarray, " level"] | AtLevels
+) -> AtSteps:
+    """Return the values of every sample between its ascending levels, straight between two and constant beyond."""
     samples = at.shape[0]
     every = (np.broadcast_to(given, (samples, given.shape[-1])) for given in (levels, values))
     return np.stack([np.interp(*row) for row in zip(at, *every, strict=True)])
@@ -56,7 +49,7 @@ class PlayOperator:
     falling: Float[np.ndarray, "sample level"]  # Torque at which it gives way downwards [N·m]
 
     @classmethod
-    def of(cls, inside: Float[np.ndarray, " level"], friction: Float[np.ndarray, "sample level"]) -> PlayOperator:
+    def of(cls, inside: Float[np.ndarray, " level"], friction: AtLevels) -> PlayOperator:
         """Return the operator of a friction torque that belongs to the torques S [N·m].
 
         Where friction grows faster than the torque the spring is locked until the torque reaches what frees it, so the
@@ -68,7 +61,7 @@ class PlayOperator:
             falling=np.minimum.accumulate((inside - friction)[:, ::-1], axis=1)[:, ::-1],
         )
 
-    def follow(self, path: Float[np.ndarray, "sample step"]) -> Float[np.ndarray, "sample step"]:
+    def follow(self, path: AtSteps) -> AtSteps:
         """Return what the spring feels at every step of a path, which starts where the torque has just risen.
 
         Exact wherever the torque only rises or only falls between two steps.
@@ -83,24 +76,20 @@ class PlayOperator:
         return felt
 
 
-def sliding_ways(reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle disc pin"]:
+def sliding_ways(reducer: Reducer, carrier_angle: AtAngles) -> Float[np.ndarray, "angle disc pin"]:
     """Return how far every disc slides along every pin per radian of the output, R_p·√S − r_rp [m/rad].
 
     A disc turns against the housing about its pole, which lies on the contact's normal. A pin that turns in its groove
     instead of staying there slides in the groove by the same way under the same force.
 
-    References
-    ----------
     Own derivation, theory page (69): R_p·√S is the distance of pin and pole, S = 1 + K1² − 2K1·cos φ.
     """
-    stage, angle = reducer.cycloid_stage, angles_of_pins(reducer, carrier_angle)
-    root = np.sqrt(1.0 + stage.shortening**2 - 2.0 * stage.shortening * np.cos(angle))
+    stage = reducer.cycloid_stage
+    root = pole_distance(stage.shortening, angles_of_pins(reducer, carrier_angle))
     return np.asarray(stage.pin_circle_radius * root - stage.pin_radius)
 
 
-def _bearing(
-    reducer: Reducer, dimensions: FrictionDimensions, found: Forces, name: str
-) -> Float[np.ndarray, "sample angle"]:
+def _bearing(reducer: Reducer, dimensions: FrictionDimensions, found: Forces, name: str) -> Curves:
     """Return the friction torque of the bearings of one kind: µ·(F + preload)·d_m/2 times their speed per output's.
 
     A crankshaft turns by −zc per output radian, discs and carrier by 1, so that its bearings turn by zp.
@@ -111,7 +100,7 @@ def _bearing(
     return np.asarray(getattr(reducer.friction, name) * load * bearing.pitch_diameter / 2.0 * speed)
 
 
-def friction_torques(solved: Solved) -> dict[str, Float[np.ndarray, "sample angle"]]:
+def friction_torques(solved: Solved) -> dict[str, Curves]:
     """Return the friction torque of every kind of contact that is known, theory page equation (70), (71) [N·m].
 
     It is that at the output: the coefficient times the sum of force times sliding way per radian of the output, the
@@ -120,8 +109,6 @@ def friction_torques(solved: Solved) -> dict[str, Float[np.ndarray, "sample angl
     T_f = Σ µ·F·way; Coulomb's friction, no seals and no grease (`IdleTorque`); mesh µ·H_v·F·r_b1·(i − 1), of a centre
     gear µ·H_v·F·r_b4·i besides, i the turns of the sun.
 
-    References
-    ----------
     Own derivation by virtual work; H_v Ohlendorf's, bearings µ·P·d/2 as SKF's.
 
     Examples
@@ -190,7 +177,7 @@ class FrictionLoop:
     no_load: FrictionAtTorque  # That without torque
     plain: HysteresisLoop  # The loop without friction
 
-    def _at(self, branch: Float[np.ndarray, "sample step"], share: float) -> Float[np.ndarray, " sample"]:
+    def _at(self, branch: AtSteps, share: float) -> Float[np.ndarray, " sample"]:
         return branch[:, int(np.argmin(np.abs(self.torque - share * self.torque[-1])))]
 
     @property
@@ -205,15 +192,8 @@ class FrictionLoop:
         return np.asarray(self._at(self.falling, 0.0) - self._at(self.rising, 0.0))
 
 
-def friction_loop(
-    model: EquivalentModel, errors: Float[np.ndarray, "sample column"], carrier_angle: Float[np.ndarray, " angle"]
-) -> FrictionLoop:
-    """Return the loop with friction at the carrier angles [rad].
-
-    References
-    ----------
-    Own derivation, theory page (72) to (74).
-    """
+def friction_loop(model: EquivalentModel, errors: Errors, carrier_angle: AtAngles) -> FrictionLoop:
+    """Return the loop with friction at the carrier angles [rad]; own derivation, theory page (72) to (74)."""
     if unknown := model.reducer.friction_dimensions.unknown:
         raise ValueError(f"{model.reducer.name}: no dimensions of {', '.join(unknown)}")
     levels = loop_torques(model.reducer, DRAWN)
@@ -233,11 +213,8 @@ def friction_loop(
 
 
 def _followed(
-    levels: Float[np.ndarray, " level"],
-    twist: Float[np.ndarray, "sample level"],
-    solved: list[Solved],
-    path: Float[np.ndarray, " step"],
-) -> Float[np.ndarray, "sample step"]:
+    levels: Float[np.ndarray, " level"], twist: AtLevels, solved: list[Solved], path: Float[np.ndarray, " step"]
+) -> AtSteps:
     """Return the twist along a path of torque that starts where the torque has just risen.
 
     The carrier bearing holds back the whole twist, the pins what the discs move, and all that turns with the cranks
@@ -276,8 +253,6 @@ def twist_of_friction(solved: list[Solved]) -> TwistOfFriction:
 
     Δθ = Σ (ΔF/ΔT)·Δway, exact; sliding f = µ·ΣF·|Δs|/Δθ.
 
-    References
-    ----------
     Own derivation, theory page (73).
 
     Examples
@@ -310,7 +285,7 @@ def twist_of_friction(solved: list[Solved]) -> TwistOfFriction:
     return TwistOfFriction(discs=_summed(discs), cranks=_summed(cranks), sliding=sliding)
 
 
-def _summed(changes: list[Float[np.ndarray, " sample"]]) -> Float[np.ndarray, "sample level"]:
+def _summed(changes: list[Float[np.ndarray, " sample"]]) -> AtLevels:
     return np.cumsum(np.stack([np.zeros_like(changes[0]), *changes], axis=1), axis=1)
 
 

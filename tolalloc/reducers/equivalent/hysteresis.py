@@ -16,9 +16,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.reducers.equivalent.condensation import CondensedAngles, bilateral_groups
-from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.model import Curves, EquivalentModel, Errors
 from tolalloc.reducers.equivalent.outputs import Forces, forces
-from tolalloc.reducers.equivalent.springs import Positions, vector_columns
+from tolalloc.reducers.equivalent.springs import AtAngles, Positions, vector_columns
 from tolalloc.reducers.reducer.bearings import Part, RollingBearing
 from tolalloc.reducers.reducer.design import Reducer
 
@@ -56,10 +56,10 @@ class HysteresisLoop:
     torque: Float[np.ndarray, " level"]  # Torques on the carrier, ascending and symmetrical about 0 [N·m]
     twist: Float[np.ndarray, "sample level angle"]  # Transmission error at each torque, output side [rad]
 
-    def _at(self, torque: float) -> Float[np.ndarray, "sample angle"]:
+    def _at(self, torque: float) -> Curves:
         return self.twist[:, int(np.argmin(np.abs(self.torque - torque)))]
 
-    def width(self, share: float) -> Float[np.ndarray, "sample angle"]:
+    def width(self, share: float) -> Curves:
         """Return the twist between both directions of `LOST_MOTION`, `BACKLASH` or 1 times the rated torque [rad]."""
         torque = share * self.torque[-1]
         return np.asarray(self._at(torque) - self._at(-torque))
@@ -91,17 +91,12 @@ def loop_torques(reducer: Reducer, shares: Sequence[float]) -> Float[np.ndarray,
 
 
 def hysteresis_loop(
-    model: EquivalentModel,
-    errors: Float[np.ndarray, "sample column"],
-    carrier_angle: Float[np.ndarray, " angle"],
-    shares: Sequence[float] = READ,
+    model: EquivalentModel, errors: Errors, carrier_angle: AtAngles, shares: Sequence[float] = READ
 ) -> HysteresisLoop:
     """Return torque against twist at shares of the rated torque in both directions and at the carrier angles [rad].
 
     θ(T) of the equilibria (5) at T = ±share·T_rated, twist in rad; without friction.
 
-    References
-    ----------
     Own derivation; lost motion at ±3 % of the rated torque as catalogues define it.
     """
     torque = loop_torques(model.reducer, shares)
@@ -112,11 +107,8 @@ def hysteresis_loop(
 
 
 def both_directions(
-    model: EquivalentModel,
-    errors: Float[np.ndarray, "sample column"],
-    torque: float,
-    carrier_angle: Float[np.ndarray, " angle"] | None = None,
-) -> tuple[Float[np.ndarray, "sample angle"], Float[np.ndarray, "sample angle"]]:
+    model: EquivalentModel, errors: Errors, torque: float, carrier_angle: AtAngles | None = None
+) -> tuple[Curves, Curves]:
     """Return the transmission error while turning counter-clockwise and clockwise against a torque [rad].
 
     What reversing adds is the second minus the first. The sign of the torque does not matter, as it resists both ways.
@@ -139,7 +131,7 @@ class _Bearings(NamedTuple):
     columns: Int[np.ndarray, " column"]  # Columns x, y of every bearing's place
     place_by_way: Float[np.ndarray, "angle bearing 2 2"]  # Displacement of the place that adds a way [-]
 
-    def displacement(self, carried: Forces, at: int) -> Float[np.ndarray, "sample column"]:
+    def displacement(self, carried: Forces, at: int) -> Errors:
         """Return how far to displace the places so that springs yield as the bearings do under their forces [m].
 
         The forces are those at one carrier angle, given by its number.
@@ -151,7 +143,7 @@ class _Bearings(NamedTuple):
         return np.asarray(np.einsum("bxy,sby->sbx", self.place_by_way[at], longer).reshape(force.shape[0], -1))
 
 
-def _bearings(model: EquivalentModel, carrier_angle: Float[np.ndarray, " angle"]) -> Iterator[_Bearings]:
+def _bearings(model: EquivalentModel, carrier_angle: AtAngles) -> Iterator[_Bearings]:
     """Yield the interfaces with rolling bearings."""
     for group in bilateral_groups(Positions(model.reducer, carrier_angle, model.orders)):
         parts = tuple(part for part in model.reducer.parts if part.interface == group.stiffness_name)
@@ -170,10 +162,7 @@ def _bearings(model: EquivalentModel, carrier_angle: Float[np.ndarray, " angle"]
 
 
 def own_load_loop(
-    model: EquivalentModel,
-    errors: Float[np.ndarray, "sample column"],
-    carrier_angle: Float[np.ndarray, " angle"],
-    shares: Sequence[float] = READ,
+    model: EquivalentModel, errors: Errors, carrier_angle: AtAngles, shares: Sequence[float] = READ
 ) -> HysteresisLoop:
     """Return torque against twist as `tolalloc.reducers.equivalent.hysteresis.hysteresis_loop` does.
 
@@ -181,8 +170,6 @@ def own_load_loop(
 
     A spring is displaced by F/K − w(F) along its force F, repeated until the twist changes by less than 1e-8 of it.
 
-    References
-    ----------
     Own derivation, theory page (75).
 
     Examples
@@ -201,12 +188,7 @@ def own_load_loop(
     return HysteresisLoop(torque=torque, twist=np.stack(twist, axis=1))
 
 
-def _twist(
-    springs: EquivalentModel,
-    errors: Float[np.ndarray, "sample column"],
-    torque: float,
-    carrier_angle: Float[np.ndarray, " angle"],
-) -> Float[np.ndarray, "sample angle"]:
+def _twist(springs: EquivalentModel, errors: Errors, torque: float, carrier_angle: AtAngles) -> Curves:
     """Return the transmission error [rad]; angle by angle, because at each of them the places are others."""
     bearings, tables = tuple(_bearings(springs, carrier_angle)), springs.tables_at(carrier_angle)
     found = np.full((errors.shape[0], carrier_angle.size), np.nan)

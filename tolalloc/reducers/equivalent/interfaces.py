@@ -17,6 +17,7 @@ from tolalloc.reducers.cycloid.loaded_contact import contact_stiffness
 from tolalloc.reducers.cycloid.tooth_profile import Normals, normals
 from tolalloc.reducers.equivalent.sources import ErrorSource, Nominal
 from tolalloc.reducers.equivalent.springs import (
+    AtAngles,
     Positions,
     SpringGroup,
     SpringRows,
@@ -67,9 +68,7 @@ def _tilt(part: str, **other: Any) -> ErrorSource:
 def sun_support(at: Positions) -> SpringGroup:
     """Return the two support springs of the sun gear, theory page equation (6).
 
-    ``sun.assembly`` is (a_SX, a_SY), fixed in the housing [m].
-
-    δ = Xs − a_SX, Ys − a_SY.
+    ``sun.assembly`` is (a_SX, a_SY), fixed in the housing [m]; δ = Xs − a_SX, Ys − a_SY.
 
     References
     ----------
@@ -167,20 +166,15 @@ GEAR_MESH = Interface(
 )
 
 
-def lever(radius: float, direction: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle 2"]:
+def lever(radius: float, direction: AtAngles) -> Float[np.ndarray, "angle 2"]:
     """Return the movement, per radian of its part, of a point at a radius and direction [m/rad].
 
     r·(−sin, cos) of the direction, own derivation: the derivative of the point's place.
-
-    Examples
-    --------
-    >>> lever(0.027, np.zeros(1)).tolist()  # a point to the right goes up
-    [[-0.0, 0.027]]
     """
     return radius * np.stack([-np.sin(direction), np.cos(direction)], axis=-1)
 
 
-def _tilted(height: float, direction: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle 2 2"]:
+def _tilted(height: float, direction: AtAngles) -> Float[np.ndarray, "angle 2 2"]:
     """Return how far a point at a height moves, per tilt (x, y) of its part, which has turned [m/rad]."""
     return turned(direction) @ (height * np.array([[0.0, 1.0], [-1.0, 0.0]]))
 
@@ -286,9 +280,7 @@ CRANK_CARRIER = Interface(
 def carrier_support(at: Positions) -> SpringGroup:
     """Return the two springs of the carrier's bearing in the housing, theory page equation (12).
 
-    ``carrier.assembly`` is (a_cx, a_cy), fixed in the housing [m].
-
-    δ = Xca − a_cx, Yca − a_cy [m].
+    ``carrier.assembly`` is (a_cx, a_cy), fixed in the housing [m]; δ = Xca − a_cx, Yca − a_cy.
 
     References
     ----------
@@ -298,7 +290,7 @@ def carrier_support(at: Positions) -> SpringGroup:
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> group = carrier_support(Positions(load_reducer("rv20e_liu2020"), np.zeros(1)))
-    >>> group.columns, group.error[0].tolist()  # δ = Xca − a_cx, Yca − a_cy
+    >>> group.columns, group.error[0].tolist()
     (('carrier.assembly.x', 'carrier.assembly.y'), [[-1.0, -0.0], [-0.0, -1.0]])
     """
     return support(at, at.coordinates.carrier, "carrier bearing", "carrier_bearing", "carrier")
@@ -509,41 +501,3 @@ PIN_SOURCES = (
     _tilt("disc{j}"),
 )
 """What the contact of pins and teeth declares."""
-
-
-def dense_rows(at: Positions) -> SpringGroup:
-    """Return the pin contacts with all columns but the tilt as one plain spring group: large, for proofs only.
-
-    Rows δ = a·q + b·ε of `pin_contact`, own derivation.
-    """
-    contact, reducer = pin_contact(at), at.reducer
-    angles, discs, pins = contact.stiffness.shape
-    stage, coordinates = reducer.cycloid_stage, at.coordinates
-    displacement = np.zeros((angles, discs, pins, coordinates.count))
-    columns: dict[str, Float[np.ndarray, "angle disc pin"]] = {}
-    own_pin = np.concatenate([contact.by_pin, np.ones((angles, discs, 1, pins))], axis=2)
-    for name, terms in pin_terms(reducer, at.orders).items():
-        column = columns.setdefault(name, np.zeros((angles, discs, pins)))
-        for entry, factor in terms:
-            column[:, :, entry % pins] += factor * own_pin[:, :, entry // pins, entry % pins]
-    columns |= dict.fromkeys(flank_terms(reducer), -np.abs(contact.by_disc[:, :, 2]))
-    for disc in range(discs):
-        first = coordinates.disc(disc)
-        displacement[:, disc, :, first : first + 3] = np.swapaxes(contact.by_disc[:, disc], 1, 2)
-        waves = harmonic_waves(contact.tooth_angle[:, disc], at.orders)
-        for entry, name in enumerate(wave_terms(disc, at.orders)):
-            column = columns.setdefault(name, np.zeros((angles, discs, pins)))
-            column[:, disc] = contact.by_tooth[:, disc, entry // waves.shape[2]] * waves[..., entry % waves.shape[2]]
-        for entry, name in enumerate(tooth_terms(reducer, disc)):
-            column = columns.setdefault(name, np.zeros((angles, discs, pins)))
-            met = contact.tooth[:, disc] == entry % stage.disc_teeth
-            column[:, disc] = np.where(met, contact.by_tooth[:, disc, entry // stage.disc_teeth], 0.0)
-    return SpringGroup(
-        name="pin contact",
-        stiffness_name="pin_contact",
-        displacement=displacement.reshape(angles, discs * pins, coordinates.count),
-        error=np.stack(list(columns.values()), axis=-1).reshape(angles, discs * pins, len(columns)),
-        columns=tuple(columns),
-        stiffness=contact.stiffness.reshape(angles, discs * pins),
-        contact="unilateral",
-    )

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int, Integer, UInt8, UInt16
 
-from tolalloc.reducers.equivalent.columns import Columns
-from tolalloc.reducers.equivalent.condensation import CondensedAngles, condense, error_columns
+from tolalloc.reducers.equivalent.columns import Columns, columns_of
+from tolalloc.reducers.equivalent.condensation import CondensedAngles, bilateral_groups, condense
 from tolalloc.reducers.equivalent.solvers.records import (
     CONVERGED,
     NOT_CONVERGED,
@@ -27,10 +27,14 @@ from tolalloc.reducers.equivalent.solvers.records import (
     SolverDesign,
     design_of,
 )
-from tolalloc.reducers.equivalent.springs import HARMONICS
+from tolalloc.reducers.equivalent.springs import HARMONICS, AtAngles, Positions
 from tolalloc.reducers.reducer.design import Reducer, at_torque
 from tolalloc.reducers.reducer.form import PartForm
 
+Errors = Float[np.ndarray, "sample column"]
+"""Deviations of units in the order of the model's columns [m, angles rad], or what has their shape."""
+Curves = Float[np.ndarray, "sample angle"]
+"""A number of every unit at every carrier angle."""
 _FEW_ANGLES = 256
 """Angles up to which tables are kept: loops have 23, a diagnosis up to 240; 8 MB for an RV-20E [-]."""
 
@@ -150,7 +154,8 @@ class EquivalentModel:
     @cached_property
     def error_columns(self) -> Columns:
         """The error columns and the values that they move."""
-        return error_columns(self.reducer, self.orders)
+        groups = bilateral_groups(Positions(self.reducer, np.zeros(1), self.orders))
+        return columns_of(self.reducer, groups, self.orders)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -171,7 +176,7 @@ class EquivalentModel:
         return self.tables_at(self.search.node_angle)
 
     @cached_property
-    def _turn(self) -> tuple[Float[np.ndarray, " angle"], CondensedAngles]:
+    def _turn(self) -> tuple[AtAngles, CondensedAngles]:
         """The coarse angles and their tables."""
         angle = 2 * pi * np.arange(self.search.coarse) / self.search.coarse
         return angle, self.tables_at(angle)
@@ -181,23 +186,18 @@ class EquivalentModel:
         for name in ("_tables", "_turn"):
             vars(self).pop(name, None)
 
-    def _given(self, errors: Float[np.ndarray, "sample column"], torque: float | Float[np.ndarray, " sample"]) -> Given:
+    def _given(self, errors: Errors, torque: float | Float[np.ndarray, " sample"]) -> Given:
         """Return what every solver takes next to the tables: places of the columns, reducer, errors, torque."""
         columns = self.error_columns
         return columns.layout, columns.map, self.design, np.ascontiguousarray(errors), torque
 
-    def tables_at(self, carrier_angle: Float[np.ndarray, " angle"]) -> CondensedAngles:
+    def tables_at(self, carrier_angle: AtAngles) -> CondensedAngles:
         """Return the condensed tables at the carrier angles [rad], those of few angles made once."""
         if carrier_angle.size > _FEW_ANGLES:
             return condense(self.reducer, self.orders, carrier_angle)
         return _tables_at_few(self.reducer, self.orders, carrier_angle.tobytes())
 
-    def equilibria(
-        self,
-        errors: Float[np.ndarray, "sample column"],
-        torque: float,
-        carrier_angle: Float[np.ndarray, " angle"] | None = None,
-    ) -> Equilibria:
+    def equilibria(self, errors: Errors, torque: float, carrier_angle: AtAngles | None = None) -> Equilibria:
         """Return the equilibrium of every sample at the carrier angles."""
         if carrier_angle is not None:
             return self.equilibria_of(self.tables_at(carrier_angle), errors, torque, carrier_angle)
@@ -206,12 +206,7 @@ class EquivalentModel:
         return self.equilibria_of(tables, errors, torque, angle, turn_of_crank)
 
     def equilibria_of(
-        self,
-        tables: CondensedAngles,
-        errors: Float[np.ndarray, "sample column"],
-        torque: float,
-        angle: Float[np.ndarray, " angle"],
-        turn_of_crank: int = 0,
+        self, tables: CondensedAngles, errors: Errors, torque: float, angle: AtAngles, turn_of_crank: int = 0
     ) -> Equilibria:
         """Return the equilibrium of every sample at the carrier angles, whose tables are there already.
 
@@ -237,13 +232,11 @@ class EquivalentModel:
             pins_in_contact=turn.touching,
         )
 
-    def extremes(self, errors: Float[np.ndarray, "sample column"], torque: float) -> TurnExtremes:
+    def extremes(self, errors: Errors, torque: float) -> TurnExtremes:
         """Return the refined extremes of every sample over one output turn."""
-        return self._searched(errors, torque, np.empty((errors.shape[0], 0)))
+        return self.extremes_and_curve(errors, torque, 0)[0]
 
-    def extremes_within(
-        self, errors: Float[np.ndarray, "sample column"], torque: float, window: tuple[float, float]
-    ) -> TurnExtremes:
+    def extremes_within(self, errors: Errors, torque: float, window: tuple[float, float]) -> TurnExtremes:
         """Return the extremes of every sample over part of the output turn, at the tabulated angles within it [rad].
 
         No finer angles are searched: what they may add, `remaining`, is not known.
@@ -284,16 +277,12 @@ class EquivalentModel:
         )
 
     def extremes_and_curve(
-        self, errors: Float[np.ndarray, "sample column"], torque: float
-    ) -> tuple[TurnExtremes, Float[np.ndarray, "sample angle"]]:
-        """Return the extremes, and the transmission error at the coarse angles that they were looked for from [rad]."""
-        curve = np.empty((errors.shape[0], self.search.coarse))
-        return self._searched(errors, torque, curve), curve
+        self, errors: Errors, torque: float, angles: int | None = None
+    ) -> tuple[TurnExtremes, Curves]:
+        """Return the extremes, and the transmission error at the coarse angles that they were looked for from [rad].
 
-    def _searched(
-        self, errors: Float[np.ndarray, "sample column"], torque: float, curve: Float[np.ndarray, "sample angle"]
-    ) -> TurnExtremes:
-        """Return the extremes, the curve filled as far as there is room."""
+        At the first so many of them, or at all.
+        """
         from tolalloc.reducers.equivalent.solvers.extremes import solve_extremes
 
         samples, search = errors.shape[0], self.search
@@ -304,12 +293,12 @@ class EquivalentModel:
             np.empty(samples, np.int64),
             np.empty(samples, np.uint8),
             np.empty(samples),
-            curve,
+            np.empty((samples, search.coarse if angles is None else angles)),
         )
         solve_extremes(self._discs, self._tables, self._given(errors, torque), search, found)
         self._mark_out_of_range(np.abs(found.extreme).max(axis=1), found.status)
         found.extreme[found.status != CONVERGED] = np.nan
-        return TurnExtremes(
+        extremes = TurnExtremes(
             largest=found.extreme[:, 0],
             smallest=found.extreme[:, 1],
             carrier_angle=(found.position - search.first) * search.node_step,
@@ -318,10 +307,9 @@ class EquivalentModel:
             status=found.status,
             residual=found.residual,
         )
+        return extremes, found.curve
 
-    def peak_to_peak_derivatives(
-        self, errors: Float[np.ndarray, "sample column"], torque: float
-    ) -> tuple[TurnExtremes, Derivatives]:
+    def peak_to_peak_derivatives(self, errors: Errors, torque: float) -> tuple[TurnExtremes, Derivatives]:
         """Return the extremes and the exact derivatives of the peak-to-peak.
 
         Theory page, equation (23). They hold while both extremes stay at the same kinks of the curve: a derivative
@@ -339,11 +327,8 @@ class EquivalentModel:
         return extremes, self._derivatives(derivative)
 
     def rotation_derivatives(
-        self,
-        errors: Float[np.ndarray, "sample column"],
-        torque: float | Float[np.ndarray, " sample"],
-        carrier_angle: Float[np.ndarray, " angle"],
-    ) -> tuple[Float[np.ndarray, "sample angle"], Derivatives]:
+        self, errors: Errors, torque: float | Float[np.ndarray, " sample"], carrier_angle: AtAngles
+    ) -> tuple[Curves, Derivatives]:
         """Return the transmission error at the carrier angles and its exact derivatives, sample by sample in one row.
 
         The torque is one for all samples or one for each.
@@ -362,9 +347,9 @@ class EquivalentModel:
 
     def pin_force_derivatives(
         self,
-        errors: Float[np.ndarray, "sample column"],
+        errors: Errors,
         torque: float,
-        carrier_angle: Float[np.ndarray, " angle"],
+        carrier_angle: AtAngles,
         at: Int[np.ndarray, " sample"],
         weights: Float[np.ndarray, "sample disc pin"],
     ) -> Derivatives:
@@ -393,7 +378,7 @@ class EquivalentModel:
         """Put a status where an equilibrium was found that the model cannot mean."""
         status[(status == CONVERGED) & (np.abs(rotation) > self.largest_rotation)] = OUT_OF_RANGE
 
-    def _padded(self, carrier_angle: Float[np.ndarray, " angle"]) -> CondensedAngles:
+    def _padded(self, carrier_angle: AtAngles) -> CondensedAngles:
         """Return the tables at the angles, with neighbours that the interpolation weighs with nothing at a node."""
         return self.tables_at(carrier_angle[np.clip(np.arange(-1, carrier_angle.size + 2), 0, carrier_angle.size - 1)])
 

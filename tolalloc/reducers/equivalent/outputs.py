@@ -20,9 +20,9 @@ from tolalloc.reducers.cycloid.solvers import LAWS, LINEAR
 from tolalloc.reducers.cycloid.tooth_profile import pin_angles
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.interfaces import pin_contact
-from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel
+from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel, Errors
 from tolalloc.reducers.equivalent.solvers.records import design_of
-from tolalloc.reducers.equivalent.springs import Positions, harmonic_waves
+from tolalloc.reducers.equivalent.springs import AtAngles, Positions, harmonic_waves
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.form import PartForm
 
@@ -73,12 +73,10 @@ class Forces:
 
 
 def forces(equilibria: Equilibria) -> Forces:
-    """Return the forces in all interfaces.
+    """Return the forces in all interfaces, NaN where nothing converged.
 
-    Stiffness times compression of every row, theory page equation (5); pins by their law, equations (30) and (31),
-    elements with play by equation (28).
-
-    F = k·δ, own derivation; NaN where nothing converged.
+    Stiffness times compression of every row, F = k·δ, theory page equation (5); pins by their law, equations (30) and
+    (31), elements with play by equation (28).
     """
     from tolalloc.reducers.equivalent.solvers.turn import solve_forces
 
@@ -104,11 +102,11 @@ class Orders:
     phase: Float[np.ndarray, "sample order"]  # Angle by which the wave, written as a cosine, leads [rad]
     angles: int  # Angles that they are read from [-]
 
-    def main(self, count: int, sample: int = 0) -> list[tuple[float, float, float]]:
-        """Return the strongest orders of one sample that are some, with amplitude and phase [rad], strongest first."""
-        own = self.amplitude[sample]
+    def main(self, count: int) -> list[tuple[float, float, float]]:
+        """Return the strongest orders of the first sample, with amplitude and phase [rad], strongest first."""
+        own = self.amplitude[0]
         strongest = [at for at in np.argsort(-own)[:count] if own[at] > _ROUNDING * own.max()]
-        return [(float(self.order[at]), float(own[at]), float(self.phase[sample, at])) for at in strongest]
+        return [(float(self.order[at]), float(own[at]), float(self.phase[0, at])) for at in strongest]
 
 
 def _waves(
@@ -120,17 +118,11 @@ def _waves(
 
 
 def fitted_waves(
-    angle: Float[np.ndarray, " angle"], curve: Float[np.ndarray, "row angle"], order: Real[np.ndarray, " order"]
+    angle: AtAngles, curve: Float[np.ndarray, "row angle"], order: Real[np.ndarray, " order"]
 ) -> Complex[np.ndarray, "row order"]:
     """Return orders of curves, cosine less i times sine amplitudes, by least squares: at any angles, of open turns too.
 
     min Σ(y − y₀ − Re Σ w·e^(inθ))², own derivation; every order that is strong must be among them.
-
-    Examples
-    --------
-    >>> angle = np.linspace(0.0, 6.0, 20)
-    >>> fitted_waves(angle, 2.0 * np.cos(1.37 * angle)[np.newaxis], np.array([1.37])).round(9).tolist()
-    [[(2+0j)]]
     """
     turn = np.exp(1j * np.outer(angle, order))
     basis = np.hstack([np.ones((angle.size, 1)), turn.real, turn.imag])
@@ -169,7 +161,7 @@ def turn_orders(
     return Orders(order=order, amplitude=amplitude, phase=np.angle(found), angles=first)
 
 
-def _spread(count: int, turns: int) -> list[Float[np.ndarray, " angle"]]:
+def _spread(count: int, turns: int) -> list[AtAngles]:
     """Return equally spaced angles of turns, other ones in every turn, in parts whose tables are small [rad]."""
     while gcd(count, turns) > 1:
         count += 1
@@ -195,15 +187,7 @@ class Solved:
 
 
 def load_share(pins: Float[np.ndarray, "sample angle disc pin"]) -> Float[np.ndarray, "sample disc"]:
-    """Return the share of all pin force that each disc carries, mean over the turn [-].
-
-    Σ_disc F/Σ F, own derivation.
-
-    Examples
-    --------
-    >>> load_share(np.array([[[[100.0, 200.0], [0.0, 100.0]]]])).tolist()  # two discs with two pins
-    [[0.75, 0.25]]
-    """
+    """Return the share of all pin force that each disc carries over the turn, Σ_disc F/Σ F, own derivation [-]."""
     total = pins.sum(axis=(1, 3))
     return np.asarray(total / total.sum(axis=1, keepdims=True))
 
@@ -238,9 +222,7 @@ def outputs_of(reducer: Reducer) -> dict[str, Quantity]:
     }
 
 
-def radial_clearance(
-    model: EquivalentModel, errors: Float[np.ndarray, "sample column"]
-) -> Float[np.ndarray, " sample"]:
+def radial_clearance(model: EquivalentModel, errors: Errors) -> Float[np.ndarray, " sample"]:
     """Return the smallest gap between all pins and teeth where the normal is radial, negative where they overlap [m].
 
     Minus the compression of the pin rows at no displacement, where a pin stands in the crank direction (root) or
@@ -258,9 +240,7 @@ def radial_clearance(
     return np.asarray(-np.max([own.pin.max(axis=1) + own.tooth.max(axis=1) for own in discs], axis=0))
 
 
-def radial_clearance_derivatives(
-    model: EquivalentModel, errors: Float[np.ndarray, "sample column"]
-) -> Float[np.ndarray, "sample column"]:
+def radial_clearance_derivatives(model: EquivalentModel, errors: Errors) -> Errors:
     """Return the derivatives of `radial_clearance` by every error column [m/m, m/rad].
 
     Those of the gap between the pin and the tooth that stand out most, which is linear in the errors: own derivation.
@@ -295,7 +275,7 @@ class _StandingOut:
     number: Integer[np.ndarray, " place"]  # Position of the tooth [-]
 
 
-def _standing_out(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) -> list[_StandingOut]:
+def _standing_out(model: EquivalentModel, errors: Errors) -> list[_StandingOut]:
     """Return the same of every disc."""
     mapped, layout, orders = model.error_columns, model.error_columns.layout, model.orders
     values = np.asarray((mapped.matrix @ errors.T).T) + mapped.map.nominal
@@ -363,20 +343,16 @@ def peak_line_load(equilibria: Equilibria, forces: Forces) -> Float[np.ndarray, 
 
 
 def unit_pressure(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]:
-    """Return Hertz's peak pressure under a line load of 1 N/m; it grows with the root of the line load [Pa].
+    """Return Hertz's peak pressure under a line load of 1 N/m, √(E*/(πR)) per √(N/m), as `peak_pressure` [Pa].
 
-    p = √(E*/(πR)) per √(N/m).
-
-    References
-    ----------
-    Hertz's line contact, as `peak_pressure`.
+    It grows with the root of the line load.
     """
     reducer, pin_angle = equilibria.reducer, angles_of_pins(equilibria.reducer, equilibria.carrier_angle)
     even = np.full_like(pin_angle, reducer.cycloid_stage.face_width)
     return peak_pressure(reducer.cycloid_stage, reducer.contact_modulus, pin_angle, even)
 
 
-def angles_of_pins(reducer: Reducer, carrier_angle: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle disc pin"]:
+def angles_of_pins(reducer: Reducer, carrier_angle: AtAngles) -> Float[np.ndarray, "angle disc pin"]:
     """Return the angle of every pin from the crank direction of every disc [rad].
 
     φ_k − β_j, theory page (2) and (13), own derivation.
@@ -416,8 +392,7 @@ def contact_pattern(
     disc
         Number of the disc, 1 for the first [-].
     carrier_angle
-        Carrier angle; unless given, the coarse angle of the model's search at which the disc's line load is largest
-        [rad].
+        Unless given, the coarse angle of the model's search at which the disc's line load is largest [rad].
     positions
         Places along the width [-].
 
@@ -513,8 +488,8 @@ def attribute(
 
 
 def _contributions(
-    model: EquivalentModel, errors: Float[np.ndarray, "1 column"], torque: float, angle: Float[np.ndarray, " angle"]
-) -> dict[str, Float[np.ndarray, " angle"]]:
+    model: EquivalentModel, errors: Float[np.ndarray, "1 column"], torque: float, angle: AtAngles
+) -> dict[str, AtAngles]:
     """Return what every source adds at the carrier angles [rad]."""
     curve, derivatives = model.rotation_derivatives(errors, torque, angle)
     parts: dict[str, Float[np.ndarray, " angle"]] = {}

@@ -36,6 +36,8 @@ _ROUNDED = 1e-3
 """Way over the largest compression that is guessed besides [-]."""
 
 
+AtCoordinates = Float[np.ndarray, "item coordinate"]
+AtPins = Float[np.ndarray, "item pin"]
 Rotated = tuple[Float[np.ndarray, "item variable"], Float[np.ndarray, "item variable"]]
 """Least and largest derivative of the carrier's rotation by every variable [rad per variable]."""
 
@@ -67,32 +69,25 @@ class _Curves:
         together = {name: np.concatenate([getattr(own, name) for own in parts]) for name in names}
         return cls(law=parts[0].law, **together)
 
-    def pins(
-        self, compression: Float[np.ndarray, "item pin"]
-    ) -> tuple[Float[np.ndarray, "item pin"], Float[np.ndarray, "item pin"]]:
+    def pins(self, compression: AtPins) -> tuple[AtPins, AtPins]:
         """Return forces of pins and their derivatives [N, N/m]."""
         force, slope, flat = np.empty(compression.size), np.empty(compression.size), compression.ravel()
         pin_slopes(self.law, self.contact.ravel(), self.log_length.ravel(), flat, force, slope)
         return force.reshape(compression.shape), slope.reshape(compression.shape)
 
-    def tangent(self, slope: Float[np.ndarray, "item pin"]) -> Float[np.ndarray, "item coordinate coordinate"]:
+    def tangent(self, slope: AtPins) -> Float[np.ndarray, "item coordinate coordinate"]:
         """Return the stiffness of the coordinates with contacts of some stiffness [N/m]."""
         return np.asarray(self.stiffness + (self.lever * slope[:, np.newaxis]) @ self.lever.swapaxes(1, 2))
 
     def unbalanced(
-        self,
-        q: Float[np.ndarray, "item coordinate"],
-        touched: Float[np.ndarray, "item pin"],
-        force: Float[np.ndarray, "item coordinate"],
-    ) -> tuple[Float[np.ndarray, "item coordinate"], Float[np.ndarray, "item pin"], Float[np.ndarray, " item"]]:
+        self, q: AtCoordinates, touched: AtPins, force: AtCoordinates
+    ) -> tuple[AtCoordinates, AtPins, Float[np.ndarray, " item"]]:
         """Return the unbalanced force, the stiffness of the contacts and the largest force [N, N/m, N]."""
         carried, slope = self.pins(touched + _along(self.lever, q))
         pushed, elastic = _against(self.lever, carried), _against(self.stiffness, q)
         return elastic + pushed - force, slope, np.abs(np.stack([pushed, elastic, force])).max(axis=(0, 2))
 
-    def equilibrium(
-        self, variables: Float[np.ndarray, "item variable"]
-    ) -> tuple[Float[np.ndarray, " item"], Float[np.ndarray, "item pin"]]:
+    def equilibrium(self, variables: Float[np.ndarray, "item variable"]) -> tuple[Float[np.ndarray, " item"], AtPins]:
         """Return rotation [rad], NaN where none was found, and compressions [m], by Newton steps on the energy."""
         force, touched, turned = (
             field[:, 0] + (field[:, 1:] * variables.reshape(*variables.shape, *[1] * (field.ndim - 2))).sum(axis=1)
@@ -112,9 +107,7 @@ class _Curves:
         rotation = turned + (self.carrier * q).sum(axis=1)
         return np.where(balanced, rotation, np.nan), touched + _along(self.lever, q)
 
-    def newton_step(
-        self, gradient: Float[np.ndarray, "item coordinate"], slope: Float[np.ndarray, "item pin"]
-    ) -> Float[np.ndarray, "item coordinate"]:
+    def newton_step(self, gradient: AtCoordinates, slope: AtPins) -> AtCoordinates:
         """Return the way to the minimum of the local quadratic energy [m]."""
         tangent = self.tangent(slope)
         tangent += _SOFT * np.trace(tangent, axis1=1, axis2=2)[:, np.newaxis, np.newaxis] * np.eye(tangent.shape[1])
@@ -150,7 +143,7 @@ class _Curves:
             left, own, middle, room = left[on], own.at(on), middle[on], np.maximum(room, _WIDER * reached)[on]
         return low, high
 
-    def moved(self, slope: Float[np.ndarray, "item pin"]) -> _MovedContacts:
+    def moved(self, slope: AtPins) -> _MovedContacts:
         """Return what every variable moves with contacts of some stiffness."""
         stiffness = self.tangent(slope)
         values = np.linalg.eigvalsh(stiffness)
@@ -184,12 +177,7 @@ class _MovedContacts:
 
 
 def _part(
-    curves: _Curves,
-    step: Float[np.ndarray, "item coordinate"],
-    gradient: Float[np.ndarray, "item coordinate"],
-    place: tuple[
-        Float[np.ndarray, "item coordinate"], Float[np.ndarray, "item pin"], Float[np.ndarray, "item coordinate"]
-    ],
+    curves: _Curves, step: AtCoordinates, gradient: AtCoordinates, place: tuple[AtCoordinates, AtPins, AtCoordinates]
 ) -> Float[np.ndarray, " item"]:
     """Return how much of a step is gone, halved until the energy's slope along it has fallen to a half."""
     q, touched, force = place
@@ -204,10 +192,7 @@ def _part(
 
 
 def _loads(
-    model: EquivalentModel,
-    tables: CondensedAngles,
-    values: Float[np.ndarray, "item load value"],
-    start: Float[np.ndarray, "item coordinate"],
+    model: EquivalentModel, tables: CondensedAngles, values: Float[np.ndarray, "item load value"], start: AtCoordinates
 ) -> _Curves:
     """Return the units at their angles from what their columns and their change make of the values."""
     layout, items = model.error_columns.layout, len(tables.stiffness)
@@ -258,18 +243,9 @@ class PeakBounds:
         designs: Float[np.ndarray, "design variable"],
         errors: Callable[[Float[np.ndarray, "unit column"], Float[np.ndarray, " setting"]], Float[np.ndarray, "..."]],
     ) -> PeakBounds:
-        """Return the bounds of units, sharpest near some designs.
+        """Return the bounds of units, sharpest near some designs, scales [-] and settings.
 
-        Parameters
-        ----------
-        model, torque
-            The equivalent model and the torque on its carrier [N·m].
-        units
-            Random units over the scales.
-        designs
-            Scales [-] and settings of the designs whose extreme angles are taken.
-        errors
-            From deviations and settings, in which they are linear, all columns of the model [m, angles rad].
+        The errors are all columns of the model, from deviations and settings, in which they are linear [m, angles rad].
         """
         count, groups, variables = len(units.standard), units.groups, designs.shape[1]
         every = np.concatenate([np.zeros((1, variables)), np.eye(variables)])
@@ -328,13 +304,9 @@ def _retained(
     return np.asarray(np.where((solved.status == CONVERGED)[..., np.newaxis], solved.retained, 0.0)[0])
 
 
-def _along(
-    lever: Float[np.ndarray, "item coordinate pin"], q: Float[np.ndarray, "item coordinate"]
-) -> Float[np.ndarray, "item pin"]:
+def _along(lever: Float[np.ndarray, "item coordinate pin"], q: AtCoordinates) -> AtPins:
     return np.asarray((q[:, np.newaxis] @ lever)[:, 0])
 
 
-def _against(
-    lever: Float[np.ndarray, "item coordinate pin"], force: Float[np.ndarray, "item pin"]
-) -> Float[np.ndarray, "item coordinate"]:
+def _against(lever: Float[np.ndarray, "item coordinate pin"], force: AtPins) -> AtCoordinates:
     return np.asarray((lever @ force[..., np.newaxis])[..., 0])

@@ -15,7 +15,7 @@ from jaxtyping import Float, Integer, UInt8
 
 from tolalloc.reducers.equivalent.friction import sliding_ways
 from tolalloc.reducers.equivalent.hysteresis import BACKLASH, TURN_ANGLES, HysteresisLoop, hysteresis_loop
-from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.model import Curves, EquivalentModel, Errors
 from tolalloc.reducers.equivalent.outputs import Solved
 from tolalloc.reducers.equivalent.springs import Positions
 from tolalloc.reducers.families.known import family_of
@@ -33,10 +33,7 @@ def exact_unit(model: EquivalentModel) -> Float[np.ndarray, "1 column"]:
 
 
 def exact_loop(reducer: Reducer) -> HysteresisLoop:
-    """Return torque against twist of the unit whose parts are exact.
-
-    Loop of `hysteresis_loop` with all errors 0 and the modification, own derivation.
-    """
+    """Return torque against twist of the unit whose parts are exact and whose teeth are modified as drawn."""
     model = EquivalentModel(reducer)
     return hysteresis_loop(model, exact_unit(model), TURN_ANGLES)
 
@@ -44,15 +41,9 @@ def exact_loop(reducer: Reducer) -> HysteresisLoop:
 def perfect_reducer(reducer: Reducer, torque: float) -> Solved:
     """Return equilibria and forces of exact parts over one pin pitch of the crank.
 
-    Its modification and the stiffness of its parts under the torque are in force. While the carrier turns by a pin
-    pitch over the teeth of a disc, the crank direction meets every phase of the pins, and all else repeats.
-
-    Parameters
-    ----------
-    torque
-        Torque on the carrier, negative where it resists the rotation [N·m].
-
-    Own derivation: everything repeats after 2π/(zp·zc) of the carrier, over which 72 equilibria are solved.
+    Its modification and the stiffness of its parts under the torque on the carrier, negative where it resists the
+    rotation [N·m], are in force. While the carrier turns by a pin pitch over the teeth of a disc, 2π/(zp·zc), the crank
+    direction meets every phase of the pins, and all else repeats: own derivation.
     """
     model, stage = EquivalentModel(at_torque(reducer, torque)), reducer.cycloid_stage
     span = 2.0 * pi / (stage.pin_count * stage.disc_teeth)
@@ -68,7 +59,7 @@ class Preload:
     status: UInt8[np.ndarray, " sample"]  # Worst status of the turn [-]
 
 
-def preload(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) -> Preload:
+def preload(model: EquivalentModel, errors: Errors) -> Preload:
     """Return what presses in every unit without torque.
 
     A disc turns against the housing about its pole, so at a pin it slides with the output speed times the distance of
@@ -83,12 +74,13 @@ def preload(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) 
     >>> f"{float(preload(model, exact_unit(model)).pin_force[0]):.2g}"  # 0.01 % of the rated torque alone [N]
     '0.23'
     """
-    return _preload_of(model.reducer, _without_torque(model, errors))
+    return _preload_of(_without_torque(model, errors))
 
 
-def _preload_of(reducer: Reducer, solved: Solved) -> Preload:
+def _preload_of(solved: Solved) -> Preload:
     """Return what presses, from equilibria and forces without torque."""
-    found, ways = solved.forces.pins, sliding_ways(reducer, TURN_ANGLES)
+    reducer, found = solved.equilibria.reducer, solved.forces.pins
+    ways = sliding_ways(reducer, TURN_ANGLES)
     return Preload(
         pin_force=np.asarray(found.max(axis=(1, 2, 3))),
         friction_torque=reducer.friction.pins * np.einsum("sadp,adp->sa", found, ways).max(axis=1),
@@ -96,21 +88,17 @@ def _preload_of(reducer: Reducer, solved: Solved) -> Preload:
     )
 
 
-def _without_torque(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) -> Solved:
+def _without_torque(model: EquivalentModel, errors: Errors) -> Solved:
     """Return equilibria and forces over an output turn under the torque at which backlash is read."""
-    torque = _least_torque(model.reducer)
+    torque = -BACKLASH * model.reducer.load.rated_torque
     return Solved.of(model.at_torque(torque).equilibria(errors, torque, TURN_ANGLES))
-
-
-def _least_torque(reducer: Reducer) -> float:
-    return -BACKLASH * reducer.load.rated_torque
 
 
 Derived = tuple[Preload, Float[np.ndarray, "sample column"]]
 """What presses in every unit, and the derivatives of one of its two outputs by every error column."""
 
 
-def pin_force_derivatives(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) -> Derived:
+def pin_force_derivatives(model: EquivalentModel, errors: Errors) -> Derived:
     """Return what presses in every unit without torque, and the derivatives of the largest pin force [N/m].
 
     Those of that pin's force at that angle, own derivation, theory page (23): the adjoint of the equilibrium with the
@@ -124,7 +112,7 @@ def pin_force_derivatives(model: EquivalentModel, errors: Float[np.ndarray, "sam
     return _derived(model, solved, at, weights.reshape(-1, *pins.shape[2:]))
 
 
-def friction_torque_derivatives(model: EquivalentModel, errors: Float[np.ndarray, "sample column"]) -> Derived:
+def friction_torque_derivatives(model: EquivalentModel, errors: Errors) -> Derived:
     """Return what presses in every unit without torque, and the derivatives of the friction torque [N·m/m].
 
     As `pin_force_derivatives`, own derivation, of the sum of forces times sliding ways at the angle where it is
@@ -136,7 +124,7 @@ def friction_torque_derivatives(model: EquivalentModel, errors: Float[np.ndarray
     return _derived(model, solved, at, by_force[at])
 
 
-def _largest(over_turn: Float[np.ndarray, "sample angle"]) -> Integer[np.ndarray, " sample"]:
+def _largest(over_turn: Curves) -> Integer[np.ndarray, " sample"]:
     """Return where each is largest, anywhere where nothing converged."""
     return np.asarray(np.nan_to_num(over_turn, nan=-inf).argmax(axis=1))
 
@@ -148,18 +136,14 @@ def _derived(
     weights: Float[np.ndarray, "sample disc pin"],
 ) -> Derived:
     """Return what presses, and the derivatives of the weighted sum of the forces at one angle of every sample."""
-    torque = _least_torque(model.reducer)
-    errors = solved.equilibria.errors
+    errors, torque = solved.equilibria.errors, solved.equilibria.torque
     found = model.at_torque(torque).pin_force_derivatives(errors, torque, TURN_ANGLES, at, weights)
-    return _preload_of(model.reducer, solved), found.by_error
+    return _preload_of(solved), found.by_error
 
 
 @lru_cache(maxsize=256)
 def rated_pin_force(reducer: Reducer) -> float:
-    """Return the largest force of a pin of exact parts under their rated torque [N].
-
-    Largest force of `perfect_reducer`, own derivation; sign of the torque: it resists.
-    """
+    """Return the largest force of a pin of exact parts under their rated torque, which resists [N]; own derivation."""
     return float(perfect_reducer(reducer, -reducer.load.rated_torque).forces.pins.max())
 
 
@@ -180,8 +164,6 @@ def twist_shares(reducer: Reducer) -> tuple[TwistShare, ...]:
 
     T·θ = Σ F²/K over all springs, K of parts in series shared as 1/K_part; at rated torque, shares of 1.
 
-    References
-    ----------
     Own derivation, theory page (68).
 
     Examples

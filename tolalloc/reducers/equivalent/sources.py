@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Literal
 
-from tolalloc.drawings.sources import is_angular
 from tolalloc.drawings.zones import Characteristic
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.reducers.reducer.design import Reducer
@@ -57,21 +56,6 @@ class ErrorSource:
     fixed: bool = False  # Whether it stands fixed in the housing, so that it is mounted and measured with it
     # Part with which it is mounted and its name there, where these are not the beginning and the rest of its own
     with_part: tuple[str, str] | None = None
-
-    @property
-    def angular(self) -> bool:
-        """Whether its columns are angles [rad], and not lengths [m]."""
-        return is_angular(self.name)
-
-    @property
-    def unit(self) -> str:
-        """What its columns are in."""
-        return "rad" if self.angular else "m"
-
-    @property
-    def part(self) -> str:
-        """The part that carries it."""
-        return self.name.partition(".")[0]
 
     @property
     def mounted(self) -> tuple[str, str]:
@@ -130,13 +114,7 @@ def _numbered(name: str) -> str:
 
 
 class ErrorSources:
-    """All kinds of sources of a model, to be asked by the name of a source or of a column.
-
-    Parameters
-    ----------
-    kinds
-        The kinds, each name once.
-    """
+    """All kinds of sources of a model, to be asked by the name of a source or of a column."""
 
     def __init__(self, kinds: Iterable[ErrorSource]) -> None:
         self.kinds = tuple(kinds)
@@ -150,12 +128,8 @@ class ErrorSources:
     def shared_lines(self, stated: Mapping[str, Hashable]) -> dict[str, str]:
         """Return source → the line of the drawing, part and feature, on which it stands with its copies.
 
-        Sources of one kind are copies of each other, on identical parts or all around one part.
-
-        Parameters
-        ----------
-        stated
-            Source → what the table states of it; copies of which it states different things have lines of their own.
+        Sources of one kind are copies of each other, on identical parts or all around one part; those of which the
+        table states different things have lines of their own.
         """
         copies: dict[tuple[ErrorSource, Hashable], list[str]] = {}
         for name, own in stated.items():

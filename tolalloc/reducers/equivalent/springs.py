@@ -15,6 +15,8 @@ from jaxtyping import Float
 
 from tolalloc.reducers.reducer.design import Reducer
 
+AtAngles = Float[np.ndarray, " angle"]
+"""A number at every carrier angle, such as the angle itself [rad]."""
 HARMONICS = (1, 2, 4)
 """Orders of the pitch and run-out deviations that liu2020 prints in Table 4."""
 
@@ -77,15 +79,15 @@ class Positions:
         return Coordinates.of(self.reducer)
 
     @cached_property
-    def crank_angle(self) -> Float[np.ndarray, " angle"]:
+    def crank_angle(self) -> AtAngles:
         """β = −zc·θc [rad]."""
         return -self.reducer.cycloid_stage.disc_teeth * self.carrier_angle
 
-    def disc_direction(self, disc: int) -> Float[np.ndarray, " angle"]:
+    def disc_direction(self, disc: int) -> AtAngles:
         """β_j = β + ψ_j, the direction of a disc's centre [rad]."""
         return self.crank_angle + 2 * np.pi * disc / self.reducer.disc_count
 
-    def crank_position(self, crank: int) -> Float[np.ndarray, " angle"]:
+    def crank_position(self, crank: int) -> AtAngles:
         """P_i = θc + φ_i, the direction of a crank axis, or of an output pin, on the carrier [rad]."""
         return self.carrier_angle + 2 * np.pi * crank / self.reducer.drive_count
 
@@ -94,12 +96,12 @@ class Positions:
         return (disc - (self.reducer.disc_count - 1) / 2) * self.reducer.cycloid_stage.disc_spacing
 
     @cached_property
-    def sun_angle(self) -> Float[np.ndarray, " angle"]:
+    def sun_angle(self) -> AtAngles:
         """θs = i·θc, i the turns of the sun per turn of the carrier [rad]."""
         return self.reducer.sun_ratio * self.carrier_angle
 
     @cached_property
-    def pinion_angle(self) -> Float[np.ndarray, " angle"]:
+    def pinion_angle(self) -> AtAngles:
         """θ of the shaft of the motor, which a pinion on it has [rad]."""
         return self.reducer.ratio * self.carrier_angle
 
@@ -164,20 +166,12 @@ def vector_columns(name: str) -> tuple[str, str]:
 
 
 class SpringRows:
-    """Rows of one spring group at a batch of carrier angles, filled in one after another.
-
-    Attributes
-    ----------
-    displacement
-        Compression per coordinate [m/m or m/rad].
-    columns
-        Error column → compression per value of it [m/m or m/rad].
-    """
+    """Rows of one spring group at a batch of carrier angles, filled in one after another."""
 
     def __init__(self, at: Positions, rows: int) -> None:
         self.at, self.shape = at, (at.carrier_angle.size, rows)
-        self.displacement = np.zeros((*self.shape, at.coordinates.count))
-        self.columns: dict[str, Float[np.ndarray, "angle row"]] = {}
+        self.displacement = np.zeros((*self.shape, at.coordinates.count))  # per coordinate [m/m or m/rad]
+        self.columns: dict[str, Float[np.ndarray, "angle row"]] = {}  # per error column [m/m or m/rad]
 
     def add(self, rows: int | slice, names: Sequence[str], moved: Float[np.ndarray, "... column"]) -> None:
         """Let columns, the last axis of what they move, move some rows."""
@@ -202,16 +196,7 @@ class SpringRows:
 def support(at: Positions, first: int, name: str, stiffness_name: str, part: str) -> SpringGroup:
     """Return the two springs that hold a part's axis in the housing, where its ``assembly`` may stand off.
 
-    δ = X − a_x, Y − a_y [m], own derivation.
-
-    Parameters
-    ----------
-    first
-        First of the part's coordinates, X and Y behind it [-].
-    name, stiffness_name
-        What the springs stand for, and the field of `Stiffness`.
-    part
-        Name of the part.
+    δ = X − a_x, Y − a_y [m], own derivation; X is the part's first coordinate, Y the next.
     """
     rows, place = SpringRows(at, 2), f"{part}.assembly"
     rows.displacement[:, [0, 1], [first, first + 1]] = 1.0
@@ -219,15 +204,10 @@ def support(at: Positions, first: int, name: str, stiffness_name: str, part: str
     return rows.group(name, stiffness_name, (part,), places=(place,))
 
 
-def turned(direction: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle 2 2"]:
+def turned(direction: AtAngles) -> Float[np.ndarray, "angle 2 2"]:
     """Return the rotation matrices from a part that has turned by a direction [rad] into the housing's frame.
 
     [[cos, −sin], [sin, cos]], own derivation; counter-clockwise positive.
-
-    Examples
-    --------
-    >>> turned(np.array([np.pi / 2]))[0].round(9).tolist()
-    [[0.0, -1.0], [1.0, 0.0]]
     """
     cosine, sine = np.cos(direction), np.sin(direction)
     return np.stack([np.stack([cosine, -sine], axis=-1), np.stack([sine, cosine], axis=-1)], axis=-2)
@@ -242,10 +222,5 @@ def harmonic_waves(angle: Float[np.ndarray, "..."], orders: tuple[int, ...]) -> 
     """Return the cosine and sine of every order at the angles [-].
 
     cos(n·angle), sin(n·angle), for every order n; own derivation of liu2020's pitch and run-out errors of Table 4.
-
-    Examples
-    --------
-    >>> harmonic_waves(np.array([np.pi / 2]), (1, 2))[0].round(9).tolist()
-    [0.0, 1.0, -1.0, 0.0]
     """
     return np.stack([wave(order * angle) for order in orders for wave in (np.cos, np.sin)], axis=-1)

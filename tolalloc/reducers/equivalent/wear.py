@@ -12,15 +12,15 @@ from jaxtyping import Float
 
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import MICROMETRE
-from tolalloc.reducers.cycloid.tooth_profile import path_curvature
+from tolalloc.reducers.cycloid.tooth_profile import path_curvature, pole_distance
 from tolalloc.reducers.equivalent.friction import sliding_ways
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES
-from tolalloc.reducers.equivalent.model import EquivalentModel
+from tolalloc.reducers.equivalent.model import EquivalentModel, Errors
 from tolalloc.reducers.equivalent.outputs import Solved, angles_of_pins
 from tolalloc.reducers.equivalent.perfect import PHASES, perfect_reducer
 from tolalloc.reducers.load_case import LoadCase, require_duty
-from tolalloc.reducers.reducer.design import CycloidStage, Reducer, thermal_shift
-from tolalloc.reducers.reducer.form import LARGEST_FREE, FlankForm, PartForm
+from tolalloc.reducers.reducer.design import Reducer, thermal_shift
+from tolalloc.reducers.reducer.form import LARGEST_FREE, FlankForm, PartForm, Points
 
 STEP = 1.0 * MICROMETRE
 """Largest wear in one step of the hours, of a flank or across a pin; what halving it changes is on page validation."""
@@ -63,17 +63,14 @@ class Wear:
     phases: tuple[DutyPhase, ...]
     steps: tuple[_Step, ...]
 
-    def aged(
-        self, model: EquivalentModel, errors: Float[np.ndarray, "sample column"]
-    ) -> Float[np.ndarray, "sample column"]:
+    def aged(self, model: EquivalentModel, errors: Errors) -> Errors:
         """Return the errors of units whose pins are worn by the units' own forces [m].
 
         Every pin loses on its radius what (99) says of the forces at the angles of an output turn, step by step with
         the flanks of that step; NaN where a unit has no equilibrium.
         """
-        columns = [
-            model.columns.index(f"each_pin.diameter.{pin + 1}") for pin in range(model.reducer.cycloid_stage.pin_count)
-        ]
+        pins = range(1, model.reducer.cycloid_stage.pin_count + 1)
+        columns = [model.columns.index(f"each_pin.diameter.{pin}") for pin in pins]
         worn = errors.copy()
         for step in self.steps:
             middle = worn.copy()
@@ -82,9 +79,7 @@ class Wear:
             worn[:, columns] -= 2.0 * step.hours * self._pin_depths(model.with_form(step.middle), middle)
         return worn
 
-    def _pin_depths(
-        self, model: EquivalentModel, errors: Float[np.ndarray, "sample column"]
-    ) -> Float[np.ndarray, "sample pin"]:
+    def _pin_depths(self, model: EquivalentModel, errors: Errors) -> Float[np.ndarray, "sample pin"]:
         """Return what an hour takes off the radius of every pin of every unit [m]."""
         stage, shift = model.reducer.cycloid_stage, model.columns.index("modification.shift")
         ways = np.abs(sliding_ways(model.reducer, TURN_ANGLES))
@@ -116,7 +111,7 @@ def flank_depth_per_force(reducer: Reducer, angle: Float[np.ndarray, "*angles"])
     [0.001, 0.01, 0.016]
     """
     stage = reducer.cycloid_stage
-    rolling = stage.pin_radius / (stage.pin_circle_radius * _root(stage, angle))
+    rolling = stage.pin_radius / (stage.pin_circle_radius * pole_distance(stage.shortening, angle))
     bend = 1.0 + stage.pin_radius * path_curvature(stage, angle)
     return np.asarray(reducer.friction.wear / stage.face_width * np.abs(1.0 - rolling) / bend)
 
@@ -133,11 +128,6 @@ def pin_depth_per_work(reducer: Reducer) -> float:
     stage = reducer.cycloid_stage
     area = 2.0 * pi * stage.pin_radius * stage.face_width * reducer.disc_count
     return reducer.friction.wear / area
-
-
-def _root(stage: CycloidStage, angle: Float[np.ndarray, "*angles"]) -> Float[np.ndarray, "*angles"]:
-    """Return √S, the distance of pin and pole over R_p [-]."""
-    return np.asarray(np.sqrt(1.0 + stage.shortening**2 - 2.0 * stage.shortening * np.cos(angle)))
 
 
 @lru_cache(maxsize=32)  # every question about the same drawing asks again
@@ -199,12 +189,8 @@ def _worn(reducer: Reducer, phases: tuple[DutyPhase, ...], hours: float, step: f
     most = hours * max(float(first.max()), 2.0 * across)
     if most > LARGEST_FREE:
         fitting = hours * LARGEST_FREE / most
-        raise InputError.at(
-            f"wear of {reducer.name}",
-            "hours",
-            hours,
-            f"up to {fitting:.3g} of this duty, which wear {LARGEST_FREE / MICROMETRE:g} µm off",
-        )
+        allowed = f"up to {fitting:.3g} of this duty, which wear {LARGEST_FREE / MICROMETRE:g} µm off"
+        raise InputError.at(f"wear of {reducer.name}", "hours", hours, allowed)
     number = max(ceil(most / step), 1)
     own, steps = hours / number, list[_Step]()
     for _ in range(number if hours else 0):
@@ -225,7 +211,7 @@ def _worn(reducer: Reducer, phases: tuple[DutyPhase, ...], hours: float, step: f
     )
 
 
-def _form(reducer: Reducer, angle: Float[np.ndarray, " point"], depth: Float[np.ndarray, " point"]) -> PartForm | None:
+def _form(reducer: Reducer, angle: Points, depth: Points) -> PartForm | None:
     """Return the form of a reducer's parts with worn flanks, as it is where nothing is worn."""
     if not depth.any():
         return reducer.form
@@ -234,12 +220,8 @@ def _form(reducer: Reducer, angle: Float[np.ndarray, " point"], depth: Float[np.
 
 
 def _rates(
-    reducer: Reducer,
-    phases: Sequence[DutyPhase],
-    angle: Float[np.ndarray, " point"],
-    depth: Float[np.ndarray, " point"],
-    pins: float,
-) -> tuple[Float[np.ndarray, " point"], float, float]:
+    reducer: Reducer, phases: Sequence[DutyPhase], angle: Points, depth: Points, pins: float
+) -> tuple[Points, float, float]:
     """Return what an hour takes off the flanks and off the pins' radius, and the volume off all flanks [m, m, m³]."""
     stage = reducer.cycloid_stage
     flank, work = np.zeros(depth.size), 0.0

@@ -29,8 +29,6 @@ def centre_mesh(at: Positions) -> SpringGroup:
     δ = n·(ε_pinion − x_sun − ε_centre) − r_b4·θs, n at π/2 + α in the housing [m]; involute spur gears in mesh. What
     moves the pinion's axis in the housing turns the output by a constant angle, so it is no source.
 
-    References
-    ----------
     Own derivation, as liu2020's of sun and planets.
     """
     gear, sun = at.reducer.centre_pair, at.coordinates.input

@@ -48,34 +48,15 @@ class NewRows:
 
 @dataclass(frozen=True, kw_only=True)
 class ReducerFamily:
-    """One family of reducers.
-
-    Parameters
-    ----------
-    name
-        What it is called.
-    interfaces
-        All spring groups but the contact of pins and teeth.
-    contact_sources
-        What the contact of pins and teeth declares.
-    places
-        What the picture shows of a reducer, from the inside of the housing to the input.
-    identified
-        Stiffnesses that measured units tell unless others are asked for, fields of `Stiffness`.
-    axes
-        Place of an axis, as the picture names it, and the source whose vector moves it there.
-    outlines
-        Radii and counts for the picture [mm, -], and what of them is an assumption of the drawing.
-    new
-        What a new folder starts from.
-    """
+    """One family of reducers."""
 
     name: str
-    interfaces: tuple[Interface, ...]
-    contact_sources: tuple[ErrorSource, ...]
-    places: Callable[[Reducer], Iterable[Place]]
-    identified: tuple[str, ...]
-    axes: Callable[[Reducer], dict[str, str]]
+    interfaces: tuple[Interface, ...]  # All spring groups but the contact of pins and teeth
+    contact_sources: tuple[ErrorSource, ...]  # What that contact declares
+    places: Callable[[Reducer], Iterable[Place]]  # In the picture, from the inside of the housing to the input
+    identified: tuple[str, ...]  # Stiffnesses that measured units tell unless others are asked for, of `Stiffness`
+    axes: Callable[[Reducer], dict[str, str]]  # Place of an axis in the picture → source whose vector moves it there
+    # Radii and counts for the picture [mm, -], and what of them is an assumption of the drawing
     outlines: Callable[[Reducer], tuple[dict[str, Any], tuple[str, ...]]]
     new: NewRows
 

@@ -25,13 +25,8 @@ _STANDS_OFF = Characteristic("coaxiality", "how far the shaft stands off is draw
 def shaft_support(at: Positions) -> SpringGroup:
     """Return the two springs of the input shaft's bearings, theory page equation (89).
 
-    ``shaft.assembly`` is (a_x, a_y), fixed in the housing [m].
-
-    δ = X − a_x, Y − a_y [m].
-
-    References
-    ----------
-    Own derivation, as liu2020's of the sun.
+    ``shaft.assembly`` is (a_x, a_y), fixed in the housing [m]; δ = X − a_x, Y − a_y, own derivation, as liu2020's of
+    the sun.
     """
     return support(at, at.coordinates.input, "shaft bearing", "shaft_support", "shaft")
 
@@ -52,8 +47,6 @@ def eccentric_bearing(at: Positions) -> SpringGroup:
 
     δ = X − x_d + ε_journal − ε_bore, Y likewise [m].
 
-    References
-    ----------
     Own derivation.
     """
     discs, shaft = at.reducer.disc_count, at.coordinates.input
@@ -88,8 +81,6 @@ def output_pins(at: Positions) -> SpringGroup:
 
     δ = x_carrier − x_disc + a·(θca − θd)·(−sin P, cos P) − e·(cos β_j, sin β_j) + errors [m]; walls exactly round.
 
-    References
-    ----------
     Own derivation; the gap of one pin is the hole's radius less the pin's and the eccentricity.
     """
     pins, discs, carrier, offset = at.reducer.holes, at.reducer.disc_count, at.coordinates.carrier, "output.offset"

@@ -61,6 +61,7 @@ class RollingBearing(ABC):
     that to the exponent, theory page equation (65).
     """
 
+    element: ClassVar[str]  # What an element is called
     exponent: ClassVar[float]  # Of the compression of an element [-]
     life_exponent: ClassVar[float]  # p of load rating over load in the basic life, theory page equation (93) [-]
 
@@ -72,15 +73,29 @@ class RollingBearing(ABC):
     preload: Annotated[float, Field(alias="preload_n", ge=0, le=1e6)] = 0.0  # Axial force that presses the rings [N]
     rows: Annotated[int, Field(ge=1, le=4)] = 1  # Bearings or rows that share the force alike [-]
 
-    @property
-    @abstractmethod
-    def elements(self) -> int:
-        """Number Z of elements in a row [-]."""
+    def __post_init__(self) -> None:
+        """Raise for elements that overlap or are smaller than their clearance, and for preload of the other kind."""
+        fitting = int(pi / asin(min(self.diameter / self.pitch_diameter, 1.0)))
+        if self.elements > fitting:
+            raise ValueError(f"{self.element}s is {self.elements}; allowed is 3 to {fitting}, else they overlap")
+        if self.clearance >= self.diameter:
+            allowed = f"below {self.element}_diameter_mm = {self.diameter / MILLIMETRE:g}"
+            raise ValueError(f"clearance_um is {self.clearance / MICROMETRE:g}; allowed is {allowed}")
+        if self.clearance < 0.0 and self.contact_angle:
+            given = f"clearance_um is {self.clearance / MICROMETRE:g}; allowed is 0 or more"
+            raise ValueError(f"{given} with a contact_angle_deg, where preload_n presses the elements")
+        if self.preload and not self.contact_angle:
+            raise ValueError(f"preload_n is {self.preload:g}; allowed is 0 without a contact_angle_deg")
 
     @property
-    @abstractmethod
+    def elements(self) -> int:
+        """Number Z of elements in a row [-]."""
+        return int(getattr(self, f"{self.element}s"))
+
+    @property
     def diameter(self) -> float:
         """Diameter of an element [m]."""
+        return float(getattr(self, f"{self.element}_diameter"))
 
     @property
     @abstractmethod
@@ -98,29 +113,8 @@ class RollingBearing(ABC):
         return self.diameter * cos(self.contact_angle) / self.pitch_diameter
 
     def life(self, load: float | Float[np.ndarray, "*loads"]) -> Float[np.ndarray, "*loads"]:
-        """Return the basic rating life L10 under an equivalent radial load [N], in turns of one ring against the other.
-
-        Examples
-        --------
-        >>> needles = RollerBearing(rollers=13, roller_diameter=2.7e-3, roller_length=7e-3, pitch_diameter=13.4e-3)
-        >>> f"{float(needles.life(needles.load_rating)):.0f}"  # a million turns under the load rating
-        '1000000'
-        """
+        """Return the basic rating life L10 under an equivalent radial load [N], in turns of ring against ring."""
         return np.asarray(1e6 * (self.load_rating / load) ** self.life_exponent)
-
-    def _require_sound(self, names: str) -> None:
-        """Raise for elements that overlap or are smaller than their clearance, and for preload of the other kind."""
-        fitting = int(pi / asin(min(self.diameter / self.pitch_diameter, 1.0)))
-        if self.elements > fitting:
-            raise ValueError(f"{names} is {self.elements}; allowed is 3 to {fitting}, else they overlap")
-        if self.clearance >= self.diameter:
-            allowed = f"below {names.removesuffix('s')}_diameter_mm = {self.diameter / MILLIMETRE:g}"
-            raise ValueError(f"clearance_um is {self.clearance / MICROMETRE:g}; allowed is {allowed}")
-        if self.clearance < 0.0 and self.contact_angle:
-            given = f"clearance_um is {self.clearance / MICROMETRE:g}; allowed is 0 or more"
-            raise ValueError(f"{given} with a contact_angle_deg, where preload_n presses the elements")
-        if self.preload and not self.contact_angle:
-            raise ValueError(f"preload_n is {self.preload:g}; allowed is 0 without a contact_angle_deg")
 
     @cached_property
     def axial(self) -> float:
@@ -210,25 +204,13 @@ class RollingBearing(ABC):
 class RollerBearing(RollingBearing):
     """Cylindrical, needle or tapered rollers: line contact, c_L = 35,948·L^(8/9) N/mm^(10/9), exponent 10/9."""
 
+    element: ClassVar[str] = "roller"
     exponent: ClassVar[float] = 10.0 / 9.0
     life_exponent: ClassVar[float] = 10.0 / 3.0
 
     rollers: Elements
     roller_diameter: Annotated[Millimetres, Field(alias="roller_diameter_mm")]  # [m]
     roller_length: Annotated[Millimetres, Field(alias="roller_length_mm")]  # Effective length L_we [m]
-
-    def __post_init__(self) -> None:
-        self._require_sound("rollers")
-
-    @property
-    def elements(self) -> int:
-        """Number of rollers in a row [-]."""
-        return self.rollers
-
-    @property
-    def diameter(self) -> float:
-        """Diameter of a roller [m]."""
-        return self.roller_diameter
 
     @property
     def coefficient(self) -> float:
@@ -250,25 +232,13 @@ class RollerBearing(RollingBearing):
 class BallBearing(RollingBearing):
     """Balls in grooves: Hertz's point contact, exponent 3/2, both races together."""
 
+    element: ClassVar[str] = "ball"
     exponent: ClassVar[float] = 1.5
     life_exponent: ClassVar[float] = 3.0
 
     balls: Elements
     ball_diameter: Annotated[Millimetres, Field(alias="ball_diameter_mm")]  # [m]
     osculation: Annotated[float, Field(gt=0.5, le=1)] = 0.52  # Radius of a groove over the ball's diameter [-]
-
-    def __post_init__(self) -> None:
-        self._require_sound("balls")
-
-    @property
-    def elements(self) -> int:
-        """Number of balls in a row [-]."""
-        return self.balls
-
-    @property
-    def diameter(self) -> float:
-        """Diameter of a ball [m]."""
-        return self.ball_diameter
 
     @property
     def coefficient(self) -> float:
@@ -363,6 +333,8 @@ class Friction:
 class FrictionDimensions:
     """Dimensions from which friction follows; none where a file states a stiffness instead."""
 
+    contacts: ClassVar[tuple[str, ...]] = tuple(CONTACTS)  # Kinds of contact that have a coefficient of friction
+
     crank_disc_bearing: RollingBearing | None = None  # One journal's
     crank_carrier_bearing: RollingBearing | None = None  # Both of one crankshaft as rows of one
     carrier_bearing: RollingBearing | None = None
@@ -378,25 +350,17 @@ class FrictionDimensions:
         known = all(ratio is not None and ratio <= LARGEST_CONTACT_RATIO for ratio in meshes)
         return bearings if known else (*bearings, "gear_mesh")
 
-    @property
-    def contacts(self) -> tuple[str, ...]:
-        """Kinds of contact that have a coefficient of friction."""
-        return tuple(CONTACTS)
-
 
 @dataclass(frozen=True, kw_only=True)
 class SingleStageFriction(FrictionDimensions):
     """Those of a single stage, whose file states no bearing by its dimensions: pins and teeth alone are known."""
 
+    contacts: ClassVar[tuple[str, ...]] = ("pins",)
+
     @property
     def unknown(self) -> tuple[str, ...]:
         """Kinds of contact whose friction does not follow from what the file states."""
         return ("eccentric_bearing", "output_pin", "carrier_bearing")
-
-    @property
-    def contacts(self) -> tuple[str, ...]:
-        """Kinds of contact that have a coefficient of friction."""
-        return ("pins",)
 
 
 def loss_factor(first_teeth: int, second_teeth: int, contact_ratio: float) -> float:
@@ -417,11 +381,9 @@ def friction_assumptions(friction: Friction, dimensions: FrictionDimensions) -> 
     """Return what the numbers on friction take for granted, and what they leave out."""
     coefficients = ", ".join(f"{CONTACTS[name]} {friction.coefficients[name]:g}" for name in dimensions.contacts)
     unknown = ", ".join(CONTACTS.get(name, name.replace("_", " ")) for name in dimensions.unknown)
+    left_out = f"friction of {unknown}: not known, because the file states a stiffness and no dimensions"
     return (
         f"coefficients of friction: {coefficients}; the same at every speed and temperature",
         "friction: Coulomb's, at the forces without friction; no churning of gears and discs, no flanges of rollers",
-        *(
-            (f"friction of {unknown}: not known, because the file states a stiffness and no dimensions",)
-            * bool(unknown)
-        ),
+        *([left_out] if unknown else []),
     )

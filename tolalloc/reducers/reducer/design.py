@@ -139,8 +139,6 @@ def thermal_shift(stage: CycloidStage, warmer: float) -> float:
     Disc and ring are each of one temperature, α is `THERMAL_EXPANSION`. Of the growth of a disc as a whole,
     α·ΔT·(R_p·cos φ − r_rp − e·cos γ) along a normal, the first term alone is taken: the others are below a tenth of it.
 
-    References
-    ----------
     Own derivation; α is an assumption.
     """
     return THERMAL_EXPANSION * stage.pin_circle_radius * warmer
@@ -431,8 +429,6 @@ def interface_forces(reducer: Reducer, torque: float) -> dict[str, float]:
     Crank–carrier T/(n_c·a_sp); crank–disc the mean over φ of |T/(n_c·n_d·a_sp) + e^(iφ)·T/(n_c·n_d·e·zp)|; mesh
     T/(i·n_c·r_b1), that of a centre gear T/(i·r_b4), i that of the sun. Units N, N·m, m; 3 to 4 % above the mean.
 
-    References
-    ----------
     Own derivation, statics; theory page (66).
 
     Examples

@@ -117,13 +117,7 @@ class GearPair(SpurPair):
     planet_virtual_teeth: Annotated[float, Field(ge=5)] | None = None
 
     def of(self, stage: FirstStage) -> GearPair:
-        """Return the data with the virtual teeth of every gear.
-
-        Raises
-        ------
-        ValueError
-            Fewer virtual teeth than the gear has.
-        """
+        """Return the data with the virtual teeth of every gear, no fewer than it has."""
         found = {}
         for gear, teeth in (("sun", stage.sun_teeth), ("planet", stage.planet_teeth)):
             name = f"{gear}_virtual_teeth"
@@ -205,13 +199,7 @@ class StiffnessRecord(Record):
     pin_span_mm: Annotated[float, Field(ge=1, le=500)] | None = None
 
     def stiffness(self, disc: Material, pin: Material, gears: FirstStage, stage: CycloidStage) -> Stiffness:
-        """Return all stiffnesses, given or by formula [N/m].
-
-        Raises
-        ------
-        ValueError
-            Gears of fewer virtual teeth than they have.
-        """
+        """Return all stiffnesses, given or by formula [N/m]."""
         bearings: dict[str, Any] = {}
         for name, formula in FORMULAS.items():
             own = getattr(self, name)
@@ -240,13 +228,7 @@ class StiffnessRecord(Record):
         )
 
     def parts(self, reducer: Reducer) -> tuple[Part, ...]:
-        """Return the parts of the interfaces that yield in series, a given stiffness as one of them.
-
-        Raises
-        ------
-        ValueError
-            A crankshaft whose journals stand outside its bearings.
-        """
+        """Return the parts of the interfaces that yield in series, a given stiffness as one of them."""
         disc, stage, found = reducer.disc_material, reducer.cycloid_stage, list[Part]()
         if isinstance(self.crank_disc_bearing, RollerBearing):
             bearing = self.crank_disc_bearing
@@ -301,13 +283,10 @@ class CentreGearStiffnessRecord(StiffnessRecord):
         found, shaft = super().parts(reducer), self.pinion_support
         if shaft is None:
             return found
-        own = (
-            shaft
-            if isinstance(shaft, float)
-            else shaft_support(**vars(shaft), elastic_modulus=reducer.disc_material.elastic_modulus)
-        )
+        if not isinstance(shaft, float):
+            shaft = shaft_support(**vars(shaft), elastic_modulus=reducer.disc_material.elastic_modulus)
         mesh = Part("centre_mesh", "centre mesh", 1.0 / reducer.stiffness.centre_mesh)
-        return (*found, mesh, Part("centre_mesh", "pinion shaft", 1.0 / own))
+        return (*found, mesh, Part("centre_mesh", "pinion shaft", 1.0 / shaft))
 
 
 class SingleStageStiffnessRecord(Record):
@@ -425,11 +404,9 @@ class _AnyReducerRecord(Record):
 
     def _stated(self) -> dict[str, Any]:
         """Return the fields of the reducer that all families have."""
-        given, same = (
-            self.modification,
-            ("name", "source", "disc_count", "cycloid_stage", "load", "friction", "catalogue"),
-        )
+        given = self.modification
         amounts = given.equidistant_um, given.shift_um, given.rotation_urad
+        same = ("name", "source", "disc_count", "cycloid_stage", "load", "friction", "catalogue")
         return {name: getattr(self, name) for name in same} | {
             "disc_material": self.material,
             "pin_material": self.pin_material or self.material,
@@ -486,11 +463,10 @@ class SingleStageRecord(_AnyReducerRecord):
     def reducer(self) -> Reducer:
         """Return the reducer in SI units."""
         stated = self._stated()
-        stiffness = self.stiffness.stiffness(stated["disc_material"], stated["pin_material"], self.cycloid_stage)
         return Reducer(
             crank_count=0,
             output_pins=self.output_pins,
-            stiffness=stiffness,
+            stiffness=self.stiffness.stiffness(stated["disc_material"], stated["pin_material"], self.cycloid_stage),
             friction_dimensions=SingleStageFriction(),
             clearances=self.clearances,
             **stated,
@@ -624,7 +600,7 @@ def _identified(data: dict[str, Any], path: Path) -> IdentifiedStiffness:
     for field in record.stiffness:
         if field not in IDENTIFIABLE:
             raise InputError.at(path, "stiffness", field, "one of " + ", ".join(IDENTIFIABLE))
-    rows = np.eye(len(record.stiffness)).tolist() if record.correlation is None else record.correlation
+    rows = np.eye(len(record.stiffness)) if record.correlation is None else record.correlation
     return IdentifiedStiffness(
         source=record.source,
         values={field: item.value for field, item in record.stiffness.items()},

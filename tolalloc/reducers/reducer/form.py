@@ -17,6 +17,7 @@ from tolalloc.drawings.table_file import plain_number, read_text_table
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
 
+Points = Float[np.ndarray, " point"]
 LARGEST_DEVIATION = 200 * MICROMETRE
 """Largest deviation of a flank that is believed, as that of an amount of the modification [m]."""
 
@@ -67,13 +68,6 @@ class FlankForm:
         """Return the deviation at angles φ, outward positive [m].
 
         Between the points it is a periodic cubic spline, own choice: the form has a continuous curvature.
-
-        Examples
-        --------
-        >>> angle = 2 * np.pi * np.arange(200) / 200
-        >>> form = FlankForm(spaces=1, angle=tuple(angle.tolist()), deviation=tuple((1e-6 * np.cos(angle)).tolist()))
-        >>> bool(abs(form.at(np.array([7.0])) - 1e-6 * np.cos(7.0)) < 1e-14)
-        True
         """
         inside = np.remainder(angle, self.period)
         start = 0.0 if self.spans else self.angle[0]
@@ -99,18 +93,11 @@ def _spline(form: FlankForm) -> Any:
     return BSpline(knots, weight[np.arange(count + 3) % count], 3)
 
 
-def flank_form(
-    angle: Float[np.ndarray, " point"],
-    deviation: Float[np.ndarray, " point"],
-    spaces: int,
-    spans: int | None,
-    place: str,
-) -> FlankForm:
+def flank_form(angle: Points, deviation: Points, spaces: int, spans: int | None, place: str) -> FlankForm:
     """Return the form through points in any order.
 
     Points of one φ are taken as their mean, own derivation. Angles φ [rad], deviations outward positive [m]; the place
     is who asks, for messages. Unless spans are stated there are `SMOOTHED` of them where the points are dense enough.
-
     """
     period = 2 * pi * spaces
     if (most := float(np.abs(deviation).max()) / MICROMETRE) > LARGEST_DEVIATION / MICROMETRE:
@@ -144,13 +131,7 @@ class PinForm:
     waves: tuple[tuple[int, float, float], ...]  # Order n, amplitudes of cos and sin [-, m, m]
 
     def at(self, direction: Float[np.ndarray, "*angles"]) -> Float[np.ndarray, "*angles"]:
-        """Return how far the pin stands out in directions [rad], Σ a·cos nχ + b·sin nχ [m].
-
-        Examples
-        --------
-        >>> PinForm(waves=((3, 5e-7, 0.0),)).at(np.array([0.0, np.pi / 3])).round(9).tolist()  # lobe and hollow
-        [5e-07, -5e-07]
-        """
+        """Return how far the pin stands out in directions [rad], Σ a·cos nχ + b·sin nχ [m]."""
         found = np.zeros_like(direction)
         for order, cosine, sine in self.waves:
             found += cosine * np.cos(order * direction) + sine * np.sin(order * direction)
@@ -193,9 +174,7 @@ class PartForm:
         return found
 
 
-def read_profile(
-    path: Path, columns: Sequence[str], may: Sequence[str] = ()
-) -> Mapping[str, Float[np.ndarray, " point"]]:
+def read_profile(path: Path, columns: Sequence[str], may: Sequence[str] = ()) -> Mapping[str, Points]:
     """Return a table of numbers by its columns: angles in rad, lengths in m, numbers without a unit as they are.
 
     Other columns may stand there, but need not.

@@ -23,12 +23,10 @@ _LUBRICATION = {"crank_disc_bearing": 12.0, "crank_carrier_bearing": 6.0, "carri
 class IdleTorque:
     """What turns a reducer without load beside its contacts, at the output [N·m].
 
-    Notes
-    -----
-    One lip around the output at the pitch diameter of the carrier bearing, T = µ·q·π·d²/2; grease in the bearings by
-    Palmgren, theory page equation (78); the preload of the bearings' rollers by µ·F·d/2. All are turned by virtual work
-    to the output, as cranks turn zp times as fast. A seal at the input is the motor's; churning of gears and discs is
-    left out. Coefficients, viscosity and the lip's force are assumptions.
+    One lip around the output at the pitch diameter of the carrier bearing, T = µ·q·π·d²/2, own derivation; grease in
+    the bearings by Palmgren, theory page equation (78); the preload of the bearings' rollers by µ·F·d/2. All are turned
+    by virtual work to the output, as cranks turn zp times as fast. A seal at the input is the motor's; churning of
+    gears and discs is left out. Coefficients, viscosity and the lip's force are assumptions.
     """
 
     seals: float | None  # None where no carrier bearing says how large the seal is
@@ -37,18 +35,13 @@ class IdleTorque:
 
     @classmethod
     def of(cls, reducer: Reducer) -> IdleTorque:
-        """Return the torques of a reducer; those that its file states as they are stated.
-
-        References
-        ----------
-        A. Palmgren, Ball and Roller Bearing Engineering, 3rd ed. (1959), for the grease; own derivation.
-        """
+        """Return the torques of a reducer; those that its file states as they are stated."""
         stated, dimensions = reducer.friction, reducer.friction_dimensions
         bearings = {name: (getattr(dimensions, name), *number_and_turns(reducer, name)) for name in _LUBRICATION}
         known = {name: own for name, own in bearings.items() if own[0] is not None}
         main = dimensions.carrier_bearing
         return cls(
-            seals=stated.seals if stated.seals is not None or main is None else lip_torque(main.pitch_diameter),
+            seals=stated.seals if stated.seals is not None or main is None else _seal_torque(main.pitch_diameter),
             grease=sum(
                 count * bearing.rows * speed * grease_torque(_LUBRICATION[name], bearing, speed * _OUTPUT_SPEED)
                 for name, (bearing, count, speed) in known.items()
@@ -80,41 +73,20 @@ def number_and_turns(reducer: Reducer, name: str) -> tuple[int, int]:
     return reducer.crank_count * journals, reducer.cycloid_stage.pin_count
 
 
-def lip_torque(diameter: float) -> float:
-    """Return the friction torque of a shaft's lip seal, µ·q·π·d²/2 with assumed µ and q [N·m].
-
-    Parameters
-    ----------
-    diameter
-        Of the shaft at the lip [m].
-
-    References
-    ----------
-    Own derivation: a line force q on the circumference, µ = 0.4 and q = 100 N/m assumed.
-
-    Examples
-    --------
-    >>> round(lip_torque(0.1), 3)
-    0.628
-    """
+def _seal_torque(diameter: float) -> float:
+    """Return the friction torque of a lip seal on a shaft of a diameter [m], µ·q·π·d²/2 with assumed µ and q [N·m]."""
     return _LIP_COEFFICIENT * _LIP_FORCE * pi * diameter**2 / 2.0
 
 
 def grease_torque(factor: float, bearing: RollingBearing, speed: float) -> float:
     """Return the torque of a bearing row that no load decides, f0·10⁻¹⁰·(ν·n)^(2/3)·d_m³, theory page (78) [N·m].
 
-    With d_m in mm, ν = 100 mm²/s assumed and n in 1/min; below ν·n = 2000 the power is 160.
-
-    Parameters
-    ----------
-    factor
-        Palmgren's f0 [-].
-    speed
-        Of one ring against the other [1/min].
+    With d_m in mm, ν = 100 mm²/s assumed and n of one ring against the other in 1/min; below ν·n = 2000 the power is
+    160.
 
     References
     ----------
-    A. Palmgren, Ball and Roller Bearing Engineering, 3rd ed. (1959).
+    A. Palmgren, Ball and Roller Bearing Engineering, 3rd ed. (1959), whose f0 the factor is.
     """
     flow = _VISCOSITY * speed
     power = flow ** (2.0 / 3.0) if flow >= 2000.0 else 160.0

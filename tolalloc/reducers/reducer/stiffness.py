@@ -9,8 +9,9 @@ Arguments are in SI units: lengths m, forces N, Young's moduli Pa, angles rad; P
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from math import inf, log, pi, radians, sin, sqrt
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
@@ -103,15 +104,8 @@ class IdentifiedStiffness:
     @property
     def content(self) -> tuple[object, ...]:
         """Everything as numbers and names that compare and print in full."""
-        own = (getattr(self, item.name) for item in fields(self))
-        return tuple(
-            value.tolist()
-            if isinstance(value, np.ndarray)
-            else list(value.items())
-            if isinstance(value, dict)
-            else value
-            for value in own
-        )
+        values, uncertainty = list(self.values.items()), list(self.standard_uncertainty.items())
+        return self.source, values, uncertainty, self.correlation.tolist(), self.notes
 
     @property
     def covariance(self) -> Float[np.ndarray, "stiffness stiffness"]:
@@ -121,32 +115,26 @@ class IdentifiedStiffness:
 
 
 def checked_correlation(
-    rows: Sequence[Sequence[float]] | Float[np.ndarray, "row column"], names: tuple[str, ...], place: object
+    rows: Sequence[Sequence[float]] | Float[np.ndarray, "row column"], names: tuple[str, ...], place: str | Path
 ) -> Float[np.ndarray, "stiffness stiffness"]:
     """Return the rows as a correlation of the named stiffnesses."""
-    size, field_name = len(names), "correlation"
-    lengths = [len(row) for row in rows]
+    size, lengths = len(names), [len(row) for row in rows]
     if lengths != [size] * size:
-        raise InputError.at(
-            f"{place}",
-            f"{field_name}, numbers per row,",
-            lengths,
-            f"{size} rows of {size}, in the order {', '.join(names)}",
-        )
+        allowed = f"{size} rows of {size}, in the order {', '.join(names)}"
+        raise InputError.at(place, "correlation, numbers per row,", lengths, allowed)
     matrix = np.array(rows, dtype=float).reshape(size, size)
     for (row, column), value in np.ndenumerate(matrix):
-        entry = f"{field_name} of {names[row]} with {names[column]}"
+        entry = f"correlation of {names[row]} with {names[column]}"
         if not abs(value) <= 1.0 + ROUNDING:
-            raise InputError.at(f"{place}", entry, float(value), "-1 to 1")
+            raise InputError.at(place, entry, float(value), "-1 to 1")
         if row == column and abs(value - 1.0) > ROUNDING:
-            raise InputError.at(f"{place}", entry, float(value), "1, that of a stiffness with itself")
+            raise InputError.at(place, entry, float(value), "1, that of a stiffness with itself")
         if abs(value - matrix[column, row]) > ROUNDING:
-            raise InputError.at(f"{place}", entry, float(value), f"{matrix[column, row]:g}, as in the mirrored place")
+            raise InputError.at(place, entry, float(value), f"{matrix[column, row]:g}, as in the mirrored place")
     smallest = float(np.linalg.eigvalsh(matrix)[0]) if size else 0.0
     if smallest < -ROUNDING:
-        raise InputError.at(
-            f"{place}", f"smallest eigenvalue of {field_name}", smallest, "0 or more, else no such values exist"
-        )
+        allowed = "0 or more, else no such values exist"
+        raise InputError.at(place, "smallest eigenvalue of correlation", smallest, allowed)
     return matrix
 
 

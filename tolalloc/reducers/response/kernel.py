@@ -26,6 +26,8 @@ from tolalloc.reducers.reducer.design import Modification, Reducer, at_torque, t
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.running.chunks import Mapper, map_chunks
 
+Samples = Float[np.ndarray, "sample column"]
+"""Deviations of units in the columns that vary, or what has their shape [m, angles rad]."""
 NAME = "stiffness (identified)"
 PREFIX = "stiffness."
 SEEN = 0.05
@@ -86,14 +88,10 @@ class KernelResponse:
         """Return the response of the same reducer with another tooth modification."""
         return replace(self, fixed={**self.fixed, **modification.deviations})
 
-    def at_disc_temperature(self, warmer: float) -> KernelResponse:
-        """Return the response of the same reducer whose discs are warmer than the ring by so much [K]."""
-        return replace(self, disc_temperature=warmer)
-
     def under(self, case: LoadCase) -> KernelResponse:
         """Return the response of the same reducer under a load case, which keeps what it does not state."""
-        kernel = self if case.disc_temperature is None else self.at_disc_temperature(case.disc_temperature)
-        kernel = replace(kernel, window=case.window)
+        warmer = self.disc_temperature if case.disc_temperature is None else case.disc_temperature
+        kernel = replace(self, window=case.window, disc_temperature=warmer)
         if case.torque is None:
             return kernel
         own = self.model
@@ -114,7 +112,7 @@ class KernelResponse:
         rated = float(np.copysign(self.model.reducer.load.rated_torque, self.torque))
         return rated if self.load is None else self.load
 
-    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+    def __call__(self, x: Samples) -> Evaluation:
         """Return the peak-to-peak of every sample [arcsec]."""
         values, status = np.empty((x.shape[0], 1)), np.empty(x.shape[0], np.uint8)
         for rows, extremes in map_chunks(self.alone._extremes, x, self.mapper):
@@ -123,7 +121,7 @@ class KernelResponse:
             self.observe(extremes.status)
         return Evaluation(values=values, status=status)
 
-    def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> WithDerivatives:
+    def with_derivatives(self, x: Samples) -> WithDerivatives:
         """Return the peak-to-peak of every sample and its derivatives, at hardly more cost than without."""
         values, status = np.empty((x.shape[0], 1)), np.empty(x.shape[0], np.uint8)
         by_column = np.empty(x.shape)
@@ -168,12 +166,11 @@ class KernelResponse:
         What is asked for is a fraction of all columns, and a chunk's answer is kept in a file or sent by a worker.
         """
         extremes, found = self.model.peak_to_peak_derivatives(self.errors(x), self.torque)
-        asked = [
-            self.model.columns.index(name) for name in (*self.columns, *self.model.reducer.modification.deviations)
-        ]
+        names = (*self.columns, *self.model.reducer.modification.deviations)
+        asked = [self.model.columns.index(name) for name in names]
         return extremes, replace(found, by_error=found.by_error[:, asked])
 
-    def errors(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample all_columns"]:
+    def errors(self, x: Samples) -> Float[np.ndarray, "sample all_columns"]:
         """Return the varied columns and the fixed ones together, in the order of the model [m].
 
         A column that is both deviates from its fixed value, worn pins are thinner, each unit's by its own forces, and
@@ -197,12 +194,9 @@ class KernelResponse:
 def stiffness_source(identified: IdentifiedStiffness, reducer: Reducer) -> CorrelatedSource:
     """Return what is not known of the identified stiffnesses as a source of relative changes ln K/K0 [-]."""
     if reducer.stiffness.pin_bending < inf and identified.standard_uncertainty.get("pin_contact", 0.0) > 0.0:
-        raise InputError.at(
-            identified.source,
-            "standard_uncertainty of pin_contact",
-            identified.standard_uncertainty["pin_contact"],
-            f"0 where pins bend, as those of {reducer.name} do (pin_span_mm)",
-        )
+        stated = identified.standard_uncertainty["pin_contact"]
+        allowed = f"0 where pins bend, as those of {reducer.name} do (pin_span_mm)"
+        raise InputError.at(identified.source, "standard_uncertainty of pin_contact", stated, allowed)
     return CorrelatedSource(
         name=NAME, columns=tuple(PREFIX + name for name in identified.values), covariance=identified.covariance
     )
@@ -226,7 +220,7 @@ class StiffnessResponse:
         """The one output of the kernel."""
         return self.kernel.outputs
 
-    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+    def __call__(self, x: Samples) -> Evaluation:
         """Return the peak-to-peak of every sample [arcsec]."""
         own = len(self.kernel.columns)
         answers = self.kernel.with_derivatives(np.ascontiguousarray(x[:, :own]))
@@ -251,14 +245,8 @@ class StiffnessResponse:
 def principal_axes(covariance: Float[np.ndarray, "stiffness stiffness"]) -> Float[np.ndarray, "axis stiffness"]:
     """Return one standard deviation along every principal axis of a covariance, upwards on the whole [-].
 
-    Axes √λ·q of C·q = λ·q with λ > 0 (own derivation): C is the sum of their squares.
-
-    Examples
-    --------
-    Two stiffnesses that are uncertain together, by 30 % each, have one axis.
-
-    >>> principal_axes(np.full((2, 2), 0.09)).round(3).tolist()
-    [[0.3, 0.3]]
+    Axes √λ·q of C·q = λ·q with λ > 0 (own derivation): C is the sum of their squares. Two stiffnesses that are
+    uncertain together have one axis.
     """
     variance, axes = np.linalg.eigh(covariance)
     kept = variance > _LEAST_AXIS * max(variance[-1], 0.0)
@@ -306,7 +294,7 @@ class OutputsWithStiffness:
             # These solves belong to a unit that is counted already.
             yield self.reading(replace(self.peak.changed(axis), observe=unobserved), self._others)
 
-    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+    def __call__(self, x: Samples) -> Evaluation:
         """Return the outputs of every sample."""
         if PEAK_TO_PEAK not in self.outputs:
             return self._differences(x, self.peak.kernel)
@@ -315,7 +303,7 @@ class OutputsWithStiffness:
         values = np.insert(others.values, self.outputs.index(PEAK_TO_PEAK), exact.values[:, 0], axis=1)
         return Evaluation(values=values, status=np.maximum(others.status, exact.status))
 
-    def _differences(self, x: Float[np.ndarray, "sample column"], kernel: KernelResponse) -> Evaluation:
+    def _differences(self, x: Samples, kernel: KernelResponse) -> Evaluation:
         """Return the others of every sample."""
         own = len(kernel.columns)
         sample, along = np.ascontiguousarray(x[:, :own]), x[:, own:] @ np.linalg.pinv(self.axes)

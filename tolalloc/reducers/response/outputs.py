@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -43,9 +42,10 @@ from tolalloc.reducers.equivalent.outputs import (
 from tolalloc.reducers.equivalent.perfect import friction_torque_derivatives, pin_force_derivatives, preload
 from tolalloc.reducers.load_case import OverLoadCases
 from tolalloc.reducers.reducer.design import Reducer
-from tolalloc.reducers.response.kernel import KernelResponse
+from tolalloc.reducers.response.kernel import KernelResponse, Samples
 from tolalloc.running.chunks import map_chunks
 
+Errors = Float[np.ndarray, "chunk all_columns"]
 Answer = tuple[Float[np.ndarray, "chunk output"], UInt8[np.ndarray, " chunk"]]
 _SHARE = "share of the pin force on the most loaded disc"
 _RV = ("largest pin force", "largest crank–disc bearing force", _SHARE)
@@ -72,16 +72,16 @@ class Reading:
     read: Callable[[KernelResponse, Float[np.ndarray, "chunk all_columns"]], Answer]
 
 
-def _peak_to_peak(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+def _peak_to_peak(kernel: KernelResponse, errors: Errors) -> Answer:
     found = kernel.extremes(errors)
     return found.peak_to_peak[:, np.newaxis] / ARCSECOND, found.status
 
 
-def _loop(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+def _loop(kernel: KernelResponse, errors: Errors) -> Answer:
     return _found(_read_off(hysteresis_loop(kernel.model, errors, TURN_ANGLES)))
 
 
-def _friction_loop(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+def _friction_loop(kernel: KernelResponse, errors: Errors) -> Answer:
     loop = friction_loop(kernel.model, errors, TURN_ANGLES)
     own = [100.0 * loop.rated.efficiency, loop.lost_motion / ARCMINUTE, loop.hysteresis_loss / ARCMINUTE]
     return _found([*_read_off(loop.plain), *own])
@@ -99,36 +99,25 @@ def _found(columns: list[Float[np.ndarray, " chunk"]]) -> Answer:
     return values, status.astype(np.uint8)
 
 
-def _load(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+def _load(kernel: KernelResponse, errors: Errors) -> Answer:
     model, torque = kernel.model, kernel.load_torque
     solved = Solved.of(model.at_torque(torque).equilibria(errors, torque, TURN_ANGLES))
     every = outputs_of(model.reducer)
     own = [every[name][1](solved) for name in _FORCES[model.reducer.family]]
-    values = np.stack([*own, *_pin_stress(solved)], axis=1)
-    return values, np.asarray(solved.equilibria.status.max(axis=1))
-
-
-def _pin_stress(solved: Solved) -> tuple[Float[np.ndarray, " chunk"], Float[np.ndarray, " chunk"]]:
-    """Return the largest line load [N/mm] and the largest Hertz pressure [MPa] of pins and teeth.
-
-    Both at the deeper end of a tooth whose disc is tilted; the force spreads evenly where no disc is.
-    """
+    # At the deeper end of a tooth whose disc is tilted; the force spreads evenly where no disc is.
     line_load = peak_line_load(solved.equilibria, solved.forces)
     pressure = unit_pressure(solved.equilibria) * np.sqrt(line_load)
-    return line_load.max(axis=(1, 2, 3)) * MILLIMETRE, pressure.max(axis=(1, 2, 3)) / MEGAPASCAL
+    own += [line_load.max(axis=(1, 2, 3)) * MILLIMETRE, pressure.max(axis=(1, 2, 3)) / MEGAPASCAL]
+    return np.stack(own, axis=1), np.asarray(solved.equilibria.status.max(axis=1))
 
 
-def _preload(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+def _preload(kernel: KernelResponse, errors: Errors) -> Answer:
     found = preload(kernel.model, errors)
     return np.stack([found.pin_force, found.friction_torque], axis=1), found.status
 
 
-def _radial_clearance(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
-    return _clearance_of(kernel.model, errors)
-
-
-def _clearance_of(model: EquivalentModel, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
-    clearance = radial_clearance(model, errors)[:, np.newaxis] / MICROMETRE
+def _radial_clearance(kernel: KernelResponse, errors: Errors) -> Answer:
+    clearance = radial_clearance(kernel.model, errors)[:, np.newaxis] / MICROMETRE
     status = np.where(np.isfinite(clearance[:, 0]), Status.CONVERGED, Status.NOT_FINITE)
     return clearance, status.astype(np.uint8)
 
@@ -157,10 +146,7 @@ _REQUIREMENTS = {
 
 
 def requirements_of(reducer: Reducer) -> tuple[Reading, ...]:
-    """Return what a requirement may limit without friction.
-
-    Transmission error, torque against twist, rated load, preload, gap at tip and root.
-    """
+    """Return what a requirement may limit without friction."""
     return _REQUIREMENTS[reducer.family]
 
 
@@ -193,17 +179,12 @@ def _waves(
 
 
 def orders_reading(orders: tuple[float, ...]) -> Reading:
-    """Return the reading of the waves of the transmission error, cosine and sine of every order.
+    """Return the reading of the waves of the transmission error, cosine and sine of every order [arcsec].
 
-    The waves are those of `tolalloc.reducers.equivalent.outputs.fitted_waves`, own derivation [arcsec].
-
-    Examples
-    --------
-    >>> orders_reading((2,)).outputs
-    ('order 2 cosine [arcsec]', 'order 2 sine [arcsec]')
+    The waves are those of `tolalloc.reducers.equivalent.outputs.fitted_waves`, own derivation.
     """
 
-    def read(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+    def read(kernel: KernelResponse, errors: Errors) -> Answer:
         found = kernel.model.equilibria(errors, kernel.torque)
         return _waves(orders, found.transmission_error), found.status.max(axis=1)
 
@@ -214,14 +195,9 @@ def with_orders(readings: tuple[Reading, ...], orders: tuple[float, ...]) -> tup
     """Return the readings and that of the waves, which are read off the curve that a peak-to-peak is searched on.
 
     As `orders_reading`, own derivation; the curve's angles are those of the coarse search.
-
-    Examples
-    --------
-    >>> [name for reading in with_orders((), (3,)) for name in reading.outputs]
-    ['order 3 cosine [arcsec]', 'order 3 sine [arcsec]']
     """
 
-    def read(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+    def read(kernel: KernelResponse, errors: Errors) -> Answer:
         found, curve = kernel.model.extremes_and_curve(errors, kernel.torque)
         return np.hstack([found.peak_to_peak[:, np.newaxis] / ARCSECOND, _waves(orders, curve)]), found.status
 
@@ -254,7 +230,7 @@ class OutputsResponse:
     def _read(self) -> tuple[str, ...]:
         return tuple(name for reading in self.readings for name in reading.outputs)
 
-    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+    def __call__(self, x: Samples) -> Evaluation:
         """Return the outputs of every sample; a sample fails where one of its readings does."""
         values, status = np.empty((x.shape[0], len(self._read))), np.empty(x.shape[0], np.uint8)
         for rows, (answer, worst) in map_chunks(self.alone.read, x, self.kernel.mapper):
@@ -273,9 +249,8 @@ class OutputsResponse:
         """Return the outputs of one chunk and the worst status of every sample."""
         errors = self.kernel.errors(x)
         answers = [reading.read(self.kernel, errors) for reading in self.readings]
-        return np.concatenate([values for values, _ in answers], axis=1), np.asarray(
-            np.max([status for _, status in answers], axis=0)
-        )
+        worst = np.max([status for _, status in answers], axis=0)
+        return np.concatenate([values for values, _ in answers], axis=1), np.asarray(worst)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -293,7 +268,7 @@ class LoadCasesResponse:
         """Those of every load case."""
         return self.responses[0].columns
 
-    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+    def __call__(self, x: Samples) -> Evaluation:
         """Return the outputs of every sample; a sample fails where one of its load cases does."""
         found = [response(x) for response in self.responses]
         values, place = np.hstack([own.values for own in found]), {name: at for at, name in enumerate(self.read)}
@@ -312,7 +287,8 @@ class LoadCasesResponse:
         return np.asarray((combined.weights(own) * own).sum(axis=1))
 
 
-def _loop_derivatives(output: str, model: EquivalentModel, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
+def _loop_derivatives(output: str, kernel: KernelResponse, errors: Errors) -> Derived:
+    model = kernel.model
     if output != TORSIONAL_STIFFNESS:
         share = hysteresis.LOST_MOTION if output == LOST_MOTION else hysteresis.BACKLASH
         (width, slope), status = _width(model, errors, share)
@@ -325,42 +301,38 @@ def _loop_derivatives(output: str, model: EquivalentModel, errors: Float[np.ndar
     return stiffness, by_error, np.maximum(first, second)
 
 
-def _width(
-    model: EquivalentModel, errors: Float[np.ndarray, "chunk all_columns"], share: float
-) -> tuple[Width, UInt8[np.ndarray, " chunk"]]:
+def _width(model: EquivalentModel, errors: Errors, share: float) -> tuple[Width, UInt8[np.ndarray, " chunk"]]:
     """Return the width of the loop at a share of the rated torque."""
     torque = share * model.reducer.load.rated_torque
     width, slope = np.zeros(len(errors)), np.zeros(errors.shape)
     status = np.full(len(errors), Status.CONVERGED, np.uint8)
     for side in (1, -1):
-        twist, found = model.at_torque(side * torque).rotation_derivatives(
-            errors, side * torque, hysteresis.TURN_ANGLES
-        )
+        twist, found = model.at_torque(side * torque).rotation_derivatives(errors, side * torque, TURN_ANGLES)
         width += side * twist.mean(axis=1)
         slope += side * found.by_error.reshape(*twist.shape, -1).mean(axis=1)
         np.maximum(status, found.status.reshape(twist.shape).max(axis=1), out=status)
     return (width, slope), status
 
 
-def _preload_derivatives(
-    output: Literal["pin_force", "friction_torque"],
-    model: EquivalentModel,
-    errors: Float[np.ndarray, "chunk all_columns"],
-) -> Derived:
-    derived = pin_force_derivatives if output == "pin_force" else friction_torque_derivatives
-    found, slopes = derived(model, errors)
-    return getattr(found, output), slopes, found.status
+def _pin_force_derivatives(kernel: KernelResponse, errors: Errors) -> Derived:
+    found, slopes = pin_force_derivatives(kernel.model, errors)
+    return found.pin_force, slopes, found.status
 
 
-def _clearance_derivatives(model: EquivalentModel, errors: Float[np.ndarray, "chunk all_columns"]) -> Derived:
-    clearance, status = _clearance_of(model, errors)
-    return clearance[:, 0], radial_clearance_derivatives(model, errors) / MICROMETRE, status
+def _friction_torque_derivatives(kernel: KernelResponse, errors: Errors) -> Derived:
+    found, slopes = friction_torque_derivatives(kernel.model, errors)
+    return found.friction_torque, slopes, found.status
 
 
-_DERIVED: dict[str, Callable[[EquivalentModel, Float[np.ndarray, "chunk all_columns"]], Derived]] = {
+def _clearance_derivatives(kernel: KernelResponse, errors: Errors) -> Derived:
+    clearance, status = _radial_clearance(kernel, errors)
+    return clearance[:, 0], radial_clearance_derivatives(kernel.model, errors) / MICROMETRE, status
+
+
+_DERIVED: dict[str, Callable[[KernelResponse, Float[np.ndarray, "chunk all_columns"]], Derived]] = {
     **{name: partial(_loop_derivatives, name) for name in (LOST_MOTION, BACKLASH, TORSIONAL_STIFFNESS)},
-    PRELOAD: partial(_preload_derivatives, "pin_force"),
-    FRICTION_TORQUE: partial(_preload_derivatives, "friction_torque"),
+    PRELOAD: _pin_force_derivatives,
+    FRICTION_TORQUE: _friction_torque_derivatives,
     RADIAL_CLEARANCE: _clearance_derivatives,
 }
 
@@ -369,7 +341,7 @@ DIFFERENTIABLE = tuple(_DERIVED)
 
 
 def output_derivatives(
-    kernel: KernelResponse, output: str, x: Float[np.ndarray, "sample column"]
+    kernel: KernelResponse, output: str, x: Samples
 ) -> tuple[Evaluation, Float[np.ndarray, "sample all_columns"]]:
     """Return one of `DIFFERENTIABLE` of every sample, and its derivatives by all error columns of the model.
 
@@ -388,4 +360,4 @@ def output_derivatives(
 
 
 def _derived(kernel: KernelResponse, output: str, x: Float[np.ndarray, "chunk column"]) -> Derived:
-    return _DERIVED[output](kernel.model, kernel.errors(x))
+    return _DERIVED[output](kernel, kernel.errors(x))
