@@ -9,6 +9,7 @@ from scipy.stats import binom, norm
 from tests.validation_manual import shown
 from tolalloc.capability.indices import (
     Limits,
+    QuantileInterval,
     capability,
     quantile_interval,
     wilson_interval,
@@ -93,14 +94,21 @@ def test_wilson_covers_on_average(confidence):
     assert min(coverage) > confidence - 0.05
 
 
+def attained_by(ordered: np.ndarray, share: float, found: QuantileInterval) -> float:
+    """Return the exact confidence of the order statistics that an interval ends at, P(r ≤ B < s)."""
+    low = np.searchsorted(ordered, found.low) + 1 if np.isfinite(found.low) else 0
+    high = np.searchsorted(ordered, found.high) + 1 if np.isfinite(found.high) else ordered.size + 1
+    return float(binom.cdf(high - 1, ordered.size, share) - binom.cdf(low - 1, ordered.size, share))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.99])
 def test_quantile_interval_covers(generator, share):
-    """The true quantile of a skewed distribution lies inside as often as the attained confidence says."""
+    """The true quantile of a skewed distribution lies inside as often as the confidence of its order statistics."""
     samples = generator.exponential(size=(4000, 600))
     found = [quantile_interval(sample, share) for sample in samples]
     inside = np.mean([item.low <= -np.log1p(-share) < item.high for item in found])
-    attained = found[0].attained
+    attained = attained_by(np.sort(samples[0]), share, found[0])
     assert attained >= 0.95
     assert inside == pytest.approx(attained, abs=4 * np.sqrt(attained * (1 - attained) / 4000))
 
@@ -117,12 +125,16 @@ def test_no_nearer_order_statistics_would_do(generator):
 @pytest.mark.parametrize("share", [0.0027, 0.5, 0.9973])
 @pytest.mark.parametrize("confidence", [0.9, 0.95])
 def test_small_samples_say_so(generator, share, confidence):
-    needed = quantile_interval(np.zeros(1), share, confidence).needed
-    enough = quantile_interval(generator.standard_normal(needed), share, confidence)
-    wanting = quantile_interval(generator.standard_normal(needed - 1), share, confidence)
+    """The fewest units that bound both sides are those with max(share, 1 − share)ⁿ ≤ half of the doubt."""
+    needed = int(np.ceil(np.log((1 - confidence) / 2) / np.log(max(share, 1 - share))))
+    samples = [generator.standard_normal(units) for units in (needed, needed - 1)]
+    enough, wanting = (quantile_interval(sample, share, confidence) for sample in samples)
     assert np.isfinite([enough.low, enough.high]).all()
     assert not np.isfinite([wanting.low, wanting.high]).all()
-    assert min(enough.attained, wanting.attained) >= confidence
+    attained = [
+        attained_by(np.sort(sample), share, own) for sample, own in zip(samples, (enough, wanting), strict=True)
+    ]
+    assert min(attained) >= confidence
 
 
 def test_arguments_out_of_range():

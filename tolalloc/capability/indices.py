@@ -41,10 +41,7 @@ class Limits:
     def excess(self, values: Float[np.ndarray, "*unit"], *, relative: bool = False) -> Float[np.ndarray, "side *unit"]:
         """Return how far values lie beyond each limit, negative inside [unit of the characteristic, or of the limit].
 
-        Parameters
-        ----------
-        relative
-            Whether over the limit, where that is not 0.
+        Relative values are over the limit, where that is not 0.
         """
         scales = [(abs(limit) or 1.0) if relative else 1.0 for _, limit in self.turned]
         return np.stack([sign * (values - limit) / by for (sign, limit), by in zip(self.turned, scales, strict=True)])
@@ -122,26 +119,14 @@ class ShareInterval:
 class QuantileInterval:
     """A quantile with an interval that holds for every continuous distribution."""
 
-    share: float  # Which quantile [-]
     estimate: float  # Empirical quantile [unit of the characteristic]
     # Ends of the interval, infinite where the sample is too small to bound that side [unit of the characteristic]
     low: float
     high: float
-    # Confidence asked for, and the exact one of the order statistics chosen, which is not less [-]
-    confidence: float
-    attained: float
-    # Units of the sample, and the fewest that bound both sides [-]
-    units: int
-    needed: int
 
 
 def capability(sample: Float[np.ndarray, " unit"], limits: Limits) -> Capability:
     """Return the capability of a sample in the order of its making.
-
-    Parameters
-    ----------
-    sample
-        Values of the characteristic [unit of the characteristic].
 
     Notes
     -----
@@ -177,11 +162,6 @@ def capability(sample: Float[np.ndarray, " unit"], limits: Limits) -> Capability
 def wilson_interval(units: int, accepted: int, confidence: float = 0.95) -> ShareInterval:
     """Return a yield with its two-sided Wilson interval, which covers on average as stated, not at every yield.
 
-    Parameters
-    ----------
-    units, accepted
-        Units of the sample, and how many are within the limits [-].
-
     References
     ----------
     Wilson 1927, (p + z²/2n ± z·√(p·(1 − p)/n + z²/4n²)) / (1 + z²/n).
@@ -194,7 +174,7 @@ def wilson_interval(units: int, accepted: int, confidence: float = 0.95) -> Shar
     """
     from scipy.stats import norm
 
-    _require_share("Wilson interval", "confidence", confidence)
+    require_share("Wilson interval", "confidence", confidence)
     if units < 1 or not 0 <= accepted <= units:
         raise InputError.at("Wilson interval", "accepted", accepted, f"0 to {units} units")
     z, share = float(norm.isf((1 - confidence) / 2)), accepted / units
@@ -211,14 +191,7 @@ def wilson_interval(units: int, accepted: int, confidence: float = 0.95) -> Shar
 
 
 def quantile_interval(sample: Float[np.ndarray, " unit"], share: float, confidence: float = 0.95) -> QuantileInterval:
-    """Return a quantile with the two-sided interval of two order statistics, half of the doubt on each side.
-
-    Parameters
-    ----------
-    sample
-        Independent values of the characteristic [unit of the characteristic].
-    share
-        Which quantile [-].
+    """Return a quantile of independent values with the interval of two order statistics, half of the doubt each side.
 
     References
     ----------
@@ -234,8 +207,8 @@ def quantile_interval(sample: Float[np.ndarray, " unit"], share: float, confiden
     """
     from scipy.stats import binom
 
-    _require_share("quantile interval", "share", share)
-    _require_share("quantile interval", "confidence", confidence)
+    require_share("quantile interval", "share", share)
+    require_share("quantile interval", "confidence", confidence)
     if sample.size < 1 or not np.isfinite(sample).all():
         raise InputError.at("quantile interval", "sample", f"{sample.size} values", "at least 1 value, all finite")
     units, tail = sample.size, (1 - confidence) / 2
@@ -243,14 +216,9 @@ def quantile_interval(sample: Float[np.ndarray, " unit"], share: float, confiden
     high = int(binom.isf(tail, units, share)) + 1
     ordered = np.sort(sample)
     return QuantileInterval(
-        share=share,
         estimate=float(np.quantile(sample, share)),
         low=float(ordered[low - 1]) if low >= 1 else -np.inf,
         high=float(ordered[high - 1]) if high <= units else np.inf,
-        confidence=confidence,
-        attained=float(binom.cdf(high - 1, units, share) - binom.cdf(low - 1, units, share)),
-        units=units,
-        needed=int(np.ceil(np.log(tail) / np.log(max(share, 1 - share)))),
     )
 
 
@@ -327,7 +295,7 @@ def holm(probabilities: Sequence[float], level: float) -> Bool[np.ndarray, " tes
     return rejected
 
 
-def _require_share(place: str, field: str, value: float) -> None:
+def require_share(place: str, field: str, value: float) -> None:
     """Raise unless a value lies between 0 and 1."""
     if not 0 < value < 1:
         raise InputError.at(place, field, value, "a number between 0 and 1")

@@ -132,7 +132,12 @@ def _moved(
     moved, errors = np.empty_like(units), experiment.errors
     for source, own in zip(errors.active, errors.columns_of_source, strict=True):
         extremes = _extreme_in_zone(source, units[:, own], gradients[:, own])
-        moved[:, own] = _moved_towards(source, units[:, own], extremes, part)
+        if source.spectrum:  # waves with phases between theirs
+            phases = _phases(units[:, own])
+            apart = np.remainder(_phases(extremes) - phases + 0.5, 1.0) - 0.5
+            moved[:, own] = _filled(source, phases + part * apart)
+        else:
+            moved[:, own] = units[:, own] + part * (extremes - units[:, own])
     return moved
 
 
@@ -177,25 +182,6 @@ def _extreme_in_zone(
         phases = np.where(better[:, np.newaxis], phases + move, phases)
         furthest = np.maximum(found, furthest)
     return _filled(source, phases)
-
-
-def _moved_towards(
-    source: Source, units: Float[np.ndarray, "unit column"], targets: Float[np.ndarray, "unit column"], part: float
-) -> Float[np.ndarray, "unit column"]:
-    """Return the parts that lie between two parts inside the zone, waves with phases between theirs.
-
-    Parameters
-    ----------
-    units, targets
-        Its columns of either part [-].
-    part
-        Part of the way, 0 to 1 [-].
-    """
-    if not source.spectrum:
-        return np.asarray(units + part * (targets - units))
-    phases = _phases(units)
-    apart = np.remainder(_phases(targets) - phases + 0.5, 1.0) - 0.5
-    return _filled(source, phases + part * apart)
 
 
 def _phases(columns: Float[np.ndarray, "unit column"]) -> Float[np.ndarray, "unit vector"]:
