@@ -51,12 +51,7 @@ class ShapleyEffects:
 def shapley_effects(experiment: Experiment[Response], permutations: int) -> ShapleyEffects:
     """Return the Shapley effects of all varying sources on all outputs, from the same samples.
 
-    Parameters
-    ----------
-    experiment
-        Its sources may depend on each other; all columns of a source go together.
-    permutations
-        Random orders of the sources; the response is called (sources + 1) times as often [-].
+    All columns of a source go together; the response is asked for (sources + 1) samples of every permutation.
 
     Notes
     -----
@@ -136,8 +131,6 @@ def _conditional_factor(
 ) -> Float[np.ndarray, "order source source"]:
     """Return roots of the correlation in which a source takes numbers of its own and of the sources behind it [-].
 
-    Notes
-    -----
     Cholesky's factor in the reverse of each order. Where the sources behind fix a source, it has no number of its own.
     """
     left = np.repeat(correlation[np.newaxis], position.shape[0], axis=0)

@@ -8,7 +8,7 @@ counted; ``conf`` takes the blocks of a Sobol' sequence for independent, so inte
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -138,8 +138,17 @@ class SobolAnalysis:
 
     @cached_property
     def overall(self) -> SourceRanking:
-        """The ranking over all outputs."""
-        return _overall_ranking(self.sources, self.outputs, self.ranked, self.indices)
+        """The ranking over those outputs that count and vary: the total index of a source is its largest one."""
+        varying = np.flatnonzero(self.indices.varies & np.isin(self.outputs, self.ranked))
+        total = self.indices.total[varying]
+        return SourceRanking(
+            sources=self.sources,
+            total=total.max(axis=0),
+            total_resamples=self.indices.total_resamples[varying].max(axis=0),
+            blocks=self.blocks,
+            drives=tuple(self.outputs[varying[at]] for at in total.argmax(axis=0)),
+            unseen=self.indices.unseen[varying].max(axis=0),
+        )
 
     def position(self, output: str | int) -> int:
         """Return the position of an output [-]."""
@@ -189,26 +198,6 @@ def _indices_of(
         samples=samples,
         unseen=found.unseen[at],
         few=few,
-    )
-
-
-def _overall_ranking(
-    sources: tuple[str, ...], outputs: tuple[str, ...], ranked: tuple[str, ...], indices: SaltelliIndices
-) -> SourceRanking:
-    """Return the ranking over those outputs that count and vary: the total index of a source is its largest one."""
-    varying = np.flatnonzero(indices.varies & np.isin(outputs, ranked))
-    if not varying.size:
-        raise ConstantOutputError(
-            "Sobol indices: every output is the same for all samples, so no source can be ranked."
-        )
-    total = indices.total[varying]
-    return SourceRanking(
-        sources=sources,
-        total=total.max(axis=0),
-        total_resamples=indices.total_resamples[varying].max(axis=0),
-        blocks=indices.blocks,
-        drives=tuple(outputs[varying[at]] for at in total.argmax(axis=0)),
-        unseen=indices.unseen[varying].max(axis=0),
     )
 
 
@@ -379,7 +368,8 @@ def sobol_indices(
         columns=errors.columns,
         replicates=min(REPLICATES, effort.start),
     )
-    blocks = _Blocks(experiment, design, effort, counted, further or (lambda _: experiment.response), cheap)
+    further = further or (lambda _: experiment.response)
+    blocks = _Blocks(experiment=experiment, design=design, effort=effort, counted=counted, further=further, cheap=cheap)
     shared = {source.name: source.dimension for source in errors.sources}  # the tolerance that a source may share
     convergence = until_converged(
         blocks.resampled,
@@ -409,27 +399,25 @@ _CHEAP_SAMPLES = 2**16
 """Samples of a cheap model at least, with which its own indices err by some 1e-4 where it is smooth [-]."""
 
 
+@dataclass(kw_only=True)
 class _Blocks:
     """Blocks that are solved when they are first asked for."""
 
-    first: SaltelliIndices  # Of all outputs and groups, from the first number of blocks
-    followed: Response  # What is asked of further blocks
-    answers: Evaluation  # Its outputs in all blocks of the design
+    experiment: Experiment[Response]
+    design: SaltelliDesign
+    effort: SobolEffort
+    counted: tuple[str, ...]
+    further: Callable[[tuple[str, ...]], Response]
+    cheap: Regression | None
+    samples: int = 0
+    first: SaltelliIndices = field(init=False)  # Of all outputs and groups, from the first number of blocks
+    last: SaltelliIndices | None = None  # Of the followed outputs and the groups of the present design
+    leading: int = 0  # Position of the first output that counts and varies
+    followed: Response = field(init=False)  # What is asked of further blocks
+    answers: Evaluation = field(init=False)  # Its outputs in all blocks of the design
 
-    def __init__(
-        self,
-        experiment: Experiment[Response],
-        design: SaltelliDesign,
-        effort: SobolEffort,
-        counted: tuple[str, ...],
-        further: Callable[[tuple[str, ...]], Response],
-        cheap: Regression | None,
-    ) -> None:
-        self.experiment, self.design, self.effort, self.counted = experiment, design, effort, counted
-        self.further, self.cheap = further, cheap
-        self.names, self.outputs = design.names, experiment.response.outputs
-        self.last: SaltelliIndices | None = None  # Of the followed outputs and the groups of the present design
-        self.samples = 0
+    def __post_init__(self) -> None:
+        self.names, self.outputs = self.design.names, self.experiment.response.outputs
 
     def resampled(self, blocks: int) -> Resampled:
         """Return the indices of the output whose order must become stable."""
@@ -443,8 +431,8 @@ class _Blocks:
             self.samples += more.status.size
             self.answers = Evaluation.joined([self.answers, more])
             self.last = self._indices(self.answers, self.followed.outputs)
-        found, at = self.indices, self.outputs.index(self._leading)
-        return found.total[at], found.total_resamples[at]
+        found = self.indices
+        return found.total[self.leading], found.total_resamples[self.leading]
 
     @property
     def indices(self) -> SaltelliIndices:
@@ -459,19 +447,9 @@ class _Blocks:
         """Indices of the followed output with the small groups as one; none where all are told apart."""
         if self.last is None or self.design.names == self.names:
             return None
-        at = self.followed.outputs.index(self._leading)
-        return _indices_of(self.last, at, self._leading, self.design.names, self.last.blocks, self.samples)
-
-    @property
-    def _leading(self) -> str:
-        """The first output that counts and varies, of those that count in the ranking over all."""
-        varies = dict(zip(self.outputs, self.first.varies, strict=True))
-        found = next((name for name in self.counted if varies[name]), None)
-        if found is None:
-            raise ConstantOutputError(
-                "Sobol indices: every output is the same for all samples, so no source can be ranked."
-            )
-        return found
+        leading = self.outputs[self.leading]
+        at = self.followed.outputs.index(leading)
+        return _indices_of(self.last, at, leading, self.design.names, self.last.blocks, self.samples)
 
     @property
     def _places(self) -> list[int]:
@@ -482,12 +460,18 @@ class _Blocks:
         found = solved(self.experiment, self.experiment.response, self.design.chunks(0, blocks))
         self.samples = found.status.size
         self.first = self._indices(found, self.outputs)
-        self.followed = self.further((self._leading,))
+        varying = [at for at in map(self.outputs.index, self.counted) if self.first.varies[at]]
+        if not varying:
+            raise ConstantOutputError(
+                "Sobol indices: every output is the same for all samples, so no source can be ranked."
+            )
+        self.leading = varying[0]
+        self.followed = self.further((self.outputs[self.leading],))
         self.answers = replace(found, values=found.values[:, self._places])
 
     def _part(self) -> None:
         """Part the largest groups from the rest, which is one group from here on."""
-        total = self.first.total[self.outputs.index(self._leading)]
+        total = self.first.total[self.leading]
         if self.effort.second_order or total.size <= LARGEST + 1:
             return
         largest = {self.names[at] for at in np.argsort(-total, kind="stable")[:LARGEST]}
