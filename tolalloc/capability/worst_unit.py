@@ -42,16 +42,8 @@ def worst_unit(
 ) -> WorstUnit:
     """Return the worst unit that an ascent from many random units finds inside the zones.
 
-    Parameters
-    ----------
-    experiment
-        Correlations of its sources do not count, any part may be anywhere in its zone.
-    starts
-        Random units at the limits of all zones from which to ascend [-].
-    steps
-        Steps of every ascent [-].
-    sense
-        1 where large outputs are bad, for an upper limit; −1 where small ones are, for a lower limit [-].
+    Correlations of the sources do not count, any part may be anywhere in its zone. The sense is 1 where large outputs
+    are bad, for an upper limit; −1 where small ones are, for a lower limit [-].
 
     Notes
     -----

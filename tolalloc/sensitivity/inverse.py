@@ -57,18 +57,7 @@ class InverseSensitivity:
 def inverse_sensitivity(
     experiment: Experiment[Response], *, limit: float, target: float, units: int = 2048
 ) -> InverseSensitivity:
-    """Return how far each zone may open, or must close, alone.
-
-    Parameters
-    ----------
-    experiment
-        Its first output is limited; a joint source stays as it is.
-    limit
-        Largest output allowed [output].
-    target
-        Share of the units that must keep it [-].
-    units
-        Units of every trial [-].
+    """Return how far each zone may open, or must close, alone; a joint source stays as it is.
 
     Notes
     -----
@@ -131,13 +120,7 @@ def inverse_sensitivity(
 
 
 def fewest_units(target: float) -> int:
-    """Return the fewest units that show a quantile at the target yield [-].
-
-    Examples
-    --------
-    >>> fewest_units(0.9973)
-    1852
-    """
+    """Return the fewest units that show a quantile at the target yield [-]."""
     return int(np.ceil(_LEAST_OUTSIDE / (1.0 - target)))
 
 
@@ -258,13 +241,7 @@ def _bracket(
 
 
 def _squared(excess: Float[np.ndarray, " found"], limit: float) -> Float[np.ndarray, " found"]:
-    """Return quantile² less limit² with the sign of the excess, or the excess where no limit above 0 leaves a square.
-
-    Examples
-    --------
-    >>> _squared(np.array([1.0, -3.0, -9.0]), 3.0).tolist()
-    [7.0, -9.0, -9.0]
-    """
+    """Return quantile² less limit² with the sign of the excess, or the excess where no limit above 0 has a square."""
     return np.maximum(limit + excess, 0.0) ** 2 - limit**2 if limit > 0.0 else excess
 
 

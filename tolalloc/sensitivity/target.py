@@ -79,16 +79,10 @@ def target_sensitivity(
 
     Parameters
     ----------
-    sample
-        Random units and their answers; the first output is analysed.
-    errors
-        The sources that the units were drawn from, at any zones.
     limit
-        Largest output allowed; unless enough units stand on either side, the worst 5 % are taken instead [output].
+        Largest first output allowed; unless enough units stand on either side, the worst 5 % are taken instead.
     resamples, permutations
         Bootstrap resamples, and random choices of units for the test of no effect [-].
-    largest_failed_share
-        Share of the units that may fail [-].
 
     Notes
     -----
@@ -154,8 +148,6 @@ def target_sensitivity(
 def limited_measures(errors: ErrorModel, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample source"]:
     """Return what the drawing limits, for every source, in such a way that it compares with the zone [m].
 
-    Notes
-    -----
     A size: its deviation from the middle. A position: twice the distance from the true one. Pitch and run-out: the
     range over a turn. Of like features the largest one counts. No drawing limits a joint source: for it, the root mean
     square of its standardised columns stands [-].
