@@ -8,8 +8,8 @@ from scipy.stats import binom, norm
 
 from tests.validation_manual import shown
 from tolalloc.capability.indices import (
+    Interval,
     Limits,
-    QuantileInterval,
     capability,
     quantile_interval,
     wilson_interval,
@@ -25,11 +25,10 @@ def test_indices_by_hand():
     found = capability(SAMPLE, Limits(lower=4.0, upper=13.0))
     overall, within = np.sqrt(2.0), 2.2 * np.sqrt(np.pi) / 2
     assert found.deviation_overall == pytest.approx(overall)
-    assert found.deviation_within == pytest.approx(within)
     assert (found.cp, found.cpk) == pytest.approx((9 / (6 * within), 3 / (3 * within)))
     assert (found.pp, found.ppk) == pytest.approx((9 / (6 * overall), 3 / (3 * overall)))
     assert found.normal_ppm == pytest.approx(1e6 * (norm.cdf(-6 / overall) + norm.cdf(-3 / overall)))
-    assert (found.outside, found.units) == (0, 6)
+    assert Limits(lower=4.0, upper=13.0).outside(SAMPLE) == 0
 
 
 @pytest.mark.parametrize(
@@ -40,16 +39,17 @@ def test_one_limit(limits, distance, outside):
     found = capability(SAMPLE, limits)
     assert found.cp is found.pp is None
     assert found.ppk == pytest.approx(distance / (3 * np.sqrt(2.0)))
-    assert found.outside == outside
+    assert limits.outside(SAMPLE) == outside
     assert found.normal_ppm == pytest.approx(1e6 * norm.sf(distance / np.sqrt(2.0)))
 
 
 def test_three_sigma_is_2700_ppm(generator):
     """Independent normal units with limits at ±3σ: all indices 1, and both figures 2700 per million."""
-    found = capability(generator.standard_normal(400_000), Limits(lower=-3.0, upper=3.0))
+    sample, limits = generator.standard_normal(400_000), Limits(lower=-3.0, upper=3.0)
+    found = capability(sample, limits)
     np.testing.assert_allclose([found.cp, found.cpk, found.pp, found.ppk], 1.0, atol=0.01)
     assert found.normal_ppm == pytest.approx(2699.8, rel=0.03)
-    assert found.outside / 0.4 == pytest.approx(2699.8, abs=4 * np.sqrt(2699.8 / 0.4))
+    assert limits.outside(sample) / 0.4 == pytest.approx(2699.8, abs=4 * np.sqrt(2699.8 / 0.4))
 
 
 def test_drift_shows_in_the_overall_indices_only(generator):
@@ -60,8 +60,9 @@ def test_drift_shows_in_the_overall_indices_only(generator):
 
 
 def test_skewed_units_part_the_two_figures(generator):
-    found = capability(generator.exponential(size=200_000), Limits(upper=6.0))
-    assert found.outside / found.units == pytest.approx(np.exp(-6), rel=0.15)
+    sample, limits = generator.exponential(size=200_000), Limits(upper=6.0)
+    found = capability(sample, limits)
+    assert limits.outside(sample) / sample.size == pytest.approx(np.exp(-6), rel=0.15)
     assert found.normal_ppm < 5.0
 
 
@@ -94,7 +95,7 @@ def test_wilson_covers_on_average(confidence):
     assert min(coverage) > confidence - 0.05
 
 
-def attained_by(ordered: np.ndarray, share: float, found: QuantileInterval) -> float:
+def attained_by(ordered: np.ndarray, share: float, found: Interval) -> float:
     """Return the exact confidence of the order statistics that an interval ends at, P(r ≤ B < s)."""
     low = np.searchsorted(ordered, found.low) + 1 if np.isfinite(found.low) else 0
     high = np.searchsorted(ordered, found.high) + 1 if np.isfinite(found.high) else ordered.size + 1

@@ -37,7 +37,7 @@ def test_salibs_analysis_of_the_arrays_gives_the_printed_indices(second_order, c
     if second_order:
         np.testing.assert_array_equal([theirs["S2"][pair] for pair in own.pairs], own.second)
     assert given.samples.shape == (given.outputs.size, 3)
-    assert own.dropped == len(broken)
+    assert found.dropped == len(broken)
     assert list(theirs.to_df()[0].index) == list(own.sources)
 
 

@@ -237,7 +237,7 @@ def test_one_pass_gives_every_output_and_one_ranking_over_all():
         assert (np.abs(own.first - truth) <= 4 * own.first_resamples.std(axis=0) + 1e-12).all()
         alone = analysis([weights[at]], fixed(512)).of(0)
         np.testing.assert_array_equal(alone.total_resamples, own.total_resamples)
-        assert own.samples == 512 * 5
+        assert found.samples == 512 * 5
     overall = found.overall
     assert overall.drives == ("y0 [-]", "y2 [-]", "y2 [-]")
     assert overall.order == [0, 2, 1]

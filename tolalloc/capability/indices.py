@@ -87,9 +87,7 @@ class Capability:
     """Capability of a sample."""
 
     mean: float  # Mean of the sample [unit of the characteristic]
-    # Standard deviation within subgroups, and of the whole sample [unit of the characteristic]
-    deviation_within: float
-    deviation_overall: float
+    deviation_overall: float  # Standard deviation of the whole sample [unit of the characteristic]
     # (U − L) / 6σ and min(U − μ, μ − L) / 3σ with the deviation within subgroups; ``cp`` is none if a side is open [-]
     cp: float | None
     cpk: float
@@ -99,28 +97,14 @@ class Capability:
     # Units beyond the limits per million if the characteristic is normal with the sample's mean and overall deviation;
     # the only figure here besides the indices that assumes a normal distribution [-]
     normal_ppm: float
-    # Units of the sample, and how many lie beyond a limit [-]
-    units: int
-    outside: int
 
 
 @dataclass(frozen=True, kw_only=True)
-class ShareInterval:
-    """A share of units with its two-sided interval."""
+class Interval:
+    """An estimate with its two-sided interval, in its own unit."""
 
-    # Share and the ends of its interval [-]
     estimate: float
-    low: float
-    high: float
-    confidence: float  # Confidence of the interval [-]
-
-
-@dataclass(frozen=True, kw_only=True)
-class QuantileInterval:
-    """A quantile with an interval that holds for every continuous distribution."""
-
-    estimate: float  # Empirical quantile [unit of the characteristic]
-    # Ends of the interval, infinite where the sample is too small to bound that side [unit of the characteristic]
+    # Ends of the interval, infinite where a sample is too small to bound that side
     low: float
     high: float
 
@@ -144,22 +128,19 @@ def capability(sample: Float[np.ndarray, " unit"], limits: Limits) -> Capability
     within = float(np.abs(np.diff(sample)).mean() / _MOVING_RANGE)
     if min(within, overall) <= 0:
         raise InputError("Capability: the sample does not vary, so no index can be given.")
-    width, distance, outside = limits.width, limits.distance(mean), limits.outside(sample)
+    width, distance = limits.width, limits.distance(mean)
     return Capability(
         mean=mean,
-        deviation_within=within,
         deviation_overall=overall,
         cp=None if width is None else width / (6 * within),
         cpk=distance / (3 * within),
         pp=None if width is None else width / (6 * overall),
         ppk=distance / (3 * overall),
         normal_ppm=MILLION * limits.normal_share_outside(mean, overall),
-        units=sample.size,
-        outside=outside,
     )
 
 
-def wilson_interval(units: int, accepted: int, confidence: float = 0.95) -> ShareInterval:
+def wilson_interval(units: int, accepted: int, confidence: float = 0.95) -> Interval:
     """Return a yield with its two-sided Wilson interval, which covers on average as stated, not at every yield.
 
     References
@@ -181,16 +162,15 @@ def wilson_interval(units: int, accepted: int, confidence: float = 0.95) -> Shar
     centre = share + z**2 / (2 * units)
     half = z * float(np.sqrt(share * (1 - share) / units + z**2 / (4 * units**2)))
     scale = 1 + z**2 / units
-    return ShareInterval(
+    return Interval(
         estimate=share,
         # Rounding must not leave the ends of an extreme yield just off 0 and 1.
         low=max(0.0, (centre - half) / scale) if accepted else 0.0,
         high=min(1.0, (centre + half) / scale) if accepted < units else 1.0,
-        confidence=confidence,
     )
 
 
-def quantile_interval(sample: Float[np.ndarray, " unit"], share: float, confidence: float = 0.95) -> QuantileInterval:
+def quantile_interval(sample: Float[np.ndarray, " unit"], share: float, confidence: float = 0.95) -> Interval:
     """Return a quantile of independent values with the interval of two order statistics, half of the doubt each side.
 
     References
@@ -215,7 +195,7 @@ def quantile_interval(sample: Float[np.ndarray, " unit"], share: float, confiden
     low = int(binom.ppf(tail, units, share))
     high = int(binom.isf(tail, units, share)) + 1
     ordered = np.sort(sample)
-    return QuantileInterval(
+    return Interval(
         estimate=float(np.quantile(sample, share)),
         low=float(ordered[low - 1]) if low >= 1 else -np.inf,
         high=float(ordered[high - 1]) if high <= units else np.inf,

@@ -36,10 +36,9 @@ class InverseSensitivity:
     """The factor of each zone at which the requirement is just kept, all other zones as they are."""
 
     sources: tuple[str, ...]  # Names of the sources that a drawing limits, in the order of all arrays
-    quantile: float  # Quantile of the output at the target yield with the zones as they are [output]
-    meets: bool  # Whether that keeps the limit; if so the factors are above 1, if not below
-    # Whether the interval of that quantile leaves the limit out; if not, these units tell no factor from 1, all are
-    # NaN, and none is searched for
+    meets: bool  # Whether the zones as they are keep the limit; if so the factors are above 1, if not below
+    # Whether the interval of the present quantile leaves the limit out; if not, these units tell no factor from 1, all
+    # are NaN, and none is searched for
     decided: bool
     # Factor of the zone; infinite if the largest factor tried keeps the limit too, NaN if the limit is missed even
     # without the source [-]
@@ -48,10 +47,7 @@ class InverseSensitivity:
     low: Float[np.ndarray, " source"]
     high: Float[np.ndarray, " source"]
     zone: Float[np.ndarray, " source"]  # Factor times the zone [m]
-    # Units of every trial, samples without a usable answer over all trials, and calls of the response [-]
-    units: int
-    failed: int
-    calls: int
+    units: int  # Units of every trial [-]
 
 
 def inverse_sensitivity(
@@ -106,7 +102,6 @@ def inverse_sensitivity(
         low[own], high[own] = _interval(factor[own], quantiles, bracket, limit)
     return InverseSensitivity(
         sources=tuple(source.name for source in errors.active),
-        quantile=now,
         meets=meets,
         decided=decided,
         factor=factor,
@@ -114,8 +109,6 @@ def inverse_sensitivity(
         high=high,
         zone=factor * experiment.zones[:count],
         units=units,
-        failed=openings.failed,
-        calls=openings.calls,
     )
 
 
@@ -124,15 +117,13 @@ def fewest_units(target: float) -> int:
     return int(np.ceil(_LEAST_OUTSIDE / (1.0 - target)))
 
 
+@dataclass(frozen=True)
 class _Openings:
     """The same units with one zone multiplied by a factor, for several sources in each call of the response."""
 
-    def __init__(
-        self, experiment: Experiment[Response], standard: Float[np.ndarray, "unit column"], target: float
-    ) -> None:
-        self.experiment, self.errors = experiment, experiment.errors
-        self.standard, self.target = standard, target
-        self.calls = self.failed = 0
+    experiment: Experiment[Response]
+    standard: Float[np.ndarray, "unit column"]
+    target: float
 
     @cached_property
     def present(self) -> tuple[Float[np.ndarray, " unit"], Bool[np.ndarray, " unit"]]:
@@ -186,11 +177,9 @@ class _Openings:
         for own, source, factor in zip(x, sources, factors, strict=True):
             zones = self.experiment.zones.copy()
             zones[source] *= factor
-            own[:] = self.errors.deviations(standard, zones)
+            own[:] = self.experiment.errors.deviations(standard, zones)
         evaluation = self.experiment.response(x.reshape(-1, standard.shape[1]))
         values, good = (part.reshape(x.shape[:2]) for part in (evaluation.values[:, 0], evaluation.good))
-        self.calls += 1
-        self.failed += int(np.count_nonzero(~good))
         return values, good
 
     def _require_few_failures(
@@ -203,9 +192,10 @@ class _Openings:
         failed = np.count_nonzero(~good, axis=1)
         worst = int(failed.argmax())
         if failed[worst] > self.experiment.largest_failed_share * good.shape[1]:
+            name = self.experiment.errors.active[sources[worst]].name
             raise SolveError(
                 f"Inverse sensitivity: {failed[worst]} of {good.shape[1]} units have no usable answer with "
-                f"{self.errors.active[sources[worst]].name} at {factors[worst]:.4g} times its zone; allowed is "
+                f"{name} at {factors[worst]:.4g} times its zone; allowed is "
                 f"{self.experiment.largest_failed_share:.4g} of them, because more would bias the quantile."
             )
 
@@ -218,7 +208,7 @@ def _bracket(
     These are two factors per source with the limit between their quantiles, then quantile less limit at both.
     """
     trials = [2.0, _LARGEST_FACTOR] if now <= limit else [0.0]
-    left = np.arange(len(openings.errors.active))
+    left = np.arange(len(openings.experiment.errors.active))
     if now > limit:
         left = left[openings.may_repair(left, limit)]
     near, near_excess, found = 1.0, np.full(left.size, now - limit), []
@@ -264,7 +254,7 @@ def _crossings(
         left = left[np.abs(excess) > _SAME * abs(limit)]
         if not left.size:
             return fresh, quantiles
-    name = openings.errors.active[sources[left[0]]].name
+    name = openings.experiment.errors.active[sources[left[0]]].name
     raise SolveError(f"Inverse sensitivity: the quantile jumps over the limit at {fresh[left[0]]:.6g} of {name}.")
 
 

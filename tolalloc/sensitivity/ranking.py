@@ -25,9 +25,6 @@ class Neighbours:
     # Positions of the two sources [-]
     before: int
     after: int
-    # Difference of their indices, and its standard deviation over the resamples [-]
-    difference: float
-    deviation: float
     probability: float  # Share of resamples in which they have this order [-]
     separated: bool  # Whether that share reaches 0.9
     # Blocks that would have to be added to tell them apart, 0 if they are, none if they are equal or have few [-]
@@ -85,8 +82,6 @@ class SourceRanking:
                 Neighbours(
                     before=leading,
                     after=following,
-                    difference=difference,
-                    deviation=deviation,
                     probability=probability,
                     separated=separated,
                     more_blocks=0 if separated else more,

@@ -26,18 +26,13 @@ _PIVOT = 1e-10
 class ShapleyEffects:
     """Shapley effects of every source on every output."""
 
-    # Names, in the order of all arrays
-    sources: tuple[str, ...]
-    outputs: tuple[str, ...]
+    sources: tuple[str, ...]  # Names, in the order of all arrays
     # Share of the output's variance; the shares of one output add up to 1. Not a number for an output that is the same
     # for all samples [-].
     effects: Float[np.ndarray, "output source"]
     resamples: Float[np.ndarray, "output resample source"]  # The same from bootstrap resamples of the permutations [-]
     unseen: Float[np.ndarray, "output source"]  # Share possible where too few permutations show a source, else 0 [-]
-    # Permutations used, and permutations dropped because one of their samples failed [-]
-    permutations: int
-    dropped: int
-    samples: int  # Samples evaluated [-]
+    dropped: int  # Permutations dropped because one of their samples failed [-]
 
     def interval(self, output: int) -> Float[np.ndarray, "2 source"]:
         """Return the 90 % interval of the effects on an output [-]."""
@@ -97,13 +92,10 @@ def shapley_effects(experiment: Experiment[Response], permutations: int) -> Shap
     whole = added.mean(axis=0).sum(axis=1, keepdims=True)
     return ShapleyEffects(
         sources=names,
-        outputs=response.outputs,
         effects=effects[:, 0],
         resamples=effects[:, 1:],
         unseen=np.divide(possible, whole, out=np.zeros_like(possible), where=whole > 0.0),
-        permutations=used,
         dropped=permutations - used,
-        samples=permutations * (len(names) + 1),
     )
 
 

@@ -44,8 +44,6 @@ class SourceIndices(SourceRanking):
     pairs: tuple[tuple[int, int], ...]
     second: Float[np.ndarray, " pair"]
     second_resamples: Float[np.ndarray, "resample pair"]
-    dropped: int  # Saltelli blocks dropped because one of their samples failed [-]
-    samples: int  # Samples evaluated [-]
 
     @property
     def first_interval(self) -> Float[np.ndarray, "2 source"]:
@@ -169,7 +167,7 @@ class SobolAnalysis:
         at = self.position(output)
         followed = self.outputs[at] in self.followed
         blocks, few = (self.blocks, self.small) if followed else (self.first_blocks, frozenset[int]())
-        return _indices_of(self.indices, at, self.outputs[at], self.sources, blocks, self.samples, few)
+        return _indices_of(self.indices, at, self.outputs[at], self.sources, blocks, few)
 
 
 def _indices_of(
@@ -178,10 +176,9 @@ def _indices_of(
     output: str,
     sources: tuple[str, ...],
     blocks: int,
-    samples: int,
     few: frozenset[int] = frozenset(),
 ) -> SourceIndices:
-    """Return the indices at one place, of an output from so many blocks of an analysis with so many samples [-]."""
+    """Return the indices at one place, of an output from so many blocks."""
     if not found.varies[at]:
         raise ConstantOutputError(f"Sobol indices: {output} is the same for all samples; no source can be ranked.")
     return SourceIndices(
@@ -194,8 +191,6 @@ def _indices_of(
         second=found.second[at],
         second_resamples=found.second_resamples[at],
         blocks=blocks,
-        dropped=found.dropped,
-        samples=samples,
         unseen=found.unseen[at],
         few=few,
     )
@@ -449,7 +444,7 @@ class _Blocks:
             return None
         leading = self.outputs[self.leading]
         at = self.followed.outputs.index(leading)
-        return _indices_of(self.last, at, leading, self.design.names, self.last.blocks, self.samples)
+        return _indices_of(self.last, at, leading, self.design.names, self.last.blocks)
 
     @property
     def _places(self) -> list[int]:

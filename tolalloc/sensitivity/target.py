@@ -27,10 +27,9 @@ class TargetSensitivity:
     sources: tuple[str, ...]  # Names, in the order of all arrays
     threshold: float  # Output beyond which a unit counts as outside [output]
     is_limit: bool  # Whether the threshold is the limit; if not, it cuts off the worst 5 % of the units
-    # Good units, how many of them are outside, and units without a usable answer, which are left out [-]
+    # Good units, and how many of them are outside [-]
     units: int
     outside: int
-    failed: int
     # First-order index of "is outside" given the measure that the drawing limits [-]
     first: Float[np.ndarray, " source"]
     first_resamples: Float[np.ndarray, "resample source"]  # The same from resamples [-]
@@ -133,7 +132,6 @@ def target_sensitivity(
         is_limit=is_limit,
         units=values.size,
         outside=int(np.count_nonzero(outside)),
-        failed=sample.failed,
         first=_first(tables),
         first_resamples=_first_resamples(tables, seeds.child("first"), resamples),
         lift=squares[outside].mean(axis=0) / squares.mean(axis=0),
