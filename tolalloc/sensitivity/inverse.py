@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -128,7 +129,7 @@ class _Openings:
     @cached_property
     def present(self) -> tuple[Float[np.ndarray, " unit"], Bool[np.ndarray, " unit"]]:
         """Output of every unit with the zones as they are, and which are good."""
-        values, good = self._solved(self.standard, np.zeros(1, int), np.ones(1))
+        ((values, good),) = self._solved(np.zeros(1, int), np.ones(1))
         self._require_few_failures(good, np.zeros(1, int), np.ones(1))
         return values[0], good[0]
 
@@ -136,11 +137,9 @@ class _Openings:
         self, sources: Int[np.ndarray, " trial"], factors: Float[np.ndarray, " trial"]
     ) -> Float[np.ndarray, "trial 3"]:
         """Return the quantile of every trial at the target yield, and the ends of its interval [output]."""
-        trials, found = max(1, _ROWS_AT_ONCE // self.standard.shape[0]), []
-        for start in range(0, sources.size, trials):
-            own, by = sources[start : start + trials], factors[start : start + trials]
-            values, good = self._solved(self.standard, own, by)
-            self._require_few_failures(good, own, by)
+        found = list[tuple[float, float, float]]()
+        for values, good in self._solved(sources, factors):
+            self._require_few_failures(good, sources[len(found) :], factors[len(found) :])
             found += [self.quantile(*trial) for trial in zip(values, good, strict=True)]
         return np.array(found)
 
@@ -159,28 +158,25 @@ class _Openings:
         values, good = self.present
         needed = good.size - int(np.floor((good.size - 1) * self.target))
         worst = np.argsort(np.where(good, values, -np.inf))[-max(needed, int(_WORST * good.size)) :]
-        trials, beyond = max(1, _ROWS_AT_ONCE // worst.size), []
-        for start in range(0, sources.size, trials):
-            own = sources[start : start + trials]
-            values, good = self._solved(self.standard[worst], own, np.zeros(own.size))
-            beyond += [int(np.count_nonzero(trial)) for trial in good & (values > limit)]
-        return np.array(beyond, int) < needed
+        closed = self._solved(sources, np.zeros(sources.size), worst)
+        beyond = [np.count_nonzero(good & (values > limit), axis=1) for values, good in closed]
+        return np.concatenate(beyond) < needed
 
     def _solved(
         self,
-        standard: Float[np.ndarray, "unit column"],
         sources: Int[np.ndarray, " trial"],
         factors: Float[np.ndarray, " trial"],
-    ) -> tuple[Float[np.ndarray, "trial unit"], Bool[np.ndarray, "trial unit"]]:
-        """Return the outputs of units in every trial from one call of the response, and which are good."""
-        x = np.empty((sources.size, *standard.shape))
-        for own, source, factor in zip(x, sources, factors, strict=True):
-            zones = self.experiment.zones.copy()
-            zones[source] *= factor
-            own[:] = self.experiment.errors.deviations(standard, zones)
-        evaluation = self.experiment.response(x.reshape(-1, standard.shape[1]))
-        values, good = (part.reshape(x.shape[:2]) for part in (evaluation.values[:, 0], evaluation.good))
-        return values, good
+        units: slice | Int[np.ndarray, " unit"] = slice(None),
+    ) -> Iterator[tuple[Float[np.ndarray, "some_trials unit"], Bool[np.ndarray, "some_trials unit"]]]:
+        """Yield the outputs of units in some trials from one call of the response, and which are good."""
+        standard = self.standard[units]
+        trials = max(1, _ROWS_AT_ONCE // standard.shape[0])
+        for start in range(0, sources.size, trials):
+            zones = np.repeat(self.experiment.zones[np.newaxis], sources[start : start + trials].size, axis=0)
+            zones[np.arange(len(zones)), sources[start : start + trials]] *= factors[start : start + trials]
+            x = np.stack([self.experiment.errors.deviations(standard, own) for own in zones])
+            evaluation = self.experiment.response(x.reshape(-1, standard.shape[1]))
+            yield evaluation.values[:, 0].reshape(x.shape[:2]), evaluation.good.reshape(x.shape[:2])
 
     def _require_few_failures(
         self,

@@ -55,7 +55,6 @@ class Answers:
     y: Float[np.ndarray, " sample"]  # The answers [output]
     fold: Int[np.ndarray, " sample"]  # Fold of every sample [-]
     response: Response  # What gave the answers
-    failed: int  # Failed samples, which are left out [-]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,7 +120,7 @@ def answers_of(
             f"Surrogate: {failed} of {fold.size} samples to learn from failed; allowed is {largest_failed_share:.4g} "
             "of them."
         )
-    return Answers(x=x[good], y=y[good], fold=fold[good], response=response, failed=failed)
+    return Answers(x=x[good], y=y[good], fold=fold[good], response=response)
 
 
 def cross_validate(candidate: Candidate, answers: Answers, quantile: float = 0.9973) -> Score:
@@ -179,7 +178,6 @@ class Choice:
     output: str  # What is predicted, with its unit of measurement
     scores: tuple[Score, ...]  # One per candidate that was tried
     untried: tuple[str, ...]  # Names of the candidates that were not, as one before them left too little to gain
-    failed: int  # Answers to learn from that failed and were left out [-]
     best: int  # Place of the highest Q² among those that passed the gate, or among all if none did [-]
     chosen: Response | None  # That candidate fitted to all answers; none if no candidate passed
 
@@ -234,7 +232,6 @@ def choose(
         output=response.outputs[0],
         scores=tuple(scores),
         untried=tuple(candidate.name for candidate in candidates[len(scores) :]),
-        failed=answers.failed,
         best=best,
         chosen=candidates[best].fit(answers.x, answers.y) if passed else None,
     )
