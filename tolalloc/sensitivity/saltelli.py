@@ -90,17 +90,17 @@ class SaltelliDesign:
         """Samples of a block [-]."""
         return (1 + self.second_order) * len(self.names) + 2
 
-    def chunks(self, start: int, stop: int, only: tuple[str, ...] = ()) -> Iterator[Float[np.ndarray, "sample column"]]:
+    def chunks(self, start: int, stop: int, only: str = "") -> Iterator[Float[np.ndarray, "sample column"]]:
         """Yield the samples of the blocks from ``start`` up to but not ``stop``, uniform numbers in [0, 1).
 
-        If players are named, of every block only the samples AB of these, in this order.
+        If a group is named, of every block only the sample AB of it.
         """
-        at_once = 1 << max(0, (SAMPLES_AT_ONCE // (len(only) or self.samples_per_block)).bit_length() - 1)
-        points, exchanged = self._points(start, stop), self._own[[self.names.index(name) for name in only]]
+        at_once = 1 << max(0, (SAMPLES_AT_ONCE // (1 if only else self.samples_per_block)).bit_length() - 1)
+        points = self._points(start, stop)
         for first in range(0, stop - start, at_once):
             a, b = points[:, first : first + at_once]
             if only:
-                yield np.where(exchanged, b, a).reshape(-1, a.shape[-1])
+                yield np.where(self._own[self.names.index(only)], b, a).reshape(-1, a.shape[-1])
             else:  # in SALib's order
                 pairs = [(a, b), (b, a)][: 1 + self.second_order]
                 between = [np.where(self._own, inner, outer) for outer, inner in pairs]

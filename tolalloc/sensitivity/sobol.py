@@ -465,15 +465,27 @@ class _Blocks:
         self.answers = replace(found, values=found.values[:, self._places])
 
     def _part(self) -> None:
-        """Part the largest groups from the rest, which is one group from here on."""
+        """Part the largest groups from the rest, which is one group from here on.
+
+        The samples A and B are the same for any groups, and so are those in which a group that is in both designs is
+        exchanged: only those of the rest are solved.
+        """
         total = self.first.total[self.leading]
         if self.effort.second_order or total.size <= LARGEST + 1:
             return
         largest = {self.names[at] for at in np.argsort(-total, kind="stable")[:LARGEST]}
         groups = tuple(own if own in largest else OTHERS for own in self.design.factor_groups)
         before, self.design = self.design, replace(self.design, factor_groups=groups)
-        self.answers, added = _exchanged(self.experiment, self.followed, before, self.answers, self.design)
-        self.samples += added
+        size, places = before.samples_per_block, {own: at for at, own in enumerate(before.columns_of_names, start=1)}
+        blocks = self.answers.status.size // size
+        more = solved(self.experiment, self.followed, self.design.chunks(0, blocks, only=OTHERS))
+        self.samples += more.status.size
+        order = [0, *(places.get(own, size) for own in self.design.columns_of_names), size - 1]
+        values, status = (
+            np.concatenate([known.reshape(blocks, size, -1), new.reshape(blocks, 1, -1)], axis=1)[:, order]
+            for known, new in ((self.answers.values, more.values), (self.answers.status, more.status))
+        )
+        self.answers = Evaluation(values=values.reshape(-1, values.shape[2]), status=status.reshape(-1))
 
     def _indices(self, answers: Evaluation, outputs: tuple[str, ...]) -> SaltelliIndices:
         blocks = answers.status.size // self.design.samples_per_block
@@ -485,28 +497,22 @@ class _Blocks:
             second_order=self.effort.second_order,
             resamples=self.effort.resamples,
             largest_failed_share=self.experiment.largest_failed_share,
-            control=_control(self.experiment, self.cheap, self.design, blocks, outputs),
+            control=self._control(blocks, outputs),
         )
 
-
-def _control(
-    experiment: Experiment[Response],
-    cheap: Regression | None,
-    design: SaltelliDesign,
-    blocks: int,
-    outputs: tuple[str, ...],
-) -> CheapAnswers | None:
-    """Return what a cheap model says of so many blocks and of many others; a constant of outputs that it has not."""
-    if cheap is None:
-        return None
-    needed = max(_CHEAP_TIMES * blocks, _CHEAP_SAMPLES // design.samples_per_block)
-    other = replace(design, seed=experiment.seeds.child("cheap").integer())
-    answers = []
-    for own, count in ((design, blocks), (other, 1 << (needed - 1).bit_length())):
-        known = solved(experiment, cheap, own.chunks(0, count)).values
-        places = [cheap.outputs.index(name) if name in cheap.outputs else known.shape[1] for name in outputs]
-        answers.append(np.column_stack([known, np.zeros(len(known))])[:, places])
-    return CheapAnswers(own=answers[0], many=answers[1])
+    def _control(self, blocks: int, outputs: tuple[str, ...]) -> CheapAnswers | None:
+        """Return what a cheap model says of so many blocks and of many others; a constant of outputs it has not."""
+        if self.cheap is None:
+            return None
+        needed = max(_CHEAP_TIMES * blocks, _CHEAP_SAMPLES // self.design.samples_per_block)
+        other = replace(self.design, seed=self.experiment.seeds.child("cheap").integer())
+        answers = []
+        for design, count in ((self.design, blocks), (other, 1 << (needed - 1).bit_length())):
+            known = solved(self.experiment, self.cheap, design.chunks(0, count)).values
+            own = self.cheap.outputs
+            places = [own.index(name) if name in own else known.shape[1] for name in outputs]
+            answers.append(np.column_stack([known, np.zeros(len(known))])[:, places])
+        return CheapAnswers(own=answers[0], many=answers[1])
 
 
 def solved(
@@ -516,31 +522,3 @@ def solved(
     errors = experiment.errors
     standard = (errors.standard_values(np.maximum(uniform, _HALF_STEP)) for uniform in chunks)
     return Evaluation.joined([response(experiment.deviations(own)) for own in standard])
-
-
-def _exchanged(
-    experiment: Experiment[Response],
-    response: Response,
-    before: SaltelliDesign,
-    answers: Evaluation,
-    after: SaltelliDesign,
-) -> tuple[Evaluation, int]:
-    """Return what a response says of the blocks of a design that are known of other groups, and the samples solved.
-
-    The samples A and B are the same for any groups, and so are those in which a group that is in both is exchanged:
-    only those of new groups are solved.
-    """
-    size = before.samples_per_block
-    blocks = answers.status.size // size
-    places = {columns: at + 1 for at, columns in enumerate(before.columns_of_names)}
-    named = dict(zip(after.names, after.columns_of_names, strict=True))
-    new = tuple(name for name, columns in named.items() if columns not in places)
-    values, status = answers.values.reshape(blocks, size, -1), answers.status.reshape(blocks, size)
-    if new:
-        more = solved(experiment, response, after.chunks(0, blocks, only=new))
-        values = np.concatenate([values, more.values.reshape(blocks, len(new), -1)], axis=1)
-        status = np.concatenate([status, more.status.reshape(blocks, -1)], axis=1)
-    added = iter(range(size, size + len(new)))
-    order = [0, *(places[own] if own in places else next(added) for own in named.values()), size - 1]
-    ordered = values[:, order].reshape(-1, answers.values.shape[1])
-    return Evaluation(values=ordered, status=status[:, order].reshape(-1)), blocks * len(new)
