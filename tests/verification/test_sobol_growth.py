@@ -170,7 +170,7 @@ def test_further_blocks_tell_the_eight_largest_apart_and_take_the_rest_together(
     first = sobol_indices(Experiment.of(response, errors, SeedTree(3)), fixed(64))
     np.testing.assert_array_equal(own.total[sorted(found.small)], first.of(0).total[sorted(found.small)])
     np.testing.assert_array_equal(found.of(1).total, first.of(1).total)
-    salib = found.solved.to_salib()
+    salib = found.to_salib()
     theirs = analyze(**salib.for_sobol, print_to_console=False, seed=1)
     named = dict(zip(dict.fromkeys(salib.problem["groups"]), theirs["ST"], strict=True))
     np.testing.assert_allclose([named[name] for name in found.together.sources], found.together.total, rtol=1e-12)

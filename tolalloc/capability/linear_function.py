@@ -201,7 +201,8 @@ class LinearLaw:
         """Return the density at a value and the density times what each source adds on average to units there."""
         distance, sources = value - self.centre, self.zones.size
         shift = np.bincount(self._source_of_column, self._zone_means * self.function.slopes, sources)
-        shares = self._normal_shares
+        variance = max(self._normal_deviation**2, np.finfo(float).tiny)
+        shares = np.bincount(self._source_of_column, self._covariances, sources) / variance
         if not self._parts:
             deviation = self._normal_deviation
             density = float(np.exp(-0.5 * (distance / deviation) ** 2) / (np.sqrt(2 * np.pi) * deviation))
@@ -266,12 +267,6 @@ class LinearLaw:
     @cached_property
     def _normal_deviation(self) -> float:
         return float(np.sqrt(max(self._covariances.sum(), 0.0)))
-
-    @property
-    def _normal_shares(self) -> Float[np.ndarray, " source"]:
-        """Part of each source in the variance of the normal part [-]."""
-        variance = max(self._normal_deviation**2, np.finfo(float).tiny)
-        return np.bincount(self._source_of_column, self._covariances, self.zones.size) / variance
 
     @cached_property
     def _parts(self) -> tuple[_AddedColumn, ...]:

@@ -76,8 +76,10 @@ class SourceRanking:
             apart = self.total_resamples[:, leading] - self.total_resamples[:, following]
             difference, deviation = float(self.total[leading] - self.total[following]), float(apart.std(ddof=1))
             probability = float(((apart > 0).mean() + (apart >= 0).mean()) / 2)
-            separated, known = probability >= _CONFIDENCE, not self.few & {leading, following}
-            more = _more_blocks(difference, deviation, self.blocks) if known else None
+            separated, more = probability >= _CONFIDENCE, None
+            if difference > 0 and not self.few & {leading, following}:
+                needed = self.blocks * (float(norm.ppf(_CONFIDENCE)) * deviation / difference) ** 2
+                more = max(1, int(np.ceil(needed)) - self.blocks)
             found.append(
                 Neighbours(
                     before=leading,
@@ -146,14 +148,6 @@ def indistinguishable_from_zero(resamples: Float[np.ndarray, "resample source"])
     Quantile of 5 % of the draws ≤ 0: Efron & Tibshirani 1993, ch. 13; for 100 resamples or more.
     """
     return np.asarray(np.quantile(resamples, 1 - 0.95, axis=0) <= 0)
-
-
-def _more_blocks(difference: float, deviation: float, blocks: int) -> int | None:
-    """Return the blocks to add until the confidence is reached, at least one; none if the indices are equal [-]."""
-    if difference <= 0:
-        return None
-    needed = blocks * (float(norm.ppf(_CONFIDENCE)) * deviation / difference) ** 2
-    return max(1, int(np.ceil(needed)) - blocks)
 
 
 def _require_places(count: int, sources: int) -> None:

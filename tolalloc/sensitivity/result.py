@@ -108,8 +108,7 @@ class RankingResult:
 
         That analysis gives the indices before a control variate corrects them.
         """
-        assert self.sobol.solved is not None
-        return self.sobol.solved.to_salib()
+        return self.sobol.to_salib()
 
     @cached_property
     def capabilities(self) -> tuple[OutputCapability, ...]:

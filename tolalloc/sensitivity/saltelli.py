@@ -277,16 +277,22 @@ def saltelli_indices(
     counts = without_each(replicate, present.size)
     weights = t_weights(present.size, resamples, seeds)
     with one_blas_thread():
-        found = [
-            _of_output(values[:, :, at][whole], counts, sources, second_order=second_order)
-            for at in range(values.shape[2])  # one copy in memory at a time
-        ]
+        found, shown = [], []
+        for at in range(values.shape[2]):  # one copy in memory at a time
+            answers = values[:, :, at][whole]
+            shown.append(_shown(answers, sources))
+            found.append(one_pass(np.ascontiguousarray(answers.T[np.newaxis]), counts, sources))
+            if found[-1][0][0]:  # SALib's estimates in the first row, which leaves out no replicate
+                for own, estimate in zip(
+                    found[-1][2:], salib_estimates(answers.ravel(), sources, second_order), strict=True
+                ):
+                    own[0, 0] = estimate
         varies, variance, first, total, second = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        plain, shown = total, [_shown(values[:, :, at][whole], sources) for at in range(values.shape[2])]
+        plain = total
         if control is not None:
             own, many = (answers.reshape(-1, size, values.shape[2]) for answers in (control.own, control.many))
             first, total = first.copy(), total.copy()
-            for at in np.flatnonzero(varies):
+            for at in np.flatnonzero(varies).tolist():
                 both, mine = (values[:, :, at][whole], own[:, :, at][whole]), (first[at], total[at], shown[at])
                 first[at], total[at], shown[at] = _controlled(*both, many[:, :, at], mine, counts, sources)
     return SaltelliIndices(
@@ -317,22 +323,6 @@ _Rows = tuple[
     Float[np.ndarray, "output row pair"],
 ]
 """Which outputs vary, and their variance, first-order, total and second-order indices; the first row is no resample."""
-
-
-def _of_output(
-    answers: Float[np.ndarray, "block sample"],
-    counts: Float[np.ndarray, "row block"],
-    sources: int,
-    *,
-    second_order: bool,
-) -> _Rows:
-    """Return the indices of one output: SALib's estimates in the first row, then those without one replicate."""
-    found = one_pass(np.ascontiguousarray(answers.T[np.newaxis]), counts, sources)
-    varies, _, *indices = found
-    if varies[0]:
-        for own, estimate in zip(indices, salib_estimates(answers.ravel(), sources, second_order), strict=True):
-            own[0, 0] = estimate
-    return found
 
 
 def _controlled(

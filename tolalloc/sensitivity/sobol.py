@@ -64,26 +64,6 @@ class SourceIndices(SourceRanking):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SolvedDesign:
-    """A Saltelli design whose samples are solved."""
-
-    design: SaltelliDesign  # Which samples they are
-    answers: Evaluation  # The first output, block by block
-
-    def to_salib(self) -> SalibArrays:
-        """Return the design and its answers as SALib takes them; blocks with a failed sample are left out whole."""
-        size = self.design.samples_per_block
-        whole = np.repeat(self.answers.good.reshape(-1, size).all(axis=1), size)
-        samples = np.concatenate(list(self.design.chunks(0, whole.size // size)))
-        return SalibArrays(
-            problem=self.design.problem,
-            samples=samples[whole],
-            outputs=self.answers.values[whole, 0],
-            second_order=self.design.second_order,
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
 class SalibArrays:
     """A problem as SALib specifies it, its samples and their answers, for SALib's own analysis and plots."""
 
@@ -111,7 +91,8 @@ class SobolAnalysis:
     samples: int  # Samples evaluated [-]
     first_blocks: int  # Saltelli blocks used for the other outputs, and for the groups that came out small [-]
     together: SourceIndices | None = None  # Indices of the followed output with the small groups as one, `OTHERS`
-    solved: SolvedDesign | None = None  # What the indices of the followed output come from, where it is kept
+    # What the indices of the followed output come from, where it is kept: the design, and the output block by block
+    solved: tuple[SaltelliDesign, Evaluation] | None = None
 
     @property
     def blocks(self) -> int:
@@ -157,6 +138,19 @@ class SobolAnalysis:
         if not 0 <= output < len(self.outputs):
             raise InputError.at("Sobol indices", "output", output, f"0 to {len(self.outputs) - 1}")
         return output
+
+    def to_salib(self) -> SalibArrays:
+        """Return the design and its answers as SALib takes them; blocks with a failed sample are left out whole."""
+        assert self.solved is not None
+        design, answers = self.solved
+        size = design.samples_per_block
+        whole = np.repeat(answers.good.reshape(-1, size).all(axis=1), size)
+        return SalibArrays(
+            problem=design.problem,
+            samples=np.concatenate(list(design.chunks(0, whole.size // size)))[whole],
+            outputs=answers.values[whole, 0],
+            second_order=design.second_order,
+        )
 
     def narrowed(self, output: str | int) -> float:
         """Return the median over all sources of how wide an interval is over that without a control variate [-]."""
@@ -384,7 +378,7 @@ def sobol_indices(
         samples=blocks.samples,
         first_blocks=blocks.first.blocks,
         together=blocks.together,
-        solved=SolvedDesign(design=blocks.design, answers=replace(blocks.answers, values=blocks.answers.values[:, :1])),
+        solved=(blocks.design, replace(blocks.answers, values=blocks.answers.values[:, :1])),
     )
 
 
