@@ -217,7 +217,7 @@ _RANDOM_UNITS = "Monte Carlo"
 
 @dataclass(frozen=True, kw_only=True)
 class YieldAtLimit(Agreement):
-    """Yield at a limit, and whether it can be relied on; where few random units lie beyond it, by rare methods."""
+    """Yield at a limit, and whether it can be relied on."""
 
     # Yield with its two-sided 95 % interval: that of `MonteCarlo.within` from random units, or where few of them exceed
     # the limit that of a log-normally distributed estimate [-]

@@ -54,7 +54,9 @@ class InverseSensitivity:
 def inverse_sensitivity(
     experiment: Experiment[Response], *, limit: float, target: float, units: int = 2048
 ) -> InverseSensitivity:
-    """Return how far each zone may open, or must close, alone; a joint source stays as it is.
+    """Return how far each zone may open, or must close, alone, until a share of the units just keeps an upper limit.
+
+    The first output is limited; a joint source stays as it is.
 
     Notes
     -----
