@@ -212,7 +212,7 @@ def rank(asked: Measures, record: RunRecord) -> RankingResult:
             sobol = measures.sobol(tuple(name for names in spectra.values() for name in names), cheap)
         with record.stage("other measures"):
             shapley = measures.shapley()
-            slopes = derived(model, measures.leading, sample.x[sample.evaluation.good].std(axis=0))
+            slopes = derived(measures.model, measures.leading, sample.x[sample.evaluation.good].std(axis=0))
             local = local_derivatives(own("local", slopes), effort.derivative_units)
             leading = own("centring", measures.response)
             centre = centring(leading, sample, measures.limits[measures.leading], local)
