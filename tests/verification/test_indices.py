@@ -8,6 +8,7 @@ from scipy.stats import binom, norm
 
 from tests.validation_manual import shown
 from tolalloc.capability.indices import (
+    Interval,
     Limits,
     capability,
     quantile_interval,
@@ -24,11 +25,10 @@ def test_indices_by_hand():
     found = capability(SAMPLE, Limits(lower=4.0, upper=13.0))
     overall, within = np.sqrt(2.0), 2.2 * np.sqrt(np.pi) / 2
     assert found.deviation_overall == pytest.approx(overall)
-    assert found.deviation_within == pytest.approx(within)
     assert (found.cp, found.cpk) == pytest.approx((9 / (6 * within), 3 / (3 * within)))
     assert (found.pp, found.ppk) == pytest.approx((9 / (6 * overall), 3 / (3 * overall)))
     assert found.normal_ppm == pytest.approx(1e6 * (norm.cdf(-6 / overall) + norm.cdf(-3 / overall)))
-    assert (found.outside, found.units) == (0, 6)
+    assert Limits(lower=4.0, upper=13.0).outside(SAMPLE) == 0
 
 
 @pytest.mark.parametrize(
@@ -39,16 +39,17 @@ def test_one_limit(limits, distance, outside):
     found = capability(SAMPLE, limits)
     assert found.cp is found.pp is None
     assert found.ppk == pytest.approx(distance / (3 * np.sqrt(2.0)))
-    assert found.outside == outside
+    assert limits.outside(SAMPLE) == outside
     assert found.normal_ppm == pytest.approx(1e6 * norm.sf(distance / np.sqrt(2.0)))
 
 
 def test_three_sigma_is_2700_ppm(generator):
     """Independent normal units with limits at ±3σ: all indices 1, and both figures 2700 per million."""
-    found = capability(generator.standard_normal(400_000), Limits(lower=-3.0, upper=3.0))
+    sample, limits = generator.standard_normal(400_000), Limits(lower=-3.0, upper=3.0)
+    found = capability(sample, limits)
     np.testing.assert_allclose([found.cp, found.cpk, found.pp, found.ppk], 1.0, atol=0.01)
     assert found.normal_ppm == pytest.approx(2699.8, rel=0.03)
-    assert found.outside / 0.4 == pytest.approx(2699.8, abs=4 * np.sqrt(2699.8 / 0.4))
+    assert limits.outside(sample) / 0.4 == pytest.approx(2699.8, abs=4 * np.sqrt(2699.8 / 0.4))
 
 
 def test_drift_shows_in_the_overall_indices_only(generator):
@@ -59,8 +60,9 @@ def test_drift_shows_in_the_overall_indices_only(generator):
 
 
 def test_skewed_units_part_the_two_figures(generator):
-    found = capability(generator.exponential(size=200_000), Limits(upper=6.0))
-    assert found.outside / found.units == pytest.approx(np.exp(-6), rel=0.15)
+    sample, limits = generator.exponential(size=200_000), Limits(upper=6.0)
+    found = capability(sample, limits)
+    assert limits.outside(sample) / sample.size == pytest.approx(np.exp(-6), rel=0.15)
     assert found.normal_ppm < 5.0
 
 
@@ -93,14 +95,21 @@ def test_wilson_covers_on_average(confidence):
     assert min(coverage) > confidence - 0.05
 
 
+def attained_by(ordered: np.ndarray, share: float, found: Interval) -> float:
+    """Return the exact confidence of the order statistics that an interval ends at, P(r ≤ B < s)."""
+    low = np.searchsorted(ordered, found.low) + 1 if np.isfinite(found.low) else 0
+    high = np.searchsorted(ordered, found.high) + 1 if np.isfinite(found.high) else ordered.size + 1
+    return float(binom.cdf(high - 1, ordered.size, share) - binom.cdf(low - 1, ordered.size, share))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.99])
 def test_quantile_interval_covers(generator, share):
-    """The true quantile of a skewed distribution lies inside as often as the attained confidence says."""
+    """The true quantile of a skewed distribution lies inside as often as the confidence of its order statistics."""
     samples = generator.exponential(size=(4000, 600))
     found = [quantile_interval(sample, share) for sample in samples]
     inside = np.mean([item.low <= -np.log1p(-share) < item.high for item in found])
-    attained = found[0].attained
+    attained = attained_by(np.sort(samples[0]), share, found[0])
     assert attained >= 0.95
     assert inside == pytest.approx(attained, abs=4 * np.sqrt(attained * (1 - attained) / 4000))
 
@@ -117,12 +126,16 @@ def test_no_nearer_order_statistics_would_do(generator):
 @pytest.mark.parametrize("share", [0.0027, 0.5, 0.9973])
 @pytest.mark.parametrize("confidence", [0.9, 0.95])
 def test_small_samples_say_so(generator, share, confidence):
-    needed = quantile_interval(np.zeros(1), share, confidence).needed
-    enough = quantile_interval(generator.standard_normal(needed), share, confidence)
-    wanting = quantile_interval(generator.standard_normal(needed - 1), share, confidence)
+    """The fewest units that bound both sides are those with max(share, 1 − share)ⁿ ≤ half of the doubt."""
+    needed = int(np.ceil(np.log((1 - confidence) / 2) / np.log(max(share, 1 - share))))
+    samples = [generator.standard_normal(units) for units in (needed, needed - 1)]
+    enough, wanting = (quantile_interval(sample, share, confidence) for sample in samples)
     assert np.isfinite([enough.low, enough.high]).all()
     assert not np.isfinite([wanting.low, wanting.high]).all()
-    assert min(enough.attained, wanting.attained) >= confidence
+    attained = [
+        attained_by(np.sort(sample), share, own) for sample, own in zip(samples, (enough, wanting), strict=True)
+    ]
+    assert min(attained) >= confidence
 
 
 def test_arguments_out_of_range():

@@ -30,20 +30,20 @@ def analysed(correlation=None, *, second_order: bool = False, broken: tuple[int,
 @pytest.mark.parametrize("broken", [(), (11,)])
 def test_salibs_analysis_of_the_arrays_gives_the_printed_indices(second_order, correlation, broken):
     found = analysed(correlation, second_order=second_order, broken=broken)
-    own, given = found.of(0), found.solved.to_salib()
+    own, given = found.of(0), found.to_salib()
     theirs = sobol.analyze(**given.for_sobol, num_resamples=100, seed=1)
     np.testing.assert_array_equal(theirs["S1"], own.first)
     np.testing.assert_array_equal(theirs["ST"], own.total)
     if second_order:
         np.testing.assert_array_equal([theirs["S2"][pair] for pair in own.pairs], own.second)
     assert given.samples.shape == (given.outputs.size, 3)
-    assert own.dropped == len(broken)
+    assert found.dropped == len(broken)
     assert list(theirs.to_df()[0].index) == list(own.sources)
 
 
 def test_salibs_plot_of_the_arrays_has_a_bar_per_source():
     found = analysed()
-    total = sobol.analyze(**found.solved.to_salib().for_sobol, seed=1).to_df()[0]
+    total = sobol.analyze(**found.to_salib().for_sobol, seed=1).to_df()[0]
     axes = bar_plot(total)
     assert [text.get_text() for text in axes.get_xticklabels()] == ["a", "b", "c"]
     np.testing.assert_allclose([bar.get_height() for bar in axes.containers[-1]], found.of(0).total)
@@ -52,7 +52,7 @@ def test_salibs_plot_of_the_arrays_has_a_bar_per_source():
 
 @pytest.mark.slow
 def test_the_samples_feed_salibs_measures_of_given_data():
-    given = analysed().solved.to_salib()
+    given = analysed().to_salib()
     for measure in (pawn, delta):
         found = measure.analyze(given.problem, given.samples, given.outputs, seed=1)
         assert len(next(iter(found.values()))) == 3

@@ -17,11 +17,9 @@ from tolalloc.models.model import Evaluation
 from tolalloc.reports.tellers.ranking import converged
 from tolalloc.sensitivity.ranking import (
     SourceRanking,
-    before,
     indistinguishable_from_zero,
     percentile_interval,
     rank_interval,
-    ranks,
     share_interval,
     until_converged,
 )
@@ -332,16 +330,15 @@ RESAMPLED = np.array([[0.5, 0.3, 0.2], [0.5, 0.2, 0.3], [0.6, 0.2, 0.1], [0.4, 0
 
 
 def test_ranks_and_orders_of_a_ranking_made_by_hand():
-    assert ranks(RESAMPLED).tolist() == [[1, 2, 3], [1, 3, 2], [1, 2, 3], [1, 2, 3]]
     assert rank_interval(RESAMPLED).tolist() == [[1, 2, 2], [1, 3, 3]]
     assert rank_interval(RESAMPLED * [1.0, 0.0, 0.0]).tolist() == [[1, 2, 2], [1, 3, 3]]  # equals share their ranks
     made = ranking([0.5, 0.3, 0.2], RESAMPLED)
+    np.testing.assert_array_equal(made.among_first(1), [1.0, 0.0, 0.0])
     np.testing.assert_array_equal(made.among_first(2), [1.0, 0.75, 0.25])
-    np.testing.assert_array_equal(before(RESAMPLED), [[0.5, 1, 1], [0, 0.5, 0.75], [0, 0.25, 0.5]])
+    assert [pair.probability for pair in made.neighbours] == [1.0, 0.75]
+    assert ranking([0.5, 0.5], np.full((4, 2), 0.5), "ab").neighbours[0].probability == 0.5  # equals count half
     assert indistinguishable_from_zero(RESAMPLED).tolist() == [False, False, True]
-    np.testing.assert_allclose(percentile_interval(RESAMPLED, 0.5)[:, 0], [0.475, 0.525])
-    with pytest.raises(InputError, match="confidence is 1"):
-        percentile_interval(RESAMPLED, 1.0)
+    np.testing.assert_allclose(percentile_interval(RESAMPLED)[:, 0], [0.415, 0.585])
     with pytest.raises(InputError, match="1 to 3"):
         made.among_first(4)
 

@@ -103,7 +103,6 @@ def test_linear_function_of_correlated_sources(seed):
     # Sharp enough to tell correlated from independent sources: ten standard errors and more.
     independent = exact_linear(WEIGHTS, np.eye(4))
     assert (np.abs(exact - independent) / found.resamples[0].std(axis=0)).max() > 10
-    assert found.samples == 8000 * 5
     np.testing.assert_allclose(found.effects.sum(axis=1), 1.0, rtol=1e-12)
     np.testing.assert_allclose(found.resamples.sum(axis=2), 1.0, rtol=1e-12)
 
@@ -162,7 +161,6 @@ def test_every_output_has_the_bits_that_it_has_alone():
     np.testing.assert_allclose(both.effects[0], alone.effects[0], rtol=1e-12)
     np.testing.assert_allclose(both.effects[1], [0, 0, 0, 1], atol=1e-12)
     assert np.isnan(both.effects[2]).all()
-    assert both.outputs == ("y0 [-]", "y1 [-]", "y2 [-]")
     again = shapley_effects(Experiment.of(Function((linear,)), errors, SeedTree(0)), 300)
     np.testing.assert_array_equal(again.resamples, alone.resamples)
 
@@ -171,7 +169,6 @@ def test_a_failed_sample_drops_its_permutation_and_too_many_stop_the_analysis():
     errors = model(PAIRS)
     found = shapley_effects(Experiment.of(Function((linear,), fail_above=3.4), errors, SeedTree(0)), 4000)
     assert 0 < found.dropped <= 40
-    assert found.permutations == 4000 - found.dropped
     within_standard_errors(found, 0, exact_linear(WEIGHTS, errors.normal_correlation))
     with pytest.raises(SolveError, match=r"units have no usable answer; allowed is a share of 0\.01"):
         shapley_effects(Experiment.of(Function((linear,), fail_above=1.5), errors, SeedTree(0)), 4000)

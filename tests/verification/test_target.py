@@ -181,7 +181,7 @@ def test_too_small_a_sample_is_refused():
 def test_failed_units_are_left_out_and_counted():
     sample = monte_carlo(Experiment.of(Sum(fail=10), SIZES, SeedTree(3)), 2000)
     found = target_sensitivity(sample, SIZES, 1.0, SeedTree(3), permutations=9, resamples=9)
-    assert (found.units, found.failed) == (1990, 10)
+    assert (found.units, sample.failed) == (1990, 10)
     broken = MonteCarlo(x=sample.x, evaluation=Evaluation(values=sample.evaluation.values, status=np.ones(2000, "u1")))
     with pytest.raises(SolveError):
         target_sensitivity(broken, SIZES, 1.0, SeedTree(3))

@@ -14,13 +14,7 @@ Ends = Float[np.ndarray, "*interval"] | float
 def halved(
     holds: Callable[[Any], Bool[np.ndarray, "*interval"] | bool], inside: Ends, outside: Ends, steps: int
 ) -> Any:
-    """Return the ends of intervals where something holds, after so many halvings; it need not be continuous.
-
-    Examples
-    --------
-    >>> float(halved(lambda x: x * x <= 2.0, 0.0, 2.0, 30).round(6))
-    1.414214
-    """
+    """Return the ends of intervals where something holds, after so many halvings; it need not be continuous."""
     for _ in range(steps):
         middle = (inside + outside) / 2.0
         there = holds(middle)

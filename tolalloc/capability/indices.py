@@ -41,10 +41,7 @@ class Limits:
     def excess(self, values: Float[np.ndarray, "*unit"], *, relative: bool = False) -> Float[np.ndarray, "side *unit"]:
         """Return how far values lie beyond each limit, negative inside [unit of the characteristic, or of the limit].
 
-        Parameters
-        ----------
-        relative
-            Whether over the limit, where that is not 0.
+        Relative values are over the limit, where that is not 0.
         """
         scales = [(abs(limit) or 1.0) if relative else 1.0 for _, limit in self.turned]
         return np.stack([sign * (values - limit) / by for (sign, limit), by in zip(self.turned, scales, strict=True)])
@@ -90,9 +87,7 @@ class Capability:
     """Capability of a sample."""
 
     mean: float  # Mean of the sample [unit of the characteristic]
-    # Standard deviation within subgroups, and of the whole sample [unit of the characteristic]
-    deviation_within: float
-    deviation_overall: float
+    deviation_overall: float  # Standard deviation of the whole sample [unit of the characteristic]
     # (U − L) / 6σ and min(U − μ, μ − L) / 3σ with the deviation within subgroups; ``cp`` is none if a side is open [-]
     cp: float | None
     cpk: float
@@ -102,46 +97,20 @@ class Capability:
     # Units beyond the limits per million if the characteristic is normal with the sample's mean and overall deviation;
     # the only figure here besides the indices that assumes a normal distribution [-]
     normal_ppm: float
-    # Units of the sample, and how many lie beyond a limit [-]
-    units: int
-    outside: int
 
 
 @dataclass(frozen=True, kw_only=True)
-class ShareInterval:
-    """A share of units with its two-sided interval."""
+class Interval:
+    """An estimate with its two-sided interval, in its own unit."""
 
-    # Share and the ends of its interval [-]
     estimate: float
+    # Ends of the interval, infinite where a sample is too small to bound that side
     low: float
     high: float
-    confidence: float  # Confidence of the interval [-]
-
-
-@dataclass(frozen=True, kw_only=True)
-class QuantileInterval:
-    """A quantile with an interval that holds for every continuous distribution."""
-
-    share: float  # Which quantile [-]
-    estimate: float  # Empirical quantile [unit of the characteristic]
-    # Ends of the interval, infinite where the sample is too small to bound that side [unit of the characteristic]
-    low: float
-    high: float
-    # Confidence asked for, and the exact one of the order statistics chosen, which is not less [-]
-    confidence: float
-    attained: float
-    # Units of the sample, and the fewest that bound both sides [-]
-    units: int
-    needed: int
 
 
 def capability(sample: Float[np.ndarray, " unit"], limits: Limits) -> Capability:
     """Return the capability of a sample in the order of its making.
-
-    Parameters
-    ----------
-    sample
-        Values of the characteristic [unit of the characteristic].
 
     Notes
     -----
@@ -159,28 +128,20 @@ def capability(sample: Float[np.ndarray, " unit"], limits: Limits) -> Capability
     within = float(np.abs(np.diff(sample)).mean() / _MOVING_RANGE)
     if min(within, overall) <= 0:
         raise InputError("Capability: the sample does not vary, so no index can be given.")
-    width, distance, outside = limits.width, limits.distance(mean), limits.outside(sample)
+    width, distance = limits.width, limits.distance(mean)
     return Capability(
         mean=mean,
-        deviation_within=within,
         deviation_overall=overall,
         cp=None if width is None else width / (6 * within),
         cpk=distance / (3 * within),
         pp=None if width is None else width / (6 * overall),
         ppk=distance / (3 * overall),
         normal_ppm=MILLION * limits.normal_share_outside(mean, overall),
-        units=sample.size,
-        outside=outside,
     )
 
 
-def wilson_interval(units: int, accepted: int, confidence: float = 0.95) -> ShareInterval:
+def wilson_interval(units: int, accepted: int, confidence: float = 0.95) -> Interval:
     """Return a yield with its two-sided Wilson interval, which covers on average as stated, not at every yield.
-
-    Parameters
-    ----------
-    units, accepted
-        Units of the sample, and how many are within the limits [-].
 
     References
     ----------
@@ -194,31 +155,23 @@ def wilson_interval(units: int, accepted: int, confidence: float = 0.95) -> Shar
     """
     from scipy.stats import norm
 
-    _require_share("Wilson interval", "confidence", confidence)
+    require_share("Wilson interval", "confidence", confidence)
     if units < 1 or not 0 <= accepted <= units:
         raise InputError.at("Wilson interval", "accepted", accepted, f"0 to {units} units")
     z, share = float(norm.isf((1 - confidence) / 2)), accepted / units
     centre = share + z**2 / (2 * units)
     half = z * float(np.sqrt(share * (1 - share) / units + z**2 / (4 * units**2)))
     scale = 1 + z**2 / units
-    return ShareInterval(
+    return Interval(
         estimate=share,
         # Rounding must not leave the ends of an extreme yield just off 0 and 1.
         low=max(0.0, (centre - half) / scale) if accepted else 0.0,
         high=min(1.0, (centre + half) / scale) if accepted < units else 1.0,
-        confidence=confidence,
     )
 
 
-def quantile_interval(sample: Float[np.ndarray, " unit"], share: float, confidence: float = 0.95) -> QuantileInterval:
-    """Return a quantile with the two-sided interval of two order statistics, half of the doubt on each side.
-
-    Parameters
-    ----------
-    sample
-        Independent values of the characteristic [unit of the characteristic].
-    share
-        Which quantile [-].
+def quantile_interval(sample: Float[np.ndarray, " unit"], share: float, confidence: float = 0.95) -> Interval:
+    """Return a quantile of independent values with the interval of two order statistics, half of the doubt each side.
 
     References
     ----------
@@ -234,23 +187,18 @@ def quantile_interval(sample: Float[np.ndarray, " unit"], share: float, confiden
     """
     from scipy.stats import binom
 
-    _require_share("quantile interval", "share", share)
-    _require_share("quantile interval", "confidence", confidence)
+    require_share("quantile interval", "share", share)
+    require_share("quantile interval", "confidence", confidence)
     if sample.size < 1 or not np.isfinite(sample).all():
         raise InputError.at("quantile interval", "sample", f"{sample.size} values", "at least 1 value, all finite")
     units, tail = sample.size, (1 - confidence) / 2
     low = int(binom.ppf(tail, units, share))
     high = int(binom.isf(tail, units, share)) + 1
     ordered = np.sort(sample)
-    return QuantileInterval(
-        share=share,
+    return Interval(
         estimate=float(np.quantile(sample, share)),
         low=float(ordered[low - 1]) if low >= 1 else -np.inf,
         high=float(ordered[high - 1]) if high <= units else np.inf,
-        confidence=confidence,
-        attained=float(binom.cdf(high - 1, units, share) - binom.cdf(low - 1, units, share)),
-        units=units,
-        needed=int(np.ceil(np.log(tail) / np.log(max(share, 1 - share)))),
     )
 
 
@@ -327,7 +275,7 @@ def holm(probabilities: Sequence[float], level: float) -> Bool[np.ndarray, " tes
     return rejected
 
 
-def _require_share(place: str, field: str, value: float) -> None:
+def require_share(place: str, field: str, value: float) -> None:
     """Raise unless a value lies between 0 and 1."""
     if not 0 < value < 1:
         raise InputError.at(place, field, value, "a number between 0 and 1")

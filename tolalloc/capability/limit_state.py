@@ -39,26 +39,15 @@ class LimitState(Protocol):
 
 
 class CountedLimitState:
-    """A limit state that counts its calls and stops when too many of them fail.
+    """A limit state that counts its calls and stops when more than a share of them fails.
 
     A failed sample reads as infinitely safe: it can neither count as a failure of the product nor start a chain.
-
-    Parameters
-    ----------
-    largest_failed_share
-        Share of calls that may fail [-].
     """
 
     def __init__(self, limit_state: LimitState, largest_failed_share: float = 0.01) -> None:
-        self.limit_state = limit_state
+        self.limit_state, self.variables = limit_state, limit_state.variables
         self.largest_failed_share = largest_failed_share
-        self.calls = 0
-        self.failed = 0
-
-    @property
-    def variables(self) -> int:
-        """Number of independent standard normal variables."""
-        return self.limit_state.variables
+        self.calls = self.failed = 0
 
     def values(self, u: Float[np.ndarray, "sample variable"]) -> Float[np.ndarray, " sample"]:
         """Return the values of the points, infinite where the sample failed."""
@@ -225,11 +214,8 @@ class ChainedRun:
     def coefficient_of_variation(self) -> float:
         """Coefficient of variation of the probability above zero [-].
 
-        Notes
-        -----
-        It is the larger of two: that of the levels as if independent, with the correlation of their chains, and that of
-        the lineages, which also sees how levels depend on each other. Failures of few lineages know little, however
-        weakly the states of each chain are correlated.
+        The larger of that of the levels as if independent, with the correlation of their chains, and that of the
+        lineages, which also sees how levels depend on each other.
 
         References
         ----------
@@ -293,12 +279,7 @@ class ChainedEstimate(RareFailure):
 
     @staticmethod
     def of(method: str, runs: tuple[ChainedRun, ...], counted: CountedLimitState) -> ChainedEstimate:
-        """Return the mean of runs.
-
-        Notes
-        -----
-        The standard error is at least the spread between runs, because a run knows nothing of regions that it has lost.
-        """
+        """Return the mean of runs; its standard error is at least their spread, a run knows no region it has lost."""
         probabilities = np.array([run.probability for run in runs])
         probability = float(probabilities.mean())
         errors = [run.probability * run.coefficient_of_variation for run in runs if run.probability > 0]

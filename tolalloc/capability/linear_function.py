@@ -44,15 +44,7 @@ class LinearFunction:
     def through(
         cls, x: Float[np.ndarray, "sample column"], values: Float[np.ndarray, " sample"]
     ) -> LinearFunction | None:
-        """Return the plane that all samples lie on up to rounding, none if one does not.
-
-        Parameters
-        ----------
-        x
-            Deviations [m, angles rad].
-        values
-            What the function says of them, not a number where it has no answer [unit of the output].
-        """
+        """Return the plane that all samples lie on up to rounding, none if one does not or has no answer."""
         few = x.shape[1] + _SPARE
         if values.size <= few or not np.isfinite(values).all():
             return None
@@ -65,15 +57,7 @@ class LinearFunction:
 
     @classmethod
     def near(cls, x: Float[np.ndarray, "sample column"], values: Float[np.ndarray, " sample"]) -> LinearFunction:
-        """Return the plane nearest to samples by least squares.
-
-        Parameters
-        ----------
-        x
-            Deviations [m, angles rad].
-        values
-            What the function says of them [unit of the output].
-        """
+        """Return the plane nearest to samples by least squares."""
         centre, size = x.mean(axis=0), np.maximum(x.std(axis=0), np.finfo(float).tiny)
         standard, middle = (x - centre) / size, float(values.mean())
         # Columns are independent or nearly so: the small system of their products is well conditioned.
@@ -99,9 +83,9 @@ class _AddedColumn:
     marginal: Marginal
     width: float  # [unit of the output per half zone]
 
-    def masses(self, step: float, points: int) -> Float[np.ndarray, " point"]:
+    def masses(self, step: float) -> Float[np.ndarray, " point"]:
         """Return the probabilities of the cells around multiples of a step, those below zero at the end [-]."""
-        places = (np.arange(points) - points // 2) * step
+        places = (np.arange(_POINTS) - _POINTS // 2) * step
         edges = np.append(places - step / 2, places[-1] + step / 2)
         below = self.marginal.probability(edges / self.width)
         below = below if self.width > 0 else 1.0 - below
@@ -140,7 +124,7 @@ class LinearLaw:
             if not folded:
                 return None
         law = cls(function=function, errors=errors, zones=zones)
-        return law if law.half_width > 0 and not errors.joint else None
+        return law if not errors.joint and law.half_width > 0 else None
 
     @property
     def is_convex(self) -> bool:
@@ -161,7 +145,7 @@ class LinearLaw:
     @cached_property
     def centre(self) -> float:
         """Value of the middles of all zones, and of the means of what is normal [unit of the output]."""
-        return float(self.function.offset + self._column_means @ self.function.slopes)
+        return float(self.function.offset + (self.errors.middles + self._zone_means) @ self.function.slopes)
 
     def beyond(self, limits: Limits, by: float) -> float:
         """Return the share of units that lie further beyond a limit than so far [unit of the output]."""
@@ -217,7 +201,8 @@ class LinearLaw:
         """Return the density at a value and the density times what each source adds on average to units there."""
         distance, sources = value - self.centre, self.zones.size
         shift = np.bincount(self._source_of_column, self._zone_means * self.function.slopes, sources)
-        shares = self._normal_shares
+        variance = max(self._normal_deviation**2, np.finfo(float).tiny)
+        shares = np.bincount(self._source_of_column, self._covariances, sources) / variance
         if not self._parts:
             deviation = self._normal_deviation
             density = float(np.exp(-0.5 * (distance / deviation) ** 2) / (np.sqrt(2 * np.pi) * deviation))
@@ -232,7 +217,7 @@ class LinearLaw:
             added += shares * (self._read(-turned, at) / step)
         for number, part in enumerate(self._parts):
             places = np.fft.ifftshift((np.arange(_POINTS) - _POINTS // 2) * step)
-            own = np.fft.fft(part.masses(step, _POINTS) * places)
+            own = np.fft.fft(part.masses(step) * places)
             others = np.delete(self._spectra, number, axis=0).prod(axis=0) * self._normal_spectrum
             added[part.source] += self._read(own * others, at) / step
         return density, added
@@ -244,23 +229,19 @@ class LinearLaw:
 
     @cached_property
     def _source_of_column(self) -> Int[np.ndarray, " column"]:
-        counts = [len(source.columns) for source in self.errors.active]
-        return np.repeat(np.arange(len(counts)), counts)
+        counts = np.array([len(source.columns) for source in self.errors.active], int)
+        return np.repeat(np.arange(counts.size), counts)
 
     @cached_property
     def _zone_means(self) -> Float[np.ndarray, " column"]:
         """Mean of what the zone gives each normal column beside its middle [m]."""
-        found = []
-        for source, zone in zip(self.errors.active, self.zones, strict=True):
-            is_normal_size = source.feature is Feature.SIZE and _is_normal(source)
-            mean = source.zone_mapping.moments[0] / source.lever * zone if is_normal_size else 0.0
-            found += [mean] * len(source.columns)
-        return np.array(found)
-
-    @cached_property
-    def _column_means(self) -> Float[np.ndarray, " column"]:
-        middles = [source.middles for source in self.errors.active]
-        return np.asarray(np.concatenate([*middles, []]) + self._zone_means)
+        found = [
+            source.zone_mapping.moments[0] / source.lever * zone
+            if source.feature is Feature.SIZE and _is_normal(source)
+            else 0.0
+            for source, zone in zip(self.errors.active, self.zones, strict=True)
+        ]
+        return np.asarray(np.array(found)[self._source_of_column])
 
     @cached_property
     def _normal_loads(self) -> Float[np.ndarray, " column"]:
@@ -287,22 +268,14 @@ class LinearLaw:
     def _normal_deviation(self) -> float:
         return float(np.sqrt(max(self._covariances.sum(), 0.0)))
 
-    @property
-    def _normal_shares(self) -> Float[np.ndarray, " source"]:
-        """Part of each source in the variance of the normal part [-]."""
-        variance = max(self._normal_deviation**2, np.finfo(float).tiny)
-        return np.bincount(self._source_of_column, self._covariances, self.zones.size) / variance
-
     @cached_property
     def _parts(self) -> tuple[_AddedColumn, ...]:
         found = []
-        for at, (source, own) in enumerate(zip(self.errors.active, self.errors.columns_of_source, strict=False)):
-            if _is_normal(source):
-                continue
-            for slope in self.function.slopes[own]:
-                width = float(slope * self.zones[at] / 2 / source.lever)
-                if width != 0.0:
-                    found.append(_AddedColumn(source=at, marginal=source.zone_mapping.marginal, width=width))
+        for at, slope in zip(self._source_of_column, self.function.slopes, strict=True):
+            source = self.errors.active[at]
+            width = float(slope * self.zones[at] / 2 / source.lever)
+            if width != 0.0 and not _is_normal(source):
+                found.append(_AddedColumn(source=at, marginal=source.zone_mapping.marginal, width=width))
         return tuple(found)
 
     @cached_property
@@ -322,7 +295,7 @@ class LinearLaw:
 
     @cached_property
     def _spectra(self) -> Complex[np.ndarray, "part point"]:
-        return np.array([np.fft.fft(part.masses(self._grid[0], _POINTS)) for part in self._parts])
+        return np.array([np.fft.fft(part.masses(self._grid[0])) for part in self._parts])
 
     @cached_property
     def _cumulative(self) -> Float[np.ndarray, " edge"]:
@@ -356,14 +329,7 @@ class NearPlane:
     ) -> NearPlane | None:
         """Return what lies near an output, none where its law is not known or it says too little of the output.
 
-        Parameters
-        ----------
-        x
-            Deviations [m, angles rad].
-        values
-            The output, not a number where there is none [unit of the output].
-        errors, zones
-            The sources, and their zones [m].
+        Deviations of samples [m, angles rad], and the output, not a number where there is none.
         """
         known = np.isfinite(values)
         x, values = x[known], values[known]

@@ -99,10 +99,8 @@ class AnsweredUnits:
     def quantile_bound(self, target: float, confidence: float = CONFIDENCE) -> float:
         """Return the smallest limit at which this sample shows the target yield with one-sided confidence.
 
-        Notes
-        -----
         An order statistic: so many of the largest values are left out as the sample may reject. Infinite if the
-        sample is too small to show the target at all. Like the bound of `Yield`, it holds for independent units alone.
+        sample is too small to show the target at all. It holds for independent units alone.
         """
         units = self.evaluation.status.size
         allowed = allowed_rejections(units, target, confidence) - self.failed
@@ -132,12 +130,7 @@ class RedrawnUnits(AnsweredUnits):
 
 
 def proportion(units: int, rejected: int) -> Yield:
-    """Return the yield of a sample with its exact intervals.
-
-    Parameters
-    ----------
-    units, rejected
-        Numbers of units, 1 or more, and of those that are not good [-].
+    """Return the yield of a sample with its exact intervals, of one unit or more.
 
     References
     ----------
@@ -209,12 +202,7 @@ class ProcessUncertainty:
     ) -> ProcessUncertainty | None:
         """Return the process uncertainty of an output, none where no part was measured or the output does not vary.
 
-        Parameters
-        ----------
-        x
-            Deviations of random units [m, angles rad].
-        values
-            The output of these units, not a number where one has none [output].
+        Deviations of random units [m, angles rad], and their output, not a number where one has none.
         """
         pairs = zip(errors.active, errors.columns_of_source, strict=False)
         sources = [(source, own) for source, own in pairs if source.measured]
@@ -299,8 +287,6 @@ class ProcessUncertainty:
     def shares(self, limits: Limits, share: float) -> Float[np.ndarray, " process"]:
         """Return the share of units beyond the limits for every possible process, where it is so much of all [-].
 
-        Notes
-        -----
         Normal scores of the shares that the units show are moved by the same, so that the units give the share asked
         for; of few units beyond the limits the scores are those of a normal output.
         """
@@ -323,8 +309,6 @@ class ProcessUncertainty:
     def widened(self, found: Yield, limits: Limits) -> Yield:
         """Return a yield whose interval and bound also hold what is not known of the processes.
 
-        Notes
-        -----
         The error of counted units beside it is drawn from Jeffreys' posterior of a share (Brown, Cai & DasGupta 2001).
         """
         rejected = 1.0 - found.estimate
@@ -357,11 +341,6 @@ def allowed_rejections(units: int, target: float, confidence: float = CONFIDENCE
 
     The largest k with P(rejects ≤ k) ≤ 1 − confidence, rejects ~ B(units, 1 − target): Clopper & Pearson 1934.
 
-    Notes
-    -----
-    As many as a design just at the target rejects with at most the error that is left: what Clopper–Pearson's bound
-    says.
-
     Examples
     --------
     The fewest units that show 99.73 % with 95 % confidence are 1,109, and none of them may be rejected.
@@ -378,17 +357,9 @@ def allowed_rejections(units: int, target: float, confidence: float = CONFIDENCE
 def monte_carlo(
     experiment: Experiment[Response], units: int, design: SamplingDesign = SamplingDesign.MONTE_CARLO
 ) -> MonteCarlo:
-    """Return random units of an experiment.
+    """Return random units of an experiment; all intervals assume the design of Monte Carlo.
 
-    Parameters
-    ----------
-    design
-        How the units are spread; all intervals assume the first one.
-
-    Notes
-    -----
-    The deviations are kept, the uniform numbers behind them only for one chunk at a time. The response takes all units
-    at once and solves them in chunks of its own, so that an executor has many chunks to spread.
+    The response takes all units at once and solves them in chunks of its own, so that an executor has many to spread.
 
     References
     ----------
@@ -493,12 +464,6 @@ def share_change(before: Bool[np.ndarray, " unit"], after: Bool[np.ndarray, " un
     References
     ----------
     McNemar 1947: only discordant pairs tell; Clopper–Pearson for either kind, joined by Bonferroni.
-
-    Examples
-    --------
-    >>> before, after = np.array([True, False, True, False]), np.array([True, True, True, False])
-    >>> share_change(before, after).estimate
-    0.25
     """
     units = before.size
     gained, lost = int(np.count_nonzero(after & ~before)), int(np.count_nonzero(before & ~after))
@@ -555,11 +520,6 @@ def largest_excess(
     """Return how far every unit lies beyond any of its limits at most, over the standard deviation of the output [-].
 
     max over outputs and sides of sign·(y − limit)/σ, own derivation; it is above 0 where a unit fails.
-
-    Examples
-    --------
-    >>> largest_excess({"y": np.array([-1.0, 1.0])}, {"y": Limits(upper=0.5)}).tolist()
-    [-1.5, 0.5]
     """
     found = [
         own.excess(values[name]) / (float(values[name][np.isfinite(values[name])].std()) or 1.0)
@@ -573,20 +533,7 @@ def kept_at_once(
 ) -> Yield:
     """Return the share of units that keep all limits at once; one without an answer keeps none.
 
-    Parameters
-    ----------
-    evaluation
-        What a response said of random units.
-    outputs
-        Names of its outputs, in their order.
-    limits
-        Output → limits.
-    uncertain
-        Tells what measured parts of these units leave open, which the interval then holds, too.
-
-    References
-    ----------
-    The interval is that of `proportion`, Clopper & Pearson 1934.
+    The interval is that of `proportion`, and holds what measured parts of these units leave open, where that is told.
     """
     kept = [own.kept_by(evaluation.values[:, outputs.index(name)]) for name, own in limits.items()]
     good = evaluation.good & np.all(kept, axis=0)

@@ -51,15 +51,6 @@ class Drawn:
     def allowed(self, target: float, confidence: float) -> float:
         """Return what may lie beyond a limit for a yield to be shown with one-sided confidence, −1 if nothing may [-].
 
-        Parameters
-        ----------
-        target
-            The yield [-].
-        confidence
-            One-sided [-].
-
-        Notes
-        -----
         The largest weight at which a design just at the target is called good with no more than the error that is left,
         however its share is parted.
         """
@@ -70,17 +61,8 @@ class Drawn:
         return _allowed(self, target, confidence)
 
     def interval(self, weight: float, near: int, far: int) -> Yield:
-        """Return the yield with its intervals.
+        """Return the yield with its intervals, of the weight and the number of near and far units beyond the limit [-].
 
-        Parameters
-        ----------
-        weight
-            Of what lies beyond the limit [-].
-        near, far
-            How many near and far units that are [-].
-
-        Notes
-        -----
         Far units may only lower the yield, so the near ones alone bound it from above.
         """
         if self.whatever == self.units:
@@ -98,8 +80,6 @@ class Drawn:
     def probability_of_no_more(self, weight: float, share: float) -> float:
         """Return the largest probability, over all parts of a share, that no more weight lies beyond the limit [-].
 
-        Notes
-        -----
         With K_f = j the near units are among N − j others, M − j of them with a probability of p_n/(1 − p_f), the rest
         with p_n; p_n for all of them makes the probability larger.
         """
@@ -135,11 +115,6 @@ def largest_first(values: Float[np.ndarray, " value"], count: int) -> Int[np.nda
 
     Order statistics x₍₁₎ ≥ x₍₂₎ ≥ … ≥ x₍count₎; of equals the earlier one leads: David & Nagaraja 2003,
     Order Statistics.
-
-    Examples
-    --------
-    >>> largest_first(np.array([1.0, 3.0, 2.0, 3.0]), 3).tolist()
-    [1, 3, 2]
     """
     if count >= values.size:
         return np.argsort(-values, kind="stable")
@@ -174,19 +149,8 @@ class SolvedUnits:
     def kept_excess(self, excess: Float[np.ndarray, " solved"], target: float, confidence: float) -> float:
         """Return how far units lie beyond a limit if those furthest beyond it are left out [unit of the excess].
 
-        Parameters
-        ----------
-        excess
-            How far every unit lies beyond it, infinite where it has no answer [unit of the excess].
-        target
-            The yield, which says how many are left out [-].
-        confidence
-            With which it is shown, one-sided; at one half the estimate itself counts [-].
-
-        Returns
-        -------
-        float
-            Infinite where even a sample with nothing beyond the limit shows nothing.
+        As many as the yield allows with one-sided confidence; at one half the estimate itself counts. A unit without an
+        answer lies infinitely far beyond. Infinite where even a sample with nothing beyond the limit shows nothing.
         """
         allowed = self.drawn.allowed(target, confidence)
         if allowed < 0:
@@ -199,14 +163,9 @@ class SolvedUnits:
     def least_excess(self, excess: Float[np.ndarray, " solved"], target: float, confidence: float) -> float:
         """Return how far the share that a yield leaves lies beyond a limit at least [unit of the excess].
 
-        With one-sided confidence; the parameters are those of `kept_excess`, whose other end it is. Far units may only
-        add to what lies beyond, so the near ones alone bound it; plain units bound it, too. The better of both counts,
-        each with half of the error: of units near several limits few may be near this one.
-
-        Returns
-        -------
-        float
-            Minus infinity where so few units say nothing.
+        With one-sided confidence; the other end of `kept_excess`. Far units may only add to what lies beyond, so the
+        near ones alone bound it; plain units bound it, too. The better of both counts, each with half of the error: of
+        units near several limits few may be near this one. Minus infinity where so few units say nothing.
         """
         from scipy.stats import binom
 

@@ -39,14 +39,7 @@ def subset_simulation(
 ) -> ChainedEstimate:
     """Return the probability of failure from one or several independent subset simulations.
 
-    Parameters
-    ----------
-    samples
-        Samples of each level, a multiple of 10 [-].
-    runs
-        Independent runs, whose mean is the estimate [-].
-    largest_failed_share
-        Share of the samples that may fail [-].
+    Samples of each level are a multiple of 10, and a share of them may fail [-].
 
     References
     ----------
@@ -130,12 +123,8 @@ def scaled_sigma_sampling(
 
     Parameters
     ----------
-    samples
-        Samples of each width, a multiple of 10 [-].
-    runs
-        Independent runs, whose mean is the estimate [-].
-    largest_failed_share
-        Share of the samples that may fail [-].
+    samples, runs, largest_failed_share
+        As of `subset_simulation`, of each width.
     known
         Failing states that another method has met; they change nothing but the share that is seen of them [-].
 
@@ -188,8 +177,6 @@ def _widths(
 ) -> tuple[list[float], float]:
     """Return the widths from that at which most fail, or enough, down to 1, and how many times the samples it needs.
 
-    Notes
-    -----
     No width is used at which more samples than allowed have no usable answer.
     """
     width, widths = 1.0, [1.0]

@@ -33,25 +33,13 @@ class WorstUnit:
     ends: Float[np.ndarray, " start"]
 
 
-_Units = tuple[Float[np.ndarray, " start"], Float[np.ndarray, "start column"], Float[np.ndarray, "start column"]]
-"""Values of units, one of every start, the units as deviations per unit of zone, and mean gradients by column."""
-
-
 def worst_unit(
     experiment: Experiment[ResponseWithDerivatives], starts: int = 32, steps: int = 60, sense: Literal[1, -1] = 1
 ) -> WorstUnit:
     """Return the worst unit that an ascent from many random units finds inside the zones.
 
-    Parameters
-    ----------
-    experiment
-        Correlations of its sources do not count, any part may be anywhere in its zone.
-    starts
-        Random units at the limits of all zones from which to ascend [-].
-    steps
-        Steps of every ascent [-].
-    sense
-        1 where large outputs are bad, for an upper limit; −1 where small ones are, for a lower limit [-].
+    Correlations of the sources do not count, any part may be anywhere in its zone. The sense is 1 where large outputs
+    are bad, for an upper limit; −1 where small ones are, for a lower limit [-].
 
     Notes
     -----
@@ -87,39 +75,38 @@ def worst_unit(
     uniform, parts = experiment.uniform(starts), tuple(zip(errors.active, errors.columns_of_source, strict=True))
     units = np.concatenate([source.at_limit(uniform[:, own]) for source, own in parts], axis=1)
     gradients, failed = np.zeros_like(units), 0
-    worst: _Units = (np.full(starts, -np.inf), units, gradients)
+    # Of every start the worst value, its unit as deviations per unit of zone, and the mean gradients there
+    worst, worst_units, worst_gradients = np.full(starts, -np.inf), units, gradients
     # Steps only come ever closer to the corners of the zones, where a convex output is largest: the last goes to them.
     for step in range(steps + 1):
         weight = max(_WEIGHT, 1.0 / (step + 1))
         if step == steps:
-            units, gradients, weight = _moved(experiment, worst[1], worst[2], 1.0), worst[2], 0.0
+            units, gradients = _moved(experiment, worst_units, worst_gradients, 1.0), worst_gradients
+            weight = 0.0
         elif step:
             units = _moved(experiment, units, gradients, 2.0 / (step + 1))
-        values, gradients = _solved(experiment, sense, units, gradients, weight)
+        found = experiment.response.with_derivatives(experiment.deviations(units))
+        good = found.evaluation.good & np.isfinite(found.by_column).all(axis=1)
+        values = np.where(good, sense * found.evaluation.values[:, 0], -np.inf)
+        newest = np.where(good[:, np.newaxis], sense * found.by_column, gradients)
+        gradients = gradients + weight * (newest - gradients)
         failed += int(np.isinf(values).sum())
-        worse = (values > worst[0])[:, np.newaxis]
-        worst = (np.maximum(worst[0], values), np.where(worse, units, worst[1]), np.where(worse, gradients, worst[2]))
-    if failed > allowed * starts * (steps + 1) or np.isinf(worst[0]).all():
+        worse = (values > worst)[:, np.newaxis]
+        worst, worst_units = np.maximum(worst, values), np.where(worse, units, worst_units)
+        worst_gradients = np.where(worse, gradients, worst_gradients)
+    if failed > allowed * starts * (steps + 1) or np.isinf(worst).all():
         raise SolveError(
             f"Worst case: {failed} of {starts * (steps + 1)} units have no usable answer; allowed is a share of "
             f"{allowed:.4g}."
         )
-    return _result(experiment, sense, worst)
-
-
-def _solved(
-    experiment: Experiment[ResponseWithDerivatives],
-    sense: int,
-    units: Float[np.ndarray, "start column"],
-    gradients: Float[np.ndarray, "start column"],
-    weight: float,
-) -> tuple[Float[np.ndarray, " start"], Float[np.ndarray, "start column"]]:
-    """Return the values of the units, minus infinity where one has none, and gradients averaged with the given."""
-    found = experiment.response.with_derivatives(experiment.deviations(units))
-    good = found.evaluation.good & np.isfinite(found.by_column).all(axis=1)
-    newest = np.where(good[:, np.newaxis], sense * found.by_column, gradients)
-    values = np.where(good, sense * found.evaluation.values[:, 0], -np.inf)
-    return values, gradients + weight * (newest - gradients)
+    most = int(worst.argmax())
+    by_column = sense * worst_gradients[most] * worst_units[most]
+    return WorstUnit(
+        value=sense * float(worst[most]),
+        x=experiment.deviations(worst_units[[most]])[0],
+        by_zone=np.array([by_column[own].sum() for own in errors.columns_of_source]),
+        ends=np.where(np.isinf(worst), np.nan, sense * worst),
+    )
 
 
 def _moved(
@@ -132,21 +119,13 @@ def _moved(
     moved, errors = np.empty_like(units), experiment.errors
     for source, own in zip(errors.active, errors.columns_of_source, strict=True):
         extremes = _extreme_in_zone(source, units[:, own], gradients[:, own])
-        moved[:, own] = _moved_towards(source, units[:, own], extremes, part)
+        if source.spectrum:  # waves with phases between theirs
+            phases = _phases(units[:, own])
+            apart = np.remainder(_phases(extremes) - phases + 0.5, 1.0) - 0.5
+            moved[:, own] = _filled(source, phases + part * apart)
+        else:
+            moved[:, own] = units[:, own] + part * (extremes - units[:, own])
     return moved
-
-
-def _result(experiment: Experiment[ResponseWithDerivatives], sense: int, worst: _Units) -> WorstUnit:
-    """Return the worst of all starts with the signs of the output."""
-    values, units, gradients = worst
-    most = int(values.argmax())
-    by_column = sense * gradients[most] * units[most]
-    return WorstUnit(
-        value=sense * float(values[most]),
-        x=experiment.deviations(units[[most]])[0],
-        by_zone=np.array([by_column[own].sum() for own in experiment.errors.columns_of_source]),
-        ends=np.where(np.isinf(values), np.nan, sense * values),
-    )
 
 
 def _extreme_in_zone(
@@ -177,25 +156,6 @@ def _extreme_in_zone(
         phases = np.where(better[:, np.newaxis], phases + move, phases)
         furthest = np.maximum(found, furthest)
     return _filled(source, phases)
-
-
-def _moved_towards(
-    source: Source, units: Float[np.ndarray, "unit column"], targets: Float[np.ndarray, "unit column"], part: float
-) -> Float[np.ndarray, "unit column"]:
-    """Return the parts that lie between two parts inside the zone, waves with phases between theirs.
-
-    Parameters
-    ----------
-    units, targets
-        Its columns of either part [-].
-    part
-        Part of the way, 0 to 1 [-].
-    """
-    if not source.spectrum:
-        return np.asarray(units + part * (targets - units))
-    phases = _phases(units)
-    apart = np.remainder(_phases(targets) - phases + 0.5, 1.0) - 0.5
-    return _filled(source, phases + part * apart)
 
 
 def _phases(columns: Float[np.ndarray, "unit column"]) -> Float[np.ndarray, "unit vector"]:

@@ -16,7 +16,7 @@ from scipy.stats import binom
 from scipy.stats import t as student
 
 from tolalloc.capability.experiment import FEWEST_RUNS
-from tolalloc.capability.indices import MILLION, Capability, Limits, ShareInterval, capability
+from tolalloc.capability.indices import MILLION, Interval, Limits
 from tolalloc.capability.limit_state import ChainedEstimate, LimitState, RareFailure, ResponseLimit
 from tolalloc.capability.monte_carlo import CONFIDENCE, MonteCarlo, ProcessUncertainty, Yield, require_few_failures
 from tolalloc.capability.rare_failure import MOST_KNOWN, ScaledSigmaEstimate, scaled_sigma_sampling, subset_simulation
@@ -45,11 +45,6 @@ class Agreement:
     estimate: RareFailure  # What to rely on, with its cautions
     estimates: tuple[RareFailure, ...]  # What every method said, random units first
     verdict: str  # One sentence that says what to rely on, and why
-
-    @property
-    def calls(self) -> int:
-        """Calls of the limit state by all methods [-]."""
-        return sum(item.calls for item in self.estimates)
 
 
 def agreement(
@@ -221,39 +216,21 @@ _RANDOM_UNITS = "Monte Carlo"
 
 
 @dataclass(frozen=True, kw_only=True)
-class YieldAtLimit:
+class YieldAtLimit(Agreement):
     """Yield at a limit, and whether it can be relied on."""
 
-    limit: float  # Largest output allowed [output]
     # Yield with its two-sided 95 % interval: that of `MonteCarlo.within` from random units, or where few of them exceed
     # the limit that of a log-normally distributed estimate [-]
-    interval: ShareInterval
-    # Probability of a unit beyond the limit: that of the random units, or where few of them lie there what methods for
-    # rare failures agree on; with its calls, failed samples and cautions
-    estimate: RareFailure
-    estimates: tuple[RareFailure, ...]  # What every method said, random units first
-    verdict: str  # One sentence that says whether to rely on the estimate, and why
-    capability: Capability  # Indices of the random units
+    interval: Interval
 
     @property
-    def parts_per_million(self) -> ShareInterval:
+    def parts_per_million(self) -> Interval:
         """Units beyond the limit per million, with the interval [-]."""
-        return ShareInterval(
+        return Interval(
             estimate=MILLION * self.estimate.probability,
             low=MILLION * (1 - self.interval.high),
             high=MILLION * (1 - self.interval.low),
-            confidence=self.interval.confidence,
         )
-
-    @property
-    def calls(self) -> int:
-        """Calls of the response by all methods [-]."""
-        return sum(item.calls for item in self.estimates)
-
-    @property
-    def failed(self) -> int:
-        """Calls by all methods that gave no usable answer [-]."""
-        return sum(item.failed for item in self.estimates)
 
 
 def yield_at_limit(
@@ -272,12 +249,10 @@ def yield_at_limit(
     sample
         Random units whose first output is the limited one; they decide alone if 30 or more exceed the limit, units
         without an answer included.
-    samples, scaled
-        Samples of each level of subset simulation and of each width of scaled-sigma sampling, multiples of 10 [-].
-    runs
-        Independent runs of either, two or more [-].
+    samples, scaled, runs
+        As those of `agreement`; two runs or more.
     rare
-        Whether they are asked at all; else the random units say what they can.
+        Whether methods for rare failures are asked at all; else the random units say what they can.
 
     Notes
     -----
@@ -294,12 +269,10 @@ def yield_at_limit(
     >>> from tolalloc.capability.experiment import Experiment
     >>> from tolalloc.capability.monte_carlo import monte_carlo
     >>> import tolalloc as ta
-    >>> row = {"unit": "mm", "min": 1, "max": 60, "cost": 1}
-    >>> rows = [{"id": "a", "plus": 3, "minus": -3, **row}, {"id": "b", "plus": 6, "minus": -6, **row}]
-    >>> errors = ta.Drawing.of_rows(rows).errors
-    >>> y = ta.model(lambda a, b: a + b, inputs=("a", "b"), outputs=("y [mm]",)).bound(errors, "")
-    >>> experiment = Experiment.of(y, errors, SeedTree(1))
-    >>> state = ResponseLimit(experiment=experiment, limit=2.0 * np.sqrt(5.0))
+    >>> row = {"unit": "mm", "plus": 3, "minus": -3, "min": 1, "max": 60, "cost": 1}
+    >>> errors = ta.Drawing.of_rows([{"id": "a", **row}]).errors
+    >>> y = ta.model(lambda a: a, inputs=("a",), outputs=("y [mm]",)).bound(errors, "")
+    >>> state = ResponseLimit(experiment=Experiment.of(y, errors, SeedTree(1)), limit=2.0)
     >>> round(yield_at_limit(state, monte_carlo(state.experiment, 10_000)).interval.estimate, 2)
     0.98
     """
@@ -318,26 +291,19 @@ def yield_at_limit(
             f"{within.rejected:,} of {within.units:,} random units lie there; rarer ones are a full run's question."
         )
         found = Agreement(estimate=plain, estimates=(plain,), verdict=verdict)
-    counted = ShareInterval(estimate=within.estimate, low=within.low, high=within.high, confidence=CONFIDENCE)
+    counted = Interval(estimate=within.estimate, low=within.low, high=within.high)
     interval = counted if found.estimate.method == _RANDOM_UNITS else log_normal_interval(found.estimate, runs)
-    return YieldAtLimit(
-        limit=limit,
-        interval=_widened_by(interval, limit_state, sample),
-        estimate=found.estimate,
-        estimates=found.estimates,
-        verdict=found.verdict,
-        capability=capability(sample.values, Limits(upper=limit)),
-    )
+    return YieldAtLimit(**vars(found), interval=_widened_by(interval, limit_state, sample))
 
 
-def _widened_by(interval: ShareInterval, limit_state: ResponseLimit, sample: MonteCarlo) -> ShareInterval:
+def _widened_by(interval: Interval, limit_state: ResponseLimit, sample: MonteCarlo) -> Interval:
     """Return the interval of a yield that also holds what measured parts leave open of their processes."""
     evaluation = sample.evaluation
     values = np.where(evaluation.good, evaluation.values[:, 0], np.nan)
     uncertainty = ProcessUncertainty.of(limit_state.experiment.errors, sample.x, values)
     if uncertainty is None:
         return interval
-    limits, tail = Limits(upper=limit_state.limit), (1 - interval.confidence) / 2
+    limits, tail = Limits(upper=limit_state.limit), (1 - CONFIDENCE) / 2
     # The worst process at the worse end of the counted interval, and the best one at its better end.
     least, most = (
         1.0 - float(np.quantile(uncertainty.shares(limits, 1.0 - end), at))
@@ -346,15 +312,10 @@ def _widened_by(interval: ShareInterval, limit_state: ResponseLimit, sample: Mon
     return replace(interval, low=min(interval.low, least), high=max(interval.high, most))
 
 
-def log_normal_interval(failure: RareFailure, runs: int, confidence: float = CONFIDENCE) -> ShareInterval:
+def log_normal_interval(failure: RareFailure, runs: int) -> Interval:
     """Return the yield with the interval of a log-normally distributed estimate of the share beyond the limit.
 
-    Parameters
-    ----------
-    failure
-        Estimate above zero with its standard error.
-    runs
-        Independent runs that it is the mean of, two or more [-].
+    The estimate is above zero and the mean of two independent runs or more.
 
     References
     ----------
@@ -363,12 +324,11 @@ def log_normal_interval(failure: RareFailure, runs: int, confidence: float = CON
     derivation).
     """
     spread = np.sqrt(np.log1p(failure.coefficient_of_variation**2))
-    factor = float(np.exp(student.isf((1 - confidence) / 2, runs - 1) * spread))
-    return ShareInterval(
+    factor = float(np.exp(student.isf((1 - CONFIDENCE) / 2, runs - 1) * spread))
+    return Interval(
         estimate=1 - failure.probability,
         low=max(0.0, 1 - failure.probability * factor),
         high=1 - failure.probability / factor,
-        confidence=confidence,
     )
 
 

@@ -41,19 +41,8 @@ def centring(
 ) -> Centring | None:
     """Return what moving one nominal brings; none with one limit, a mean in the middle, or no size that can move.
 
-    Parameters
-    ----------
-    experiment
-        Its response has the limited output first.
-    sample
-        Random units with that output first.
-    limits
-        Of that output.
-    local
-        Derivatives of that output by each source.
+    The limited output is the first one of the experiment and of the random units.
 
-    Notes
-    -----
     A nominal that is longer by d is a column that is longer by d in every unit: d = −off/(dy/dx), and the units are
     solved there, so that no linear model decides (own derivation).
 

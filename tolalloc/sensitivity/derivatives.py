@@ -130,9 +130,6 @@ def classical_estimate(experiment: Experiment[Response]) -> ClassicalEstimate:
 
     Notes
     -----
-    Both sums assume that single errors add up, which contact switching denies; they stand beside Monte Carlo for
-    comparison with a hand calculation.
-
     With aᵢ the largest of 16 single-error outputs beyond y₀: worst case y₀ + Σ aᵢ, root sum square y₀ + √(Σ aᵢ²)
     [output]. For outputs linear in every error they are exact.
 

@@ -23,15 +23,7 @@ FAST_SECONDS = {True: 0.25, False: 1.0}
 
 
 def fewest_units() -> int:
-    """Return the fewest units whose worst share is as many as are needed, whatever the limit [-].
-
-    n = ⌈fewest outside / worst share⌉ (own derivation).
-
-    Examples
-    --------
-    >>> fewest_units()
-    1000
-    """
+    """Return the fewest units whose worst share is as many as are needed, whatever the limit [-]."""
     return ceil(FEWEST_OUTSIDE / WORST_SHARE)
 
 
@@ -174,11 +166,6 @@ class RankingEffort(NamedFields):
         """Return about how many units a ranking of so many sources solves, the methods for rare failures left out [-].
 
         Random units, Saltelli blocks, derivatives and surrogates with their trials, own count.
-
-        Examples
-        --------
-        >>> QUICK_RANKING.counted(48)
-        11008
         """
         return self.units + self.sobol.counted(sources) + 2 * self.derivative_units + 9 * self.surrogate_units
 
@@ -225,11 +212,6 @@ class RankingEffort(NamedFields):
 
         The Sobol analysis has as many blocks of sources + 2 units, a power of two, as the stated rate allows, and at
         least those of any model: counted work and no clock decides, so the same study has the same bits.
-
-        Parameters
-        ----------
-        sources
-            Sources, or blocks of dependent ones, whose columns are exchanged together [-].
 
         Examples
         --------

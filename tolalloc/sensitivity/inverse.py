@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -36,10 +37,9 @@ class InverseSensitivity:
     """The factor of each zone at which the requirement is just kept, all other zones as they are."""
 
     sources: tuple[str, ...]  # Names of the sources that a drawing limits, in the order of all arrays
-    quantile: float  # Quantile of the output at the target yield with the zones as they are [output]
-    meets: bool  # Whether that keeps the limit; if so the factors are above 1, if not below
-    # Whether the interval of that quantile leaves the limit out; if not, these units tell no factor from 1, all are
-    # NaN, and none is searched for
+    meets: bool  # Whether the zones as they are keep the limit; if so the factors are above 1, if not below
+    # Whether the interval of the present quantile leaves the limit out; if not, these units tell no factor from 1, all
+    # are NaN, and none is searched for
     decided: bool
     # Factor of the zone; infinite if the largest factor tried keeps the limit too, NaN if the limit is missed even
     # without the source [-]
@@ -48,27 +48,15 @@ class InverseSensitivity:
     low: Float[np.ndarray, " source"]
     high: Float[np.ndarray, " source"]
     zone: Float[np.ndarray, " source"]  # Factor times the zone [m]
-    # Units of every trial, samples without a usable answer over all trials, and calls of the response [-]
-    units: int
-    failed: int
-    calls: int
+    units: int  # Units of every trial [-]
 
 
 def inverse_sensitivity(
     experiment: Experiment[Response], *, limit: float, target: float, units: int = 2048
 ) -> InverseSensitivity:
-    """Return how far each zone may open, or must close, alone.
+    """Return how far each zone may open, or must close, alone, until a share of the units just keeps an upper limit.
 
-    Parameters
-    ----------
-    experiment
-        Its first output is limited; a joint source stays as it is.
-    limit
-        Largest output allowed [output].
-    target
-        Share of the units that must keep it [-].
-    units
-        Units of every trial [-].
+    The first output is limited; a joint source stays as it is.
 
     Notes
     -----
@@ -117,7 +105,6 @@ def inverse_sensitivity(
         low[own], high[own] = _interval(factor[own], quantiles, bracket, limit)
     return InverseSensitivity(
         sources=tuple(source.name for source in errors.active),
-        quantile=now,
         meets=meets,
         decided=decided,
         factor=factor,
@@ -125,36 +112,26 @@ def inverse_sensitivity(
         high=high,
         zone=factor * experiment.zones[:count],
         units=units,
-        failed=openings.failed,
-        calls=openings.calls,
     )
 
 
 def fewest_units(target: float) -> int:
-    """Return the fewest units that show a quantile at the target yield [-].
-
-    Examples
-    --------
-    >>> fewest_units(0.9973)
-    1852
-    """
+    """Return the fewest units that show a quantile at the target yield [-]."""
     return int(np.ceil(_LEAST_OUTSIDE / (1.0 - target)))
 
 
+@dataclass(frozen=True)
 class _Openings:
     """The same units with one zone multiplied by a factor, for several sources in each call of the response."""
 
-    def __init__(
-        self, experiment: Experiment[Response], standard: Float[np.ndarray, "unit column"], target: float
-    ) -> None:
-        self.experiment, self.errors = experiment, experiment.errors
-        self.standard, self.target = standard, target
-        self.calls = self.failed = 0
+    experiment: Experiment[Response]
+    standard: Float[np.ndarray, "unit column"]
+    target: float
 
     @cached_property
     def present(self) -> tuple[Float[np.ndarray, " unit"], Bool[np.ndarray, " unit"]]:
         """Output of every unit with the zones as they are, and which are good."""
-        values, good = self._solved(self.standard, np.zeros(1, int), np.ones(1))
+        ((values, good),) = self._solved(np.zeros(1, int), np.ones(1))
         self._require_few_failures(good, np.zeros(1, int), np.ones(1))
         return values[0], good[0]
 
@@ -162,11 +139,9 @@ class _Openings:
         self, sources: Int[np.ndarray, " trial"], factors: Float[np.ndarray, " trial"]
     ) -> Float[np.ndarray, "trial 3"]:
         """Return the quantile of every trial at the target yield, and the ends of its interval [output]."""
-        trials, found = max(1, _ROWS_AT_ONCE // self.standard.shape[0]), []
-        for start in range(0, sources.size, trials):
-            own, by = sources[start : start + trials], factors[start : start + trials]
-            values, good = self._solved(self.standard, own, by)
-            self._require_few_failures(good, own, by)
+        found = list[tuple[float, float, float]]()
+        for values, good in self._solved(sources, factors):
+            self._require_few_failures(good, sources[len(found) :], factors[len(found) :])
             found += [self.quantile(*trial) for trial in zip(values, good, strict=True)]
         return np.array(found)
 
@@ -185,30 +160,25 @@ class _Openings:
         values, good = self.present
         needed = good.size - int(np.floor((good.size - 1) * self.target))
         worst = np.argsort(np.where(good, values, -np.inf))[-max(needed, int(_WORST * good.size)) :]
-        trials, beyond = max(1, _ROWS_AT_ONCE // worst.size), []
-        for start in range(0, sources.size, trials):
-            own = sources[start : start + trials]
-            values, good = self._solved(self.standard[worst], own, np.zeros(own.size))
-            beyond += [int(np.count_nonzero(trial)) for trial in good & (values > limit)]
-        return np.array(beyond, int) < needed
+        closed = self._solved(sources, np.zeros(sources.size), worst)
+        beyond = [np.count_nonzero(good & (values > limit), axis=1) for values, good in closed]
+        return np.concatenate(beyond) < needed
 
     def _solved(
         self,
-        standard: Float[np.ndarray, "unit column"],
         sources: Int[np.ndarray, " trial"],
         factors: Float[np.ndarray, " trial"],
-    ) -> tuple[Float[np.ndarray, "trial unit"], Bool[np.ndarray, "trial unit"]]:
-        """Return the outputs of units in every trial from one call of the response, and which are good."""
-        x = np.empty((sources.size, *standard.shape))
-        for own, source, factor in zip(x, sources, factors, strict=True):
-            zones = self.experiment.zones.copy()
-            zones[source] *= factor
-            own[:] = self.errors.deviations(standard, zones)
-        evaluation = self.experiment.response(x.reshape(-1, standard.shape[1]))
-        values, good = (part.reshape(x.shape[:2]) for part in (evaluation.values[:, 0], evaluation.good))
-        self.calls += 1
-        self.failed += int(np.count_nonzero(~good))
-        return values, good
+        units: slice | Int[np.ndarray, " unit"] = slice(None),
+    ) -> Iterator[tuple[Float[np.ndarray, "some_trials unit"], Bool[np.ndarray, "some_trials unit"]]]:
+        """Yield the outputs of units in some trials from one call of the response, and which are good."""
+        standard = self.standard[units]
+        trials = max(1, _ROWS_AT_ONCE // standard.shape[0])
+        for start in range(0, sources.size, trials):
+            zones = np.repeat(self.experiment.zones[np.newaxis], sources[start : start + trials].size, axis=0)
+            zones[np.arange(len(zones)), sources[start : start + trials]] *= factors[start : start + trials]
+            x = np.stack([self.experiment.errors.deviations(standard, own) for own in zones])
+            evaluation = self.experiment.response(x.reshape(-1, standard.shape[1]))
+            yield evaluation.values[:, 0].reshape(x.shape[:2]), evaluation.good.reshape(x.shape[:2])
 
     def _require_few_failures(
         self,
@@ -220,9 +190,10 @@ class _Openings:
         failed = np.count_nonzero(~good, axis=1)
         worst = int(failed.argmax())
         if failed[worst] > self.experiment.largest_failed_share * good.shape[1]:
+            name = self.experiment.errors.active[sources[worst]].name
             raise SolveError(
                 f"Inverse sensitivity: {failed[worst]} of {good.shape[1]} units have no usable answer with "
-                f"{self.errors.active[sources[worst]].name} at {factors[worst]:.4g} times its zone; allowed is "
+                f"{name} at {factors[worst]:.4g} times its zone; allowed is "
                 f"{self.experiment.largest_failed_share:.4g} of them, because more would bias the quantile."
             )
 
@@ -235,7 +206,7 @@ def _bracket(
     These are two factors per source with the limit between their quantiles, then quantile less limit at both.
     """
     trials = [2.0, _LARGEST_FACTOR] if now <= limit else [0.0]
-    left = np.arange(len(openings.errors.active))
+    left = np.arange(len(openings.experiment.errors.active))
     if now > limit:
         left = left[openings.may_repair(left, limit)]
     near, near_excess, found = 1.0, np.full(left.size, now - limit), []
@@ -258,13 +229,7 @@ def _bracket(
 
 
 def _squared(excess: Float[np.ndarray, " found"], limit: float) -> Float[np.ndarray, " found"]:
-    """Return quantile² less limit² with the sign of the excess, or the excess where no limit above 0 leaves a square.
-
-    Examples
-    --------
-    >>> _squared(np.array([1.0, -3.0, -9.0]), 3.0).tolist()
-    [7.0, -9.0, -9.0]
-    """
+    """Return quantile² less limit² with the sign of the excess, or the excess where no limit above 0 has a square."""
     return np.maximum(limit + excess, 0.0) ** 2 - limit**2 if limit > 0.0 else excess
 
 
@@ -287,7 +252,7 @@ def _crossings(
         left = left[np.abs(excess) > _SAME * abs(limit)]
         if not left.size:
             return fresh, quantiles
-    name = openings.errors.active[sources[left[0]]].name
+    name = openings.experiment.errors.active[sources[left[0]]].name
     raise SolveError(f"Inverse sensitivity: the quantile jumps over the limit at {fresh[left[0]]:.6g} of {name}.")
 
 

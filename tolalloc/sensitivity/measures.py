@@ -13,7 +13,7 @@ from tolalloc.capability.monte_carlo import MonteCarlo, OneSided, monte_carlo
 from tolalloc.capability.yield_at_limit import YieldAtLimit, yield_at_limit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.models.model import KeepsTables, Model, Response, ResponseWithDerivatives, derived
+from tolalloc.models.model import KeepsTables, Model, Response, derived
 from tolalloc.running.chunks import one_blas_thread
 from tolalloc.running.progress import RunRecord
 from tolalloc.sensitivity.centring import centring
@@ -117,20 +117,15 @@ class Measures:
         What is uncertain of the model is among what is ranked. Blocks are added for the order of what drives the
         leading output, so that alone is asked for in those after the first number.
         """
-        joint, outputs = self._with_joint, self._with_uncertain((*self.outputs, *waves))
+        joint = replace(self.errors, joint=self.model.uncertain) if self.model.uncertain else self.errors
         return sobol_indices(
-            self.experiment("sobol", outputs, joint),
+            self.experiment("sobol", self._with_uncertain((*self.outputs, *waves)), joint),
             self.effort.sobol,
             ranked=tuple(self.limits),
             factor_groups=joint.block_of_column if self.by == BY_SOURCE else joint.dimension_of_column,
             further=self._with_uncertain,
             cheap=cheap,
         )
-
-    @property
-    def _with_joint(self) -> ErrorModel:
-        """The sources of the drawing and what is uncertain of the model."""
-        return replace(self.errors, joint=self.model.uncertain) if self.model.uncertain else self.errors
 
     def _with_uncertain(self, outputs: tuple[str, ...]) -> Response:
         return self.model.with_uncertain(outputs) if self.model.uncertain else self.model.reading(outputs)
@@ -148,10 +143,6 @@ class Measures:
         if not self.errors.is_correlated or self.errors.compensators:
             return None
         return shapley_effects(self.experiment("shapley", self.response), self.effort.permutations)
-
-    def derived(self, sample: MonteCarlo) -> ResponseWithDerivatives:
-        """Return the leading output with its derivatives, exact ones if the model knows them."""
-        return derived(self.model, self.leading, sample.x[sample.evaluation.good].std(axis=0))
 
     def reject(self, sample: MonteCarlo) -> TargetSensitivity:
         """Return what the units of a sample beyond the limits share."""
@@ -220,9 +211,9 @@ def rank(asked: Measures, record: RunRecord) -> RankingResult:
             effect, cheap = measures.uncertain(sample), measures.cheap(sample)
             sobol = measures.sobol(tuple(name for names in spectra.values() for name in names), cheap)
         with record.stage("other measures"):
-            derived = measures.derived(sample)
             shapley = measures.shapley()
-            local = local_derivatives(own("local", derived), effort.derivative_units)
+            slopes = derived(measures.model, measures.leading, sample.x[sample.evaluation.good].std(axis=0))
+            local = local_derivatives(own("local", slopes), effort.derivative_units)
             leading = own("centring", measures.response)
             centre = centring(leading, sample, measures.limits[measures.leading], local)
             classical = classical_estimate(own("classical", measures.response))

@@ -10,10 +10,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.stats import norm, rankdata
 
+from tolalloc.capability.indices import require_share
 from tolalloc.exceptions import InputError
 
 _CONFIDENCE = 0.9
 """Share of resamples that makes an order count, and that an interval holds [-]."""
+_TAILS = (1 - _CONFIDENCE) / 2, (1 + _CONFIDENCE) / 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,9 +25,6 @@ class Neighbours:
     # Positions of the two sources [-]
     before: int
     after: int
-    # Difference of their indices, and its standard deviation over the resamples [-]
-    difference: float
-    deviation: float
     probability: float  # Share of resamples in which they have this order [-]
     separated: bool  # Whether that share reaches 0.9
     # Blocks that would have to be added to tell them apart, 0 if they are, none if they are equal or have few [-]
@@ -65,11 +64,8 @@ class SourceRanking:
     def neighbours(self) -> tuple[Neighbours, ...]:
         """Sources that follow each other, largest total index first, and what would tell them apart.
 
-        Notes
-        -----
         The blocks to add are an extrapolation: they take the difference for the true one, and its distribution for a
-        normal one whose variance falls with one over the blocks. A difference that is itself doubtful makes them so
-        too.
+        normal one whose variance falls with one over the blocks.
 
         References
         ----------
@@ -80,14 +76,14 @@ class SourceRanking:
             apart = self.total_resamples[:, leading] - self.total_resamples[:, following]
             difference, deviation = float(self.total[leading] - self.total[following]), float(apart.std(ddof=1))
             probability = float(((apart > 0).mean() + (apart >= 0).mean()) / 2)
-            separated, known = probability >= _CONFIDENCE, not self.few & {leading, following}
-            more = _more_blocks(difference, deviation, self.blocks) if known else None
+            separated, more = probability >= _CONFIDENCE, None
+            if difference > 0 and not self.few & {leading, following}:
+                needed = self.blocks * (float(norm.ppf(_CONFIDENCE)) * deviation / difference) ** 2
+                more = max(1, int(np.ceil(needed)) - self.blocks)
             found.append(
                 Neighbours(
                     before=leading,
                     after=following,
-                    difference=difference,
-                    deviation=deviation,
                     probability=probability,
                     separated=separated,
                     more_blocks=0 if separated else more,
@@ -98,34 +94,24 @@ class SourceRanking:
     def among_first(self, count: int) -> Float[np.ndarray, " source"]:
         """Return the share of resamples in which each source is among the first ``count`` [-]."""
         _require_places(count, len(self.sources))
-        return np.asarray((ranks(self.total_resamples) <= count).mean(axis=0))
+        return np.asarray((rankdata(-self.total_resamples, "ordinal", axis=1) <= count).mean(axis=0))
 
 
 def share_interval(
     resamples: Float[np.ndarray, "resample source"], unseen: Float[np.ndarray, " source"] | float = 0.0
 ) -> Float[np.ndarray, "2 source"]:
-    """Return the two-sided 90 % interval of shares of a variance, which lie within 0 and 1 [-].
-
-    Efron & Tibshirani 1993, ch. 13, as `percentile_interval`.
-
-    Examples
-    --------
-    >>> share_interval(np.linspace(-0.2, 0.8, 101)[:, np.newaxis])[:, 0].round(3).tolist()
-    [0.0, 0.75]
-    """
-    return np.asarray(np.clip(percentile_interval(resamples, unseen=unseen), 0.0, 1.0))
+    """Return the `percentile_interval` of shares of a variance, which lie within 0 and 1 [-]."""
+    return np.asarray(np.clip(percentile_interval(resamples, unseen), 0.0, 1.0))
 
 
 def percentile_interval(
-    resamples: Float[np.ndarray, "resample source"],
-    confidence: float = 0.9,
-    unseen: Float[np.ndarray, " source"] | float = -np.inf,
+    resamples: Float[np.ndarray, "resample source"], unseen: Float[np.ndarray, " source"] | float = -np.inf
 ) -> Float[np.ndarray, "2 source"]:
-    """Return the two-sided percentile interval of every index, from 0 to what is unseen if that is given and more [-].
+    """Return the two-sided 90 % interval of every index, from 0 to what is unseen if that is given and more [-].
 
     References
     ----------
-    Efron & Tibshirani 1993, ch. 13: the quantiles (1 ∓ confidence)/2 of the resamples. For 100 resamples or more.
+    Efron & Tibshirani 1993, ch. 13: the quantiles 5 % and 95 % of the resamples. For 100 resamples or more.
     What is unseen: `tolalloc.sensitivity.saltelli.unseen`.
 
     Examples
@@ -133,21 +119,8 @@ def percentile_interval(
     >>> percentile_interval(np.linspace(0.0, 1.0, 101)[:, np.newaxis])[:, 0].round(3).tolist()
     [0.05, 0.95]
     """
-    low, high = np.quantile(resamples, _tails(confidence), axis=0)
+    low, high = np.quantile(resamples, _TAILS, axis=0)
     return np.array([np.where(unseen > high, 0.0, low), np.maximum(high, unseen)])
-
-
-def ranks(resamples: Float[np.ndarray, "resample source"]) -> Int[np.ndarray, "resample source"]:
-    """Return the rank of every source in every resample, 1 for the largest; the earlier one of equals leads [-].
-
-    rank(j) = 1 + number of larger ones + number of equal ones before it (own derivation).
-
-    Examples
-    --------
-    >>> ranks(np.array([[0.2, 0.5, 0.5]])).tolist()
-    [[3, 1, 2]]
-    """
-    return np.asarray(rankdata(-resamples, "ordinal", axis=1))
 
 
 def rank_interval(resamples: Float[np.ndarray, "resample source"]) -> Int[np.ndarray, "2 source"]:
@@ -163,61 +136,18 @@ def rank_interval(resamples: Float[np.ndarray, "resample source"]) -> Int[np.nda
     >>> rank_interval(np.array([[0.2, 0.5]] * 99 + [[0.6, 0.5]])).tolist()
     [[2, 1], [2, 1]]
     """
-    ends = zip(("min", "max"), _tails(_CONFIDENCE), strict=True)
+    ends = zip(("min", "max"), _TAILS, strict=True)
     return np.array(
         [np.quantile(rankdata(-resamples, way, axis=1), at, axis=0, method="inverted_cdf") for way, at in ends], int
     )
-
-
-def before(resamples: Float[np.ndarray, "resample source"]) -> Float[np.ndarray, "source source"]:
-    """Return the share of resamples in which the row's source is larger than the column's; equals count half [-].
-
-    P(i > j) + P(i = j)/2 over paired draws from their errors (own derivation); for 100 resamples or more.
-
-    Examples
-    --------
-    >>> before(np.array([[0.2, 0.5], [0.2, 0.2]])).tolist()
-    [[0.5, 0.25], [0.75, 0.5]]
-    """
-    columns = resamples.T
-    return np.stack([((own > columns).mean(axis=1) + (own >= columns).mean(axis=1)) / 2 for own in columns])
 
 
 def indistinguishable_from_zero(resamples: Float[np.ndarray, "resample source"]) -> Bool[np.ndarray, " source"]:
     """Return which indices are, with one-sided 95 % confidence, indistinguishable from 0: no negative share is read.
 
     Quantile of 5 % of the draws ≤ 0: Efron & Tibshirani 1993, ch. 13; for 100 resamples or more.
-
-    Notes
-    -----
-    A total index is a mean of squares: it is flagged only if the output does not depend on the source at all.
-
-    Examples
-    --------
-    >>> indistinguishable_from_zero(np.array([[-0.01, 0.2], [0.03, 0.3]])).tolist()
-    [True, False]
     """
     return np.asarray(np.quantile(resamples, 1 - 0.95, axis=0) <= 0)
-
-
-def _more_blocks(difference: float, deviation: float, blocks: int) -> int | None:
-    """Return the blocks to add until the confidence is reached, at least one; none if the indices are equal [-]."""
-    if difference <= 0:
-        return None
-    needed = blocks * (float(norm.ppf(_CONFIDENCE)) * deviation / difference) ** 2
-    return max(1, int(np.ceil(needed)) - blocks)
-
-
-def _tails(confidence: float) -> tuple[float, float]:
-    """Return the shares below the ends of a two-sided interval [-]."""
-    _require_confidence(confidence)
-    return (1 - confidence) / 2, (1 + confidence) / 2
-
-
-def _require_confidence(value: float) -> None:
-    """Raise unless a confidence lies between 0 and 1."""
-    if not 0 < value < 1:
-        raise InputError.at("ranking", "confidence", value, "a number between 0 and 1")
 
 
 def _require_places(count: int, sources: int) -> None:
@@ -269,21 +199,19 @@ def until_converged(
     Parameters
     ----------
     resampled
-        Gives the indices for a number of blocks; it may keep the answers of the blocks that it has had.
+        Gives the indices for a number of blocks.
     groups
         Group of each source; sources of one group may change places.
     count
         How many of the first sources must keep their order [-].
     start, limit
         First and largest number of blocks [-].
-    probability
-        Share of resamples that must have the order of the estimate [-].
 
     Notes
     -----
     Sources of one group share a tolerance, such as the pitch of both discs: their indices are often equal, so that
-    no number of blocks would settle an order between them, and no drawing needs one. Looking several times makes a stop
-    by chance likelier than one look does; the history shows whether the order was the same before.
+    no number of blocks would settle an order between them. Looking several times makes a stop by chance likelier than
+    one look does; the history shows whether the order was the same before.
 
     Examples
     --------
@@ -295,7 +223,7 @@ def until_converged(
     >>> until_converged(lambda blocks: same, ["a", "b"], 2, start=64, limit=64).stable
     False
     """
-    _require_confidence(probability)
+    require_share("ranking", "confidence", probability)
     if not 2 <= start <= limit:
         raise InputError.at("ranking", "first number of blocks", start, f"2 to the limit {limit}")
     history, names = list[Step](), np.array(list(groups))

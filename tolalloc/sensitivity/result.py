@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tolalloc.capability.indices import Capability, Limits, QuantileInterval, capability, quantile_interval
+from tolalloc.capability.indices import Capability, Interval, Limits, capability, quantile_interval
 from tolalloc.capability.monte_carlo import MonteCarlo, OneSided, ProcessUncertainty, UncertaintyOf, Yield, kept_at_once
 from tolalloc.capability.yield_at_limit import YieldAtLimit
 from tolalloc.drawings.error_model import ErrorModel
@@ -36,7 +36,7 @@ class OutputCapability:
     deviation: float
     least: float
     most: float
-    quantile: QuantileInterval  # Quantile at the target yield with its 95 % interval [output]
+    quantile: Interval  # Quantile at the target yield with its 95 % interval [output]
     limits: Limits | None  # Its limits, if it has any [output]
     inside: Yield | None  # Share that keeps them; units without an answer count as outside
     capability: Capability | None  # Indices; none without limits, or where the output does not vary
@@ -108,8 +108,7 @@ class RankingResult:
 
         That analysis gives the indices before a control variate corrects them.
         """
-        assert self.sobol.solved is not None
-        return self.sobol.solved.to_salib()
+        return self.sobol.to_salib()
 
     @cached_property
     def capabilities(self) -> tuple[OutputCapability, ...]:

@@ -90,16 +90,21 @@ class SaltelliDesign:
         """Samples of a block [-]."""
         return (1 + self.second_order) * len(self.names) + 2
 
-    def chunks(self, start: int, stop: int, only: tuple[str, ...] = ()) -> Iterator[Float[np.ndarray, "sample column"]]:
+    def chunks(self, start: int, stop: int, only: str = "") -> Iterator[Float[np.ndarray, "sample column"]]:
         """Yield the samples of the blocks from ``start`` up to but not ``stop``, uniform numbers in [0, 1).
 
-        If players are named, of every block only the samples AB of these, in this order.
+        If a group is named, of every block only the sample AB of it.
         """
-        at_once = 1 << max(0, (SAMPLES_AT_ONCE // (len(only) or self.samples_per_block)).bit_length() - 1)
-        points, exchanged = self._points(start, stop), self._own[[self.names.index(name) for name in only]]
+        at_once = 1 << max(0, (SAMPLES_AT_ONCE // (1 if only else self.samples_per_block)).bit_length() - 1)
+        points = self._points(start, stop)
         for first in range(0, stop - start, at_once):
             a, b = points[:, first : first + at_once]
-            yield np.where(exchanged, b, a).reshape(-1, a.shape[-1]) if only else self._samples(a, b)
+            if only:
+                yield np.where(self._own[self.names.index(only)], b, a).reshape(-1, a.shape[-1])
+            else:  # in SALib's order
+                pairs = [(a, b), (b, a)][: 1 + self.second_order]
+                between = [np.where(self._own, inner, outer) for outer, inner in pairs]
+                yield np.concatenate([a, *between, b], axis=1).reshape(-1, a.shape[-1])
 
     @property
     def problem(self) -> dict[str, Any]:
@@ -132,14 +137,6 @@ class SaltelliDesign:
     def _own(self) -> Bool[np.ndarray, "group column"]:
         """Which columns belong to each factor group."""
         return np.asarray(np.array(self.factor_groups) == np.array(self.names)[:, np.newaxis])
-
-    def _samples(
-        self, a: Float[np.ndarray, "block 1 column"], b: Float[np.ndarray, "block 1 column"]
-    ) -> Float[np.ndarray, "sample column"]:
-        """Return the samples of blocks, in SALib's order."""
-        exchanged = [(a, b), (b, a)][: 1 + self.second_order]
-        between = [np.where(self._own, inner, outer) for outer, inner in exchanged]
-        return np.concatenate([a, *between, b], axis=1).reshape(-1, len(self.factor_groups))
 
 
 def _problem(names: Sequence[str], groups: Sequence[str]) -> dict[str, Any]:
@@ -238,12 +235,8 @@ def saltelli_indices(
         Answers of A, AB₁ … AB_D, if asked for BA₁ … BA_D, and B, block by block, as SALib orders them.
     sources
         Groups of columns that were exchanged, D [-].
-    seeds
-        Node of the seed tree that draws the resamples.
     replicates
         Replicates of the design, round which its blocks go; random blocks may be divided among any number [-].
-    second_order
-        Whether the design has the BA samples.
     resamples
         Draws from the errors of the indices [-].
     largest_failed_share
@@ -253,17 +246,13 @@ def saltelli_indices(
 
     Notes
     -----
-    Replicates are independent, blocks are not: the indices without one replicate at a time say how far those of all of
-    them are off, and what a resample holds is drawn from that error (`drawn`). Indices without a replicate whose rest
-    does not vary are 0, as in SALib.
+    Indices without a replicate whose rest does not vary are 0, as in SALib.
 
     References
     ----------
-    First order: Saltelli et al. 2010, Table 2 (b), mean B·(AB_j − A) / V. Total: Jansen 1999, mean (A − AB_j)² / 2V.
-    Second order: Saltelli 2002, mean (BA_j·AB_k − A·B) / V − S_j − S_k. V is the variance of A and B together, and all
-    answers of an output are centred and divided by their standard deviation first, as SALib does: the first and the
-    second order depend on it. Error: the jackknife, Efron & Tibshirani 1993, ch. 11, over independent scramblings, Owen
-    1998.
+    Indices: `salib_estimates`. V is the variance of A and B together, and all answers of an output are centred and
+    divided by their standard deviation first, as SALib does: the first and the second order depend on it. Error: the
+    jackknife, Efron & Tibshirani 1993, ch. 11, over independent scramblings, Owen 1998.
 
     Examples
     --------
@@ -288,16 +277,22 @@ def saltelli_indices(
     counts = without_each(replicate, present.size)
     weights = t_weights(present.size, resamples, seeds)
     with one_blas_thread():
-        found = [
-            _of_output(values[:, :, at][whole], counts, sources, second_order=second_order)
-            for at in range(values.shape[2])  # one copy in memory at a time
-        ]
+        found, shown = [], []
+        for at in range(values.shape[2]):  # one copy in memory at a time
+            answers = values[:, :, at][whole]
+            shown.append(_shown(answers, sources))
+            found.append(one_pass(np.ascontiguousarray(answers.T[np.newaxis]), counts, sources))
+            if found[-1][0][0]:  # SALib's estimates in the first row, which leaves out no replicate
+                for own, estimate in zip(
+                    found[-1][2:], salib_estimates(answers.ravel(), sources, second_order), strict=True
+                ):
+                    own[0, 0] = estimate
         varies, variance, first, total, second = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        plain, shown = total, [_shown(values[:, :, at][whole], sources) for at in range(values.shape[2])]
+        plain = total
         if control is not None:
             own, many = (answers.reshape(-1, size, values.shape[2]) for answers in (control.own, control.many))
             first, total = first.copy(), total.copy()
-            for at in np.flatnonzero(varies):
+            for at in np.flatnonzero(varies).tolist():
                 both, mine = (values[:, :, at][whole], own[:, :, at][whole]), (first[at], total[at], shown[at])
                 first[at], total[at], shown[at] = _controlled(*both, many[:, :, at], mine, counts, sources)
     return SaltelliIndices(
@@ -328,22 +323,6 @@ _Rows = tuple[
     Float[np.ndarray, "output row pair"],
 ]
 """Which outputs vary, and their variance, first-order, total and second-order indices; the first row is no resample."""
-
-
-def _of_output(
-    answers: Float[np.ndarray, "block sample"],
-    counts: Float[np.ndarray, "row block"],
-    sources: int,
-    *,
-    second_order: bool,
-) -> _Rows:
-    """Return the indices of one output: SALib's estimates in the first row, then those without one replicate."""
-    found = one_pass(np.ascontiguousarray(answers.T[np.newaxis]), counts, sources)
-    varies, _, *indices = found
-    if varies[0]:
-        for own, estimate in zip(indices, salib_estimates(answers.ravel(), sources, second_order), strict=True):
-            own[0, 0] = estimate
-    return found
 
 
 def _controlled(
@@ -408,10 +387,6 @@ def _spread(rows: Float[np.ndarray, "output row source"]) -> Float[np.ndarray, "
 
 def without_each(replicate: Int[np.ndarray, " block"], replicates: int) -> Float[np.ndarray, "row block"]:
     """Return how often each row counts each block: all in the first one, then those of all replicates but one [-].
-
-    References
-    ----------
-    Efron & Tibshirani 1993, ch. 11: the jackknife.
 
     Examples
     --------
@@ -485,14 +460,7 @@ def salib_estimates(
 ) -> tuple[Float[np.ndarray, " source"], Float[np.ndarray, " source"], Float[np.ndarray, " pair"]]:
     """Return the first-order, total and second-order indices that SALib estimates from good answers [-].
 
-    Parameters
-    ----------
-    answers
-        Answers of A, AB₁ … AB_D, if asked for BA₁ … BA_D, and B, block by block [output].
-    sources
-        Groups of columns that were exchanged, D [-].
-    second_order
-        Whether the design has the BA samples.
+    The answers stand as those of `saltelli_indices`, for D sources with or without BA samples.
 
     References
     ----------
@@ -548,17 +516,9 @@ def unseen(parts: Float[np.ndarray, "block *output source"]) -> Float[np.ndarray
 
 
 def resample_counts(blocks: int, resamples: int, seeds: SeedTree) -> Float[np.ndarray, "row block"]:
-    """Return how often each resample holds each block [-]; the first row is no resample and holds each once.
+    """Return how often each bootstrap resample holds each block [-]; the first row holds each once.
 
-    References
-    ----------
-    Efron & Tibshirani 1993, ch. 6: a bootstrap resample as its counts.
-
-    Examples
-    --------
-    >>> counts = resample_counts(4, 2, SeedTree(1))
-    >>> counts[0].tolist(), counts.sum(axis=1).tolist()
-    ([1.0, 1.0, 1.0, 1.0], [4.0, 4.0, 4.0])
+    Efron & Tibshirani 1993, ch. 6.
     """
     generator = seeds.generator()
     counts = np.ones((resamples + 1, blocks))
@@ -576,8 +536,7 @@ def one_pass(
 
     References
     ----------
-    As `salib_estimates`: S_j = mean B·(AB_j − A)/V (Saltelli et al. 2010), T_j = mean (A − AB_j)²/2V (Jansen 1999),
-    S_jk = mean (BA_j·AB_k − A·B)/V − S_j − S_k (Saltelli 2002).
+    S_j, T_j and S_jk as of `salib_estimates` (Saltelli et al. 2010, Jansen 1999, Saltelli 2002).
 
     Examples
     --------

@@ -26,18 +26,13 @@ _PIVOT = 1e-10
 class ShapleyEffects:
     """Shapley effects of every source on every output."""
 
-    # Names, in the order of all arrays
-    sources: tuple[str, ...]
-    outputs: tuple[str, ...]
+    sources: tuple[str, ...]  # Names, in the order of all arrays
     # Share of the output's variance; the shares of one output add up to 1. Not a number for an output that is the same
     # for all samples [-].
     effects: Float[np.ndarray, "output source"]
     resamples: Float[np.ndarray, "output resample source"]  # The same from bootstrap resamples of the permutations [-]
     unseen: Float[np.ndarray, "output source"]  # Share possible where too few permutations show a source, else 0 [-]
-    # Permutations used, and permutations dropped because one of their samples failed [-]
-    permutations: int
-    dropped: int
-    samples: int  # Samples evaluated [-]
+    dropped: int  # Permutations dropped because one of their samples failed [-]
 
     def interval(self, output: int) -> Float[np.ndarray, "2 source"]:
         """Return the 90 % interval of the effects on an output [-]."""
@@ -51,12 +46,7 @@ class ShapleyEffects:
 def shapley_effects(experiment: Experiment[Response], permutations: int) -> ShapleyEffects:
     """Return the Shapley effects of all varying sources on all outputs, from the same samples.
 
-    Parameters
-    ----------
-    experiment
-        Its sources may depend on each other; all columns of a source go together.
-    permutations
-        Random orders of the sources; the response is called (sources + 1) times as often [-].
+    All columns of a source go together; the response is asked for (sources + 1) samples of every permutation.
 
     Notes
     -----
@@ -102,13 +92,10 @@ def shapley_effects(experiment: Experiment[Response], permutations: int) -> Shap
     whole = added.mean(axis=0).sum(axis=1, keepdims=True)
     return ShapleyEffects(
         sources=names,
-        outputs=response.outputs,
         effects=effects[:, 0],
         resamples=effects[:, 1:],
         unseen=np.divide(possible, whole, out=np.zeros_like(possible), where=whole > 0.0),
-        permutations=used,
         dropped=permutations - used,
-        samples=permutations * (len(names) + 1),
     )
 
 
@@ -136,8 +123,6 @@ def _conditional_factor(
 ) -> Float[np.ndarray, "order source source"]:
     """Return roots of the correlation in which a source takes numbers of its own and of the sources behind it [-].
 
-    Notes
-    -----
     Cholesky's factor in the reverse of each order. Where the sources behind fix a source, it has no number of its own.
     """
     left = np.repeat(correlation[np.newaxis], position.shape[0], axis=0)

@@ -8,7 +8,7 @@ counted; ``conf`` takes the blocks of a Sobol' sequence for independent, so inte
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -44,8 +44,6 @@ class SourceIndices(SourceRanking):
     pairs: tuple[tuple[int, int], ...]
     second: Float[np.ndarray, " pair"]
     second_resamples: Float[np.ndarray, "resample pair"]
-    dropped: int  # Saltelli blocks dropped because one of their samples failed [-]
-    samples: int  # Samples evaluated [-]
 
     @property
     def first_interval(self) -> Float[np.ndarray, "2 source"]:
@@ -63,26 +61,6 @@ class SourceIndices(SourceRanking):
     def first_is_zero(self) -> Bool[np.ndarray, " source"]:
         """Which first-order indices are indistinguishable from 0 and must not be printed as a negative share."""
         return indistinguishable_from_zero(self.first_resamples)
-
-
-@dataclass(frozen=True, kw_only=True)
-class SolvedDesign:
-    """A Saltelli design whose samples are solved."""
-
-    design: SaltelliDesign  # Which samples they are
-    answers: Evaluation  # The first output, block by block
-
-    def to_salib(self) -> SalibArrays:
-        """Return the design and its answers as SALib takes them; blocks with a failed sample are left out whole."""
-        size = self.design.samples_per_block
-        whole = np.repeat(self.answers.good.reshape(-1, size).all(axis=1), size)
-        samples = np.concatenate(list(self.design.chunks(0, whole.size // size)))
-        return SalibArrays(
-            problem=self.design.problem,
-            samples=samples[whole],
-            outputs=self.answers.values[whole, 0],
-            second_order=self.design.second_order,
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,7 +91,8 @@ class SobolAnalysis:
     samples: int  # Samples evaluated [-]
     first_blocks: int  # Saltelli blocks used for the other outputs, and for the groups that came out small [-]
     together: SourceIndices | None = None  # Indices of the followed output with the small groups as one, `OTHERS`
-    solved: SolvedDesign | None = None  # What the indices of the followed output come from, where it is kept
+    # What the indices of the followed output come from, where it is kept: the design, and the output block by block
+    solved: tuple[SaltelliDesign, Evaluation] | None = None
 
     @property
     def blocks(self) -> int:
@@ -138,8 +117,17 @@ class SobolAnalysis:
 
     @cached_property
     def overall(self) -> SourceRanking:
-        """The ranking over all outputs."""
-        return _overall_ranking(self.sources, self.outputs, self.ranked, self.indices)
+        """The ranking over those outputs that count and vary: the total index of a source is its largest one."""
+        varying = np.flatnonzero(self.indices.varies & np.isin(self.outputs, self.ranked))
+        total = self.indices.total[varying]
+        return SourceRanking(
+            sources=self.sources,
+            total=total.max(axis=0),
+            total_resamples=self.indices.total_resamples[varying].max(axis=0),
+            blocks=self.blocks,
+            drives=tuple(self.outputs[varying[at]] for at in total.argmax(axis=0)),
+            unseen=self.indices.unseen[varying].max(axis=0),
+        )
 
     def position(self, output: str | int) -> int:
         """Return the position of an output [-]."""
@@ -151,6 +139,19 @@ class SobolAnalysis:
             raise InputError.at("Sobol indices", "output", output, f"0 to {len(self.outputs) - 1}")
         return output
 
+    def to_salib(self) -> SalibArrays:
+        """Return the design and its answers as SALib takes them; blocks with a failed sample are left out whole."""
+        assert self.solved is not None
+        design, answers = self.solved
+        size = design.samples_per_block
+        whole = np.repeat(answers.good.reshape(-1, size).all(axis=1), size)
+        return SalibArrays(
+            problem=design.problem,
+            samples=np.concatenate(list(design.chunks(0, whole.size // size)))[whole],
+            outputs=answers.values[whole, 0],
+            second_order=design.second_order,
+        )
+
     def narrowed(self, output: str | int) -> float:
         """Return the median over all sources of how wide an interval is over that without a control variate [-]."""
         return float(np.median(self.indices.narrowed[self.position(output)]))
@@ -160,7 +161,7 @@ class SobolAnalysis:
         at = self.position(output)
         followed = self.outputs[at] in self.followed
         blocks, few = (self.blocks, self.small) if followed else (self.first_blocks, frozenset[int]())
-        return _indices_of(self.indices, at, self.outputs[at], self.sources, blocks, self.samples, few)
+        return _indices_of(self.indices, at, self.outputs[at], self.sources, blocks, few)
 
 
 def _indices_of(
@@ -169,10 +170,9 @@ def _indices_of(
     output: str,
     sources: tuple[str, ...],
     blocks: int,
-    samples: int,
     few: frozenset[int] = frozenset(),
 ) -> SourceIndices:
-    """Return the indices at one place, of an output from so many blocks of an analysis with so many samples [-]."""
+    """Return the indices at one place, of an output from so many blocks."""
     if not found.varies[at]:
         raise ConstantOutputError(f"Sobol indices: {output} is the same for all samples; no source can be ranked.")
     return SourceIndices(
@@ -185,30 +185,8 @@ def _indices_of(
         second=found.second[at],
         second_resamples=found.second_resamples[at],
         blocks=blocks,
-        dropped=found.dropped,
-        samples=samples,
         unseen=found.unseen[at],
         few=few,
-    )
-
-
-def _overall_ranking(
-    sources: tuple[str, ...], outputs: tuple[str, ...], ranked: tuple[str, ...], indices: SaltelliIndices
-) -> SourceRanking:
-    """Return the ranking over those outputs that count and vary: the total index of a source is its largest one."""
-    varying = np.flatnonzero(indices.varies & np.isin(outputs, ranked))
-    if not varying.size:
-        raise ConstantOutputError(
-            "Sobol indices: every output is the same for all samples, so no source can be ranked."
-        )
-    total = indices.total[varying]
-    return SourceRanking(
-        sources=sources,
-        total=total.max(axis=0),
-        total_resamples=indices.total_resamples[varying].max(axis=0),
-        blocks=indices.blocks,
-        drives=tuple(outputs[varying[at]] for at in total.argmax(axis=0)),
-        unseen=indices.unseen[varying].max(axis=0),
     )
 
 
@@ -379,7 +357,8 @@ def sobol_indices(
         columns=errors.columns,
         replicates=min(REPLICATES, effort.start),
     )
-    blocks = _Blocks(experiment, design, effort, counted, further or (lambda _: experiment.response), cheap)
+    further = further or (lambda _: experiment.response)
+    blocks = _Blocks(experiment=experiment, design=design, effort=effort, counted=counted, further=further, cheap=cheap)
     shared = {source.name: source.dimension for source in errors.sources}  # the tolerance that a source may share
     convergence = until_converged(
         blocks.resampled,
@@ -399,7 +378,7 @@ def sobol_indices(
         samples=blocks.samples,
         first_blocks=blocks.first.blocks,
         together=blocks.together,
-        solved=SolvedDesign(design=blocks.design, answers=replace(blocks.answers, values=blocks.answers.values[:, :1])),
+        solved=(blocks.design, replace(blocks.answers, values=blocks.answers.values[:, :1])),
     )
 
 
@@ -409,27 +388,25 @@ _CHEAP_SAMPLES = 2**16
 """Samples of a cheap model at least, with which its own indices err by some 1e-4 where it is smooth [-]."""
 
 
+@dataclass(kw_only=True)
 class _Blocks:
     """Blocks that are solved when they are first asked for."""
 
-    first: SaltelliIndices  # Of all outputs and groups, from the first number of blocks
-    followed: Response  # What is asked of further blocks
-    answers: Evaluation  # Its outputs in all blocks of the design
+    experiment: Experiment[Response]
+    design: SaltelliDesign
+    effort: SobolEffort
+    counted: tuple[str, ...]
+    further: Callable[[tuple[str, ...]], Response]
+    cheap: Regression | None
+    samples: int = 0
+    first: SaltelliIndices = field(init=False)  # Of all outputs and groups, from the first number of blocks
+    last: SaltelliIndices | None = None  # Of the followed outputs and the groups of the present design
+    leading: int = 0  # Position of the first output that counts and varies
+    followed: Response = field(init=False)  # What is asked of further blocks
+    answers: Evaluation = field(init=False)  # Its outputs in all blocks of the design
 
-    def __init__(
-        self,
-        experiment: Experiment[Response],
-        design: SaltelliDesign,
-        effort: SobolEffort,
-        counted: tuple[str, ...],
-        further: Callable[[tuple[str, ...]], Response],
-        cheap: Regression | None,
-    ) -> None:
-        self.experiment, self.design, self.effort, self.counted = experiment, design, effort, counted
-        self.further, self.cheap = further, cheap
-        self.names, self.outputs = design.names, experiment.response.outputs
-        self.last: SaltelliIndices | None = None  # Of the followed outputs and the groups of the present design
-        self.samples = 0
+    def __post_init__(self) -> None:
+        self.names, self.outputs = self.design.names, self.experiment.response.outputs
 
     def resampled(self, blocks: int) -> Resampled:
         """Return the indices of the output whose order must become stable."""
@@ -443,8 +420,8 @@ class _Blocks:
             self.samples += more.status.size
             self.answers = Evaluation.joined([self.answers, more])
             self.last = self._indices(self.answers, self.followed.outputs)
-        found, at = self.indices, self.outputs.index(self._leading)
-        return found.total[at], found.total_resamples[at]
+        found = self.indices
+        return found.total[self.leading], found.total_resamples[self.leading]
 
     @property
     def indices(self) -> SaltelliIndices:
@@ -459,19 +436,9 @@ class _Blocks:
         """Indices of the followed output with the small groups as one; none where all are told apart."""
         if self.last is None or self.design.names == self.names:
             return None
-        at = self.followed.outputs.index(self._leading)
-        return _indices_of(self.last, at, self._leading, self.design.names, self.last.blocks, self.samples)
-
-    @property
-    def _leading(self) -> str:
-        """The first output that counts and varies, of those that count in the ranking over all."""
-        varies = dict(zip(self.outputs, self.first.varies, strict=True))
-        found = next((name for name in self.counted if varies[name]), None)
-        if found is None:
-            raise ConstantOutputError(
-                "Sobol indices: every output is the same for all samples, so no source can be ranked."
-            )
-        return found
+        leading = self.outputs[self.leading]
+        at = self.followed.outputs.index(leading)
+        return _indices_of(self.last, at, leading, self.design.names, self.last.blocks)
 
     @property
     def _places(self) -> list[int]:
@@ -482,19 +449,37 @@ class _Blocks:
         found = solved(self.experiment, self.experiment.response, self.design.chunks(0, blocks))
         self.samples = found.status.size
         self.first = self._indices(found, self.outputs)
-        self.followed = self.further((self._leading,))
+        varying = [at for at in map(self.outputs.index, self.counted) if self.first.varies[at]]
+        if not varying:
+            raise ConstantOutputError(
+                "Sobol indices: every output is the same for all samples, so no source can be ranked."
+            )
+        self.leading = varying[0]
+        self.followed = self.further((self.outputs[self.leading],))
         self.answers = replace(found, values=found.values[:, self._places])
 
     def _part(self) -> None:
-        """Part the largest groups from the rest, which is one group from here on."""
-        total = self.first.total[self.outputs.index(self._leading)]
+        """Part the largest groups from the rest, which is one group from here on.
+
+        The samples A and B are the same for any groups, and so are those in which a group that is in both designs is
+        exchanged: only those of the rest are solved.
+        """
+        total = self.first.total[self.leading]
         if self.effort.second_order or total.size <= LARGEST + 1:
             return
         largest = {self.names[at] for at in np.argsort(-total, kind="stable")[:LARGEST]}
         groups = tuple(own if own in largest else OTHERS for own in self.design.factor_groups)
         before, self.design = self.design, replace(self.design, factor_groups=groups)
-        self.answers, added = _exchanged(self.experiment, self.followed, before, self.answers, self.design)
-        self.samples += added
+        size, places = before.samples_per_block, {own: at for at, own in enumerate(before.columns_of_names, start=1)}
+        blocks = self.answers.status.size // size
+        more = solved(self.experiment, self.followed, self.design.chunks(0, blocks, only=OTHERS))
+        self.samples += more.status.size
+        order = [0, *(places.get(own, size) for own in self.design.columns_of_names), size - 1]
+        values, status = (
+            np.concatenate([known.reshape(blocks, size, -1), new.reshape(blocks, 1, -1)], axis=1)[:, order]
+            for known, new in ((self.answers.values, more.values), (self.answers.status, more.status))
+        )
+        self.answers = Evaluation(values=values.reshape(-1, values.shape[2]), status=status.reshape(-1))
 
     def _indices(self, answers: Evaluation, outputs: tuple[str, ...]) -> SaltelliIndices:
         blocks = answers.status.size // self.design.samples_per_block
@@ -506,28 +491,22 @@ class _Blocks:
             second_order=self.effort.second_order,
             resamples=self.effort.resamples,
             largest_failed_share=self.experiment.largest_failed_share,
-            control=_control(self.experiment, self.cheap, self.design, blocks, outputs),
+            control=self._control(blocks, outputs),
         )
 
-
-def _control(
-    experiment: Experiment[Response],
-    cheap: Regression | None,
-    design: SaltelliDesign,
-    blocks: int,
-    outputs: tuple[str, ...],
-) -> CheapAnswers | None:
-    """Return what a cheap model says of so many blocks and of many others; a constant of outputs that it has not."""
-    if cheap is None:
-        return None
-    needed = max(_CHEAP_TIMES * blocks, _CHEAP_SAMPLES // design.samples_per_block)
-    other = replace(design, seed=experiment.seeds.child("cheap").integer())
-    answers = []
-    for own, count in ((design, blocks), (other, 1 << (needed - 1).bit_length())):
-        known = solved(experiment, cheap, own.chunks(0, count)).values
-        places = [cheap.outputs.index(name) if name in cheap.outputs else known.shape[1] for name in outputs]
-        answers.append(np.column_stack([known, np.zeros(len(known))])[:, places])
-    return CheapAnswers(own=answers[0], many=answers[1])
+    def _control(self, blocks: int, outputs: tuple[str, ...]) -> CheapAnswers | None:
+        """Return what a cheap model says of so many blocks and of many others; a constant of outputs it has not."""
+        if self.cheap is None:
+            return None
+        needed = max(_CHEAP_TIMES * blocks, _CHEAP_SAMPLES // self.design.samples_per_block)
+        other = replace(self.design, seed=self.experiment.seeds.child("cheap").integer())
+        answers = []
+        for design, count in ((self.design, blocks), (other, 1 << (needed - 1).bit_length())):
+            known = solved(self.experiment, self.cheap, design.chunks(0, count)).values
+            own = self.cheap.outputs
+            places = [own.index(name) if name in own else known.shape[1] for name in outputs]
+            answers.append(np.column_stack([known, np.zeros(len(known))])[:, places])
+        return CheapAnswers(own=answers[0], many=answers[1])
 
 
 def solved(
@@ -537,31 +516,3 @@ def solved(
     errors = experiment.errors
     standard = (errors.standard_values(np.maximum(uniform, _HALF_STEP)) for uniform in chunks)
     return Evaluation.joined([response(experiment.deviations(own)) for own in standard])
-
-
-def _exchanged(
-    experiment: Experiment[Response],
-    response: Response,
-    before: SaltelliDesign,
-    answers: Evaluation,
-    after: SaltelliDesign,
-) -> tuple[Evaluation, int]:
-    """Return what a response says of the blocks of a design that are known of other groups, and the samples solved.
-
-    The samples A and B are the same for any groups, and so are those in which a group that is in both is exchanged:
-    only those of new groups are solved.
-    """
-    size = before.samples_per_block
-    blocks = answers.status.size // size
-    places = {columns: at + 1 for at, columns in enumerate(before.columns_of_names)}
-    named = dict(zip(after.names, after.columns_of_names, strict=True))
-    new = tuple(name for name, columns in named.items() if columns not in places)
-    values, status = answers.values.reshape(blocks, size, -1), answers.status.reshape(blocks, size)
-    if new:
-        more = solved(experiment, response, after.chunks(0, blocks, only=new))
-        values = np.concatenate([values, more.values.reshape(blocks, len(new), -1)], axis=1)
-        status = np.concatenate([status, more.status.reshape(blocks, -1)], axis=1)
-    added = iter(range(size, size + len(new)))
-    order = [0, *(places[own] if own in places else next(added) for own in named.values()), size - 1]
-    ordered = values[:, order].reshape(-1, answers.values.shape[1])
-    return Evaluation(values=ordered, status=status[:, order].reshape(-1)), blocks * len(new)

@@ -27,10 +27,9 @@ class TargetSensitivity:
     sources: tuple[str, ...]  # Names, in the order of all arrays
     threshold: float  # Output beyond which a unit counts as outside [output]
     is_limit: bool  # Whether the threshold is the limit; if not, it cuts off the worst 5 % of the units
-    # Good units, how many of them are outside, and units without a usable answer, which are left out [-]
+    # Good units, and how many of them are outside [-]
     units: int
     outside: int
-    failed: int
     # First-order index of "is outside" given the measure that the drawing limits [-]
     first: Float[np.ndarray, " source"]
     first_resamples: Float[np.ndarray, "resample source"]  # The same from resamples [-]
@@ -79,16 +78,10 @@ def target_sensitivity(
 
     Parameters
     ----------
-    sample
-        Random units and their answers; the first output is analysed.
-    errors
-        The sources that the units were drawn from, at any zones.
     limit
-        Largest output allowed; unless enough units stand on either side, the worst 5 % are taken instead [output].
+        Largest first output allowed; unless enough units stand on either side, the worst 5 % are taken instead.
     resamples, permutations
         Bootstrap resamples, and random choices of units for the test of no effect [-].
-    largest_failed_share
-        Share of the units that may fail [-].
 
     Notes
     -----
@@ -139,7 +132,6 @@ def target_sensitivity(
         is_limit=is_limit,
         units=values.size,
         outside=int(np.count_nonzero(outside)),
-        failed=sample.failed,
         first=_first(tables),
         first_resamples=_first_resamples(tables, seeds.child("first"), resamples),
         lift=squares[outside].mean(axis=0) / squares.mean(axis=0),
@@ -154,8 +146,6 @@ def target_sensitivity(
 def limited_measures(errors: ErrorModel, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample source"]:
     """Return what the drawing limits, for every source, in such a way that it compares with the zone [m].
 
-    Notes
-    -----
     A size: its deviation from the middle. A position: twice the distance from the true one. Pitch and run-out: the
     range over a turn. Of like features the largest one counts. No drawing limits a joint source: for it, the root mean
     square of its standardised columns stands [-].

@@ -52,19 +52,8 @@ class UncertainEffect:
 def uncertain_effect(
     model: Model, output: str, x: Float[np.ndarray, "unit column"], seeds: SeedTree
 ) -> UncertainEffect:
-    """Return what the model's uncertain columns alone do to units, with the first order checked at ±2σ.
+    """Return what the model's uncertain columns alone do to good units, with the first order checked at ±2σ.
 
-    Parameters
-    ----------
-    model
-        What answers, to first order by `with_uncertain` and exactly by `changed`.
-    x
-        Good units, the first of which are taken.
-    seeds
-        Node of the seed tree, from which the directions of the changes come.
-
-    Notes
-    -----
     σ² = gᵀ·C·g to first order, g the gradient by the uncertain columns, C their covariance: JCGM 100:2008, eq. (13). It
     holds where `FirstOrderError.fails` is false.
     """
@@ -88,8 +77,6 @@ def first_order_error(
 
     For each of the joint changes of these columns the model is made anew.
 
-    Notes
-    -----
     e = g·Δ − (y(k + Δ) − y(k)), what Taylor's first order leaves: JCGM 100:2008, 5.1.2 [output].
 
     Examples

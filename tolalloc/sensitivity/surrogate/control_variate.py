@@ -35,12 +35,7 @@ _STRENGTHS = np.logspace(-3, 5, 9)
 def cheap_model(sample: MonteCarlo, columns: tuple[str, ...], outputs: tuple[str, ...]) -> Regression | None:
     """Return a regression of all outputs on products of the columns; none where the units are too few.
 
-    Parameters
-    ----------
-    sample
-        Solved units, random numbers of other blocks than those that will be corrected.
-    columns, outputs
-        Names of its columns and of its outputs.
+    The units have other random numbers than the blocks that will be corrected.
 
     Notes
     -----
@@ -76,10 +71,6 @@ def learnt(experiment: Experiment[Response], blocks: int) -> Regression | None:
     """Return the cheap model of an experiment, learnt from as many units of its own as so many blocks of it have.
 
     None where it has too many columns, or where so many blocks need no help: the cheap model has hardly more samples.
-
-    References
-    ----------
-    Hoerl & Kennard 1970, as `cheap_model`.
     """
     columns, units = experiment.errors.columns, units_to_learn(experiment.errors, blocks)
     if not units:
@@ -118,12 +109,7 @@ def optimal_weights(
 ) -> Float[np.ndarray, "number row"]:
     """Return with which weight the error of a cheap number corrects the own one, for every row of counts [-].
 
-    Parameters
-    ----------
-    own, cheap
-        What each block adds to the error of a number, and to that of the same number of the cheap model.
-    counts
-        How often each row counts each block [-].
+    Own and cheap are what each block adds to the error of a number, and to that of the cheap model's.
 
     Notes
     -----

@@ -45,15 +45,6 @@ def fit_quadratic_form(
 ) -> QuadraticForm:
     """Return the ridge regression on the standardised columns and all products of two.
 
-    Parameters
-    ----------
-    x, y
-        Columns and outputs of the units to learn from.
-    strength
-        Of the ridge: the square of a weight costs as much as so many squared errors [-].
-
-    Notes
-    -----
     The weights minimise Σ (y − ŷ)² + strength·Σ w²; strengths of 0 and up, 0 only with more units than terms.
 
     References
@@ -141,10 +132,8 @@ class BoxPolynomial:
 
     def derivatives(self, x: Float[np.ndarray, " variable"]) -> Float[np.ndarray, "output variable"]:
         """Return the derivatives of the outputs at one point by the variables [output/variable]."""
-        by_variable = [
-            self._slopes @ factor for factor in chebyshev.chebvander(self._scaled(x[np.newaxis])[0], self._top)
-        ]
         values = chebyshev.chebvander(self._scaled(x[np.newaxis])[0], self._top)
+        by_variable = [self._slopes @ factor for factor in values]
         columns = []
         for own in range(x.size):
             factors = [
@@ -163,11 +152,7 @@ class BoxPolynomial:
     def _slopes(self) -> Float[np.ndarray, "degree degree"]:
         """Derivative of each Chebyshev polynomial in terms of the others."""
         size = self._top + 1
-        slopes = np.zeros((size, size))
-        for degree in range(1, size):
-            own = chebyshev.chebder(np.eye(size)[degree])
-            slopes[degree, : own.size] = own
-        return slopes
+        return np.pad(chebyshev.chebder(np.eye(size), axis=1), ((0, 0), (0, 1)))[:, :size]
 
     def _scaled(self, x: Float[np.ndarray, "sample variable"]) -> Float[np.ndarray, "sample variable"]:
         """Return the variables on −1…1."""
@@ -177,25 +162,9 @@ class BoxPolynomial:
 def terms(
     x: Float[np.ndarray, "sample variable"], degrees: Int[np.ndarray, "term variable"]
 ) -> Float[np.ndarray, "sample term"]:
-    """Return the products of Chebyshev polynomials of every sample.
+    """Return the products of Chebyshev polynomials of every sample, of variables on −1…1 [-].
 
-    Parameters
-    ----------
-    x
-        Variables on −1…1 [-].
-    degrees
-        Degree of each term in each variable [-].
-
-    Notes
-    -----
     Term i is Π_v T_dᵢᵥ(x_v) with T_n(cos θ) = cos(n·θ): Mason & Handscomb 2003, Chebyshev Polynomials, ch. 1.
-
-    Examples
-    --------
-    T₂(0.5) = 2·0.5² − 1.
-
-    >>> terms(np.array([[0.5]]), np.array([[0], [1], [2]])).tolist()
-    [[1.0, 0.5, -0.5]]
     """
     values = np.moveaxis(chebyshev.chebvander(x, int(degrees.max())), 1, 0)
     return np.asarray(np.prod([values[own][:, degrees[:, own]] for own in range(x.shape[1])], axis=0))
@@ -205,11 +174,6 @@ def total_degrees(variables: int, degree: int) -> Int[np.ndarray, "term variable
     """Return all terms whose degrees add up to no more than ``degree`` [-].
 
     They are (variables + degree)! / (variables!·degree!) terms (combinations with repetition, own derivation).
-
-    Examples
-    --------
-    >>> total_degrees(2, 1).tolist(), len(total_degrees(4, 3))
-    ([[0, 0], [0, 1], [1, 0]], 35)
     """
     return np.array([row for row in product(range(degree + 1), repeat=variables) if sum(row) <= degree])
 
@@ -221,16 +185,7 @@ def fit_box_polynomial(
     degree: int,
     seeds: SeedTree,
 ) -> BoxPolynomial:
-    """Return the polynomial of least squares through answers at evenly scattered points of the box.
-
-    Parameters
-    ----------
-    answers
-        What is stood in for; it must answer everywhere in the box.
-    lower, upper
-        The box [variable].
-    degree
-        Largest total degree of a term [-].
+    """Return the polynomial of least squares, up to a total degree, through answers all over a box [variable].
 
     References
     ----------
@@ -307,16 +262,7 @@ class RegressionCandidate:
 
 
 def fitted(estimator: Any, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, "sample *output"]) -> Any:
-    """Return the fitted estimator.
-
-    w = argmin of the estimator's own objective, such as Σ (y − ŷ)² + α·Σ w² (Hoerl & Kennard 1970).
-
-    Examples
-    --------
-    >>> x = np.linspace(-1.0, 1.0, 20)[:, np.newaxis]
-    >>> round(float(fitted(quadratic_regression(), x, 3.0 + x[:, 0]).predict([[0.0]])[0]), 3)
-    3.0
-    """
+    """Return the fitted estimator."""
     from sklearn.exceptions import ConvergenceWarning
 
     with warnings.catch_warnings():
@@ -345,11 +291,7 @@ def quadratic_regression() -> Any:
 
 
 def sparse_quadratic_regression() -> Any:
-    """Return a regression on those products of two columns that the LASSO keeps.
-
-    Tibshirani 1996, J. R. Stat. Soc. B 58, 267–288: weights of the least Σ (y − ŷ)²/2n + α·Σ |w|, with α by
-    cross-validation.
-    """
+    """Return a regression on those products of two columns that the `lasso` keeps."""
     return on_products(lasso())
 
 

@@ -9,11 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Literal, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
+from tolalloc.capability.indices import require_share
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Evaluation, Response
@@ -25,8 +26,6 @@ ENOUGH_Q2 = 0.99
 """Q² of a surrogate that may be used above which no other is tried: what is left to gain is not worth its fit [-]."""
 LARGEST_FAILED_SHARE = 0.01
 """Largest share of failed predictions with which a surrogate is used [-]."""
-Shortfall = Literal["q2", "quantile", "failed"]
-"""What keeps a candidate from being used."""
 FOLDS = 5
 FEWEST_OF_FOLD = 2
 """Samples of a fold, without which its error has no scatter [-]."""
@@ -56,12 +55,6 @@ class Answers:
     y: Float[np.ndarray, " sample"]  # The answers [output]
     fold: Int[np.ndarray, " sample"]  # Fold of every sample [-]
     response: Response  # What gave the answers
-    failed: int  # Failed samples, which are left out [-]
-
-    @property
-    def splits(self) -> list[tuple[Bool[np.ndarray, " sample"], Bool[np.ndarray, " sample"]]]:
-        """Samples to fit and samples to predict, fold by fold."""
-        return [(self.fold != own, self.fold == own) for own in range(int(self.fold.max()) + 1)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,9 +85,9 @@ class Score:
         return self.failed / self.held_out
 
     @property
-    def shortfalls(self) -> tuple[Shortfall, ...]:
+    def shortfalls(self) -> tuple[str, ...]:
         """What keeps the candidate from being used; nothing if it has earned its place."""
-        passed: dict[Shortfall, bool] = {
+        passed = {
             "q2": self.q2 >= NEEDED_Q2,
             "quantile": abs(self.quantile_share) <= LARGEST_QUANTILE_ERROR,
             "failed": self.failed_share <= LARGEST_FAILED_SHARE,
@@ -110,21 +103,8 @@ def answers_of(
     largest_failed_share: float = 0.01,
     evaluation: Evaluation | None = None,
 ) -> Answers:
-    """Return the answers of a response in random folds.
+    """Return the answers of a response, its first output, in random folds; it is asked where no evaluation is known.
 
-    Parameters
-    ----------
-    response
-        What is stood in for; its first output counts.
-    x
-        Columns of every sample [m, angles rad].
-    largest_failed_share
-        Share of samples that may fail [-].
-    evaluation
-        What the response says of the samples, where that is known.
-
-    References
-    ----------
     k folds of n/k samples each, drawn without replacement: Stone 1974, J. R. Stat. Soc. B 36, 111–147.
     """
     if not 2 <= folds <= x.shape[0] // FEWEST_OF_FOLD:
@@ -140,32 +120,21 @@ def answers_of(
             f"Surrogate: {failed} of {fold.size} samples to learn from failed; allowed is {largest_failed_share:.4g} "
             "of them."
         )
-    return Answers(x=x[good], y=y[good], fold=fold[good], response=response, failed=failed)
+    return Answers(x=x[good], y=y[good], fold=fold[good], response=response)
 
 
 def cross_validate(candidate: Candidate, answers: Answers, quantile: float = 0.9973) -> Score:
     """Return what a candidate is worth where every answer is predicted by a fit to the other folds.
 
-    Parameters
-    ----------
-    candidate
-        What may become the surrogate.
-    answers
-        Answers of what it would stand in for.
-    quantile
-        Share of the units below the quantile that is compared [-].
-
-    Notes
-    -----
-    The clocked speed alone differs from run to run.
+    The quantile compared has that share of the units below it; the clocked speed alone differs from run to run.
 
     Q² = 1 − Σ (y − ŷ)² / Σ (y − ȳ)², with ŷ and ȳ from the other folds: Stone 1974, J. R. Stat. Soc. B 36, 111–147.
     """
-    if not 0.0 < quantile < 1.0:
-        raise InputError.at("surrogate", "quantile", quantile, "a number between 0 and 1")
+    require_share("surrogate", "quantile", quantile)
     predicted, mean = np.full(answers.y.size, np.nan), np.empty(answers.y.size)
     seconds, own_seconds, trained = list[float](), list[float](), list[int]()
-    for seen, unseen in answers.splits:
+    for own in range(int(answers.fold.max()) + 1):
+        seen, unseen = answers.fold != own, answers.fold == own
         fitted = candidate.fit(answers.x[seen], answers.y[seen])
         evaluation = fitted(answers.x[unseen])
         predicted[unseen] = np.where(evaluation.good, evaluation.values[:, 0], np.nan)
@@ -209,7 +178,6 @@ class Choice:
     output: str  # What is predicted, with its unit of measurement
     scores: tuple[Score, ...]  # One per candidate that was tried
     untried: tuple[str, ...]  # Names of the candidates that were not, as one before them left too little to gain
-    failed: int  # Answers to learn from that failed and were left out [-]
     best: int  # Place of the highest Q² among those that passed the gate, or among all if none did [-]
     chosen: Response | None  # That candidate fitted to all answers; none if no candidate passed
 
@@ -229,18 +197,12 @@ def choose(
 
     Parameters
     ----------
-    response
-        What is stood in for; its first output counts.
     candidates
         What may stand in, in the order of trying; one that passes with `ENOUGH_Q2` ends it.
-    x
-        Columns of random samples to learn from and to be judged on, in five folds [m, angles rad].
     quantile
-        Share of the units below the quantile that is compared, the yield that the surrogate is asked about [-].
-    largest_failed_share
-        Share of samples that may fail in the response [-].
-    evaluation
-        What the response says of the samples, where that is known.
+        The yield that the surrogate is asked about [-].
+    x, largest_failed_share, evaluation
+        As those of `answers_of`.
 
     Notes
     -----
@@ -270,7 +232,6 @@ def choose(
         output=response.outputs[0],
         scores=tuple(scores),
         untried=tuple(candidate.name for candidate in candidates[len(scores) :]),
-        failed=answers.failed,
         best=best,
         chosen=candidates[best].fit(answers.x, answers.y) if passed else None,
     )

@@ -13,7 +13,7 @@ from scipy.optimize import minimize_scalar
 from tolalloc.allocation.cost.model import ClosedForm, Exponential, Process, Reciprocal
 from tolalloc.allocation.search.process_choice import allocate
 from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Solution, Stack
-from tolalloc.capability.indices import ShareInterval, wilson_interval
+from tolalloc.capability.indices import Interval, wilson_interval
 from tolalloc.drawings.seeds import CHUNK, SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND
@@ -207,8 +207,8 @@ class AngularVerification:
     assemblies: int  # Number of assemblies [-]
     spread: Float[np.ndarray, " limit"]  # Three standard deviations of what is limited [rad]
     standard_error: Float[np.ndarray, " limit"]  # Standard error of the spread [rad]
-    shares: tuple[ShareInterval, ...]  # Share of the assemblies within each limit
-    share: ShareInterval  # Share within all limits at once
+    shares: tuple[Interval, ...]  # Share of the assemblies within each limit
+    share: Interval  # Share within all limits at once
 
 
 def verify_angles(
