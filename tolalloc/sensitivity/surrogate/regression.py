@@ -219,14 +219,6 @@ NEEDED_Q2 = 0.95
 """A surrogate below this Q² is not used; the response itself runs instead."""
 
 
-Baseline = Callable[[Float[np.ndarray, "sample column"]], Float[np.ndarray, " sample"]]
-
-
-def _no_baseline(x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, " sample"]:
-    """Return one for every sample."""
-    return np.ones(x.shape[0])
-
-
 @dataclass(frozen=True, kw_only=True)
 class Regression:
     """A fitted regression in place of a response."""
@@ -234,13 +226,12 @@ class Regression:
     # As in `tolalloc.models.model.Response`; the columns are the first ones of every sample
     columns: tuple[str, ...]
     outputs: tuple[str, ...]
-    estimator: Any  # The fitted scikit-learn estimator of the outputs over the baseline
-    baseline: Baseline = _no_baseline  # A rough answer that the estimator corrects
+    estimator: Any  # The fitted scikit-learn estimator of the outputs
 
     def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
         """Return the predictions."""
         own = x[:, : len(self.columns)]
-        values = np.reshape(self.estimator.predict(own), (-1, len(self.outputs))) * self.baseline(own)[:, np.newaxis]
+        values = np.reshape(self.estimator.predict(own), (-1, len(self.outputs)))
         return Evaluation(values=np.asarray(values, dtype=float), status=np.zeros(x.shape[0], np.uint8))
 
 
@@ -253,12 +244,10 @@ class RegressionCandidate:
     columns: tuple[str, ...]
     outputs: tuple[str, ...]
     estimator: Callable[[], Any]  # Makes the unfitted scikit-learn regressor
-    baseline: Baseline = _no_baseline  # A rough positive answer; the regressor learns the ratio to it
 
     def fit(self, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, " sample"]) -> Regression:
         """Return the regression through answers."""
-        estimator = fitted(self.estimator(), x, y / self.baseline(x))
-        return Regression(columns=self.columns, outputs=self.outputs, estimator=estimator, baseline=self.baseline)
+        return Regression(columns=self.columns, outputs=self.outputs, estimator=fitted(self.estimator(), x, y))
 
 
 def fitted(estimator: Any, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, "sample *output"]) -> Any:
@@ -305,20 +294,3 @@ def lasso() -> Any:
     from sklearn.preprocessing import StandardScaler
 
     return TransformedTargetRegressor(LassoCV(alphas=np.logspace(-2.5, 0, 14), cv=3), transformer=StandardScaler())
-
-
-def gaussian_process(columns: int) -> Any:
-    """Return a Gaussian process of the logarithm of a positive output, one length per column, and noise.
-
-    Kernel c·exp(−Σ (Δuᵢ/lᵢ)²/2) + noise of standardised columns u, its parameters by the largest likelihood: Rasmussen
-    & Williams 2006, Gaussian Processes for Machine Learning, ch. 2 and 5. For positive outputs.
-    """
-    from sklearn.compose import TransformedTargetRegressor
-    from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
-    from sklearn.pipeline import make_pipeline
-    from sklearn.preprocessing import StandardScaler
-
-    kernel = ConstantKernel(10.0) * RBF(np.full(columns, 3.0), (0.3, 1e3)) + WhiteKernel(1e-3, (1e-8, 1.0))
-    process = make_pipeline(StandardScaler(), GaussianProcessRegressor(kernel, normalize_y=True, random_state=1))
-    return TransformedTargetRegressor(process, func=np.log, inverse_func=np.exp)
