@@ -98,11 +98,6 @@ class Diagnosis:
     failed: int
 
     @property
-    def column_mean(self) -> Float[np.ndarray, " column"]:
-        """Mean of every column [m, angles rad]."""
-        return np.asarray(self.deviations.mean(axis=0))
-
-    @property
     def column_interval(self) -> Float[np.ndarray, "2 column"]:
         """95 % interval of every column [m, angles rad]."""
         return np.asarray(np.quantile(self.deviations, TAILS, axis=0))

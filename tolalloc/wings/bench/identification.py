@@ -138,7 +138,7 @@ def identify(
     _require_close(request, data, surrogate)
     quick = problem.of(request.parameters, surrogate)
     progress.begin("Gauss–Newton")
-    found = _found(problem, quick, request.seed, seeds)
+    found = _found(problem, quick, seeds)
     prediction = kernel(found.coordinates)
     own = information(problem, prediction, found.coordinates)
     widened = problem.widened(own.variance_factor)
@@ -207,13 +207,13 @@ def _require_close(request: IdentificationRequest, data: AllReadings, surrogate:
         )
 
 
-def _found(problem: IdentificationProblem, quick: IdentificationProblem, seed: int, seeds: SeedTree) -> Identified:
+def _found(problem: IdentificationProblem, quick: IdentificationProblem, seeds: SeedTree) -> Identified:
     """Return the least objective on polynomials, finished on the model from there.
 
     The reducer as given is another start on the model, should polynomials lead astray.
     """
-    near = gauss_newton(quick, starts(quick, STARTS, seeds.child("starts")), seed)
-    return gauss_newton(problem, np.stack([near.coordinates, problem.start]), seed).after(near)
+    near = gauss_newton(quick, starts(quick, STARTS, seeds.child("starts")))
+    return gauss_newton(problem, np.stack([near.coordinates, problem.start])).after(near)
 
 
 def judged_choices(quick: IdentificationProblem, surrogate: Surrogate, reducer: Reducer) -> tuple[ParameterChoice, ...]:

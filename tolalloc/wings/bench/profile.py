@@ -40,14 +40,9 @@ class ParameterProfile:
         return replace(self, interval=(min(self.interval[0], float(low)), max(self.interval[1], float(high))))
 
     @property
-    def open_ends(self) -> tuple[bool, bool]:
-        """Whether the interval reaches the lower and the upper bound."""
-        return bool(self.interval[0] <= self.coordinate[0]), bool(self.interval[1] >= self.coordinate[-1])
-
-    @property
     def is_identified(self) -> bool:
         """Whether the readings keep the parameter away from at least one of its bounds."""
-        return not all(self.open_ends)
+        return bool(self.interval[0] > self.coordinate[0] or self.interval[1] < self.coordinate[-1])
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,6 @@ from tolalloc.reducers.reducer.design import Reducer
 BLENDS = {"linear": Polynomial([0, 1]), "step": Polynomial([0, 0, 3, -2])}
 """From 0 to 1 between two given times: along a straight line, or by the cubic that starts and ends level."""
 
-
 _OverTime = Float[np.ndarray, " time"]
 _Piece = tuple[Int[np.ndarray, " time"], _OverTime, _OverTime, _OverTime, _OverTime]
 """The piece of a profile that each time lies in: number, first value, rise to the last, length, share gone."""
@@ -260,8 +259,7 @@ class Damping:
     mass_proportional: float = 0.0  # Damping per mass of every coordinate [1/s]
     stiffness_proportional: float = 0.0  # Damping per stiffness of every interface without play [s]
     # Further damping per stiffness of single interfaces, by their field of
-    # `tolalloc.reducers.reducer.stiffness.Stiffness`
-    # [s]
+    # `tolalloc.reducers.reducer.stiffness.Stiffness` [s]
     interfaces: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -275,13 +273,7 @@ class Damping:
         return self.stiffness_proportional + self.interfaces.get(interface, 0.0)
 
     def check(self, groups: list[SpringGroup]) -> None:
-        """Make sure that every interface with damping of its own is there and has no play.
-
-        Raises
-        ------
-        InputError
-            One that is not.
-        """
+        """Make sure that every interface with damping of its own is there and has no play."""
         allowed = [group.stiffness_name for group in groups if group.contact == "bilateral"]
         for name in self.interfaces:
             if name not in allowed:
