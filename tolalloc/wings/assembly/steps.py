@@ -87,8 +87,6 @@ def observed(chain: DatumFlowChain, step: AssemblyStep) -> Float[np.ndarray, "re
 class StateSpace:
     """Steps mount → measure → adjust: z = x + F w, y = C z + v, x⁺ = z + B (u + n).
 
-    Notes
-    -----
     zhang2025's equations with A = 1, in the causal order: what a step brings in is measured before it is adjusted;
     otherwise the last part's error could never be taken out.
     """
@@ -116,11 +114,8 @@ def state_space(
 ) -> StateSpace:
     """Return the linear system of an assembly.
 
-    Parameters
-    ----------
-    transform
-        `DatumFlowChain.transform` unless given, or `DatumFlowChain.twist_transform` for six coordinates a part
-        [rad/rad].
+    The transform is `DatumFlowChain.transform` unless given, or `DatumFlowChain.twist_transform` for six coordinates a
+    part.
     """
     whole = chain.transform if transform is None else transform
     size = whole.shape[0] // len(chain.parts)
@@ -137,8 +132,6 @@ def state_space(
 def check_steps(chain: DatumFlowChain, steps: Sequence[AssemblyStep], place: str) -> None:
     """Refuse steps that cannot be carried out, in a sentence about a place, such as their file.
 
-    Notes
-    -----
     Parts that are not there can be turned by `steps_in_order` with ``all`` only, zhang2025's own way.
     """
     mounted: list[str] = []

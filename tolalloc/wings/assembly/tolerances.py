@@ -61,8 +61,6 @@ def requirements_of(plan: AssemblyPlan) -> AngularRequirements:
 def angular_limits(plan: AssemblyPlan) -> AngularLimits:
     """Return the limits of a plan; what has no limit gets no row.
 
-    Notes
-    -----
     The tilt is limited as a whole, Var_x + Var_y, since its direction turns with the crank.
     """
     requirements, parts = requirements_of(plan), np.eye(len(plan.chain.names))
@@ -80,8 +78,6 @@ def angular_limits(plan: AssemblyPlan) -> AngularLimits:
 def angular_problem(plan: AssemblyPlan, errors: FinalErrors) -> AllocationProblem:
     """Return the allocation with tolerances and stacks in arcseconds, for the gains of given final errors.
 
-    Notes
-    -----
     With fixed gains nine times a final variance is Σ a_i·t_i² + 9ν, so it stays below T² where ‖√a∘t‖ ≤ √(T² − 9ν).
     The priced effort is affine in t² too: a quality loss and a constant, which is left out. Where the noise alone
     exceeds a limit the budget is negative, as no tolerance keeps it.
@@ -204,8 +200,6 @@ def verify_angles(
 ) -> AngularVerification:
     """Return what assemblies of normally distributed parts, readings and adjustments show of an allocation.
 
-    Notes
-    -----
     An assembly is within a tilt limit where √(x² + y²) is, which is not what three standard deviations of x and y
     together promise of one normal angle: of assemblies that just keep a limit 99.73 % are within it where the tilt has
     one direction only, and 1 − exp(−9) = 99.988 % where it has none.
@@ -244,8 +238,6 @@ class RetunedAllocation:
 def retuned_allocation(plan: AssemblyPlan, most_filters: int = 100) -> RetunedAllocation:
     """Return allocations whose filters are tuned again until the tolerances settle.
 
-    Notes
-    -----
     Every allocation keeps the limits with its own gains, so each is one that can be built, whether or not the iteration
     settles. Gains and tolerances together are not a convex program: neither the fixed point nor the best of the
     allocations is claimed to be the cheapest of all filters. The iteration ends where no tolerances keep the limits.
@@ -291,8 +283,6 @@ def best_state_weight(
     The points of the curve are evenly spread by their logarithms; the best one is looked for between the lowest and the
     highest [-].
 
-    Notes
-    -----
     The best of the points is refined between its neighbours. The total need not have one minimum alone, so what lies
     between other points is not searched.
     """

@@ -77,12 +77,8 @@ def drawn(
 ) -> Trajectory:
     """Return simulated assemblies from standard normal numbers.
 
-    Parameters
-    ----------
-    deviations
-        Standard deviations of every part error, of a reading, and of what an adjustment misses [rad].
-    standard
-        `random_numbers` per assembly: those of the part errors, of the readings, of the adjustments [-].
+    Deviations are the standard ones of every part error, of a reading, and of what an adjustment misses [rad]; of the
+    numbers, `random_numbers` per assembly, those of the part errors come first, then of the readings [-].
     """
     of_parts, of_reading, of_adjustment = deviations
     parts = space.entering.shape[2]

@@ -121,8 +121,6 @@ def diagnose(
     vary [m]. The named sources contain the dominant one with the probability ``level`` [-]. Each stage of the work is
     told as it begins. What gauges have read of its parts already narrows them too.
 
-    Notes
-    -----
     Bayes' rule with the drawings as prior. The map from errors to curve has kinks wherever a pin takes over, and one
     curve has many near explanations: scouts led from the prior towards the curve find them, damped Gauss–Newton steps
     climb down, and sequential Monte Carlo on the kernel samples the errors around the best one.

@@ -21,8 +21,6 @@ _STEPS = 40
 class IdentificationProblem:
     """Half the sum of squares of all residuals over their noise, and of the coordinates over their prior deviation.
 
-    Notes
-    -----
     liu2020, equations (15)–(16), with weights. Theory page, equation (38).
     """
 

@@ -315,8 +315,6 @@ def _apart(table: TextTable) -> tuple[TextTable, TextTable | None]:
 def _without_gauge(path: Path, column: GaugedColumn, names: Sequence[str], stated: TextTable | None) -> GaugedColumn:
     """Return a column part by part, with what its gauge adds to it; unchanged where nothing is known of the gauge.
 
-    Notes
-    -----
     The variance of one reading is stated, or pooled from parts that were read again, Σ(y − ȳ)²/Σ(r − 1); a mean of r of
     them has 1/r of it, and parts with different r the mean of that, to first order.
     """
@@ -515,8 +513,6 @@ def _plain(source: Source) -> Source:
 def _capability(source: Source, columns: Sequence[GaugedColumn], lots: Lots) -> LotCapability:
     """Return the capability of a source and its row in the table of the lot.
 
-    Notes
-    -----
     Cp is that of a tolerance table: of a size the σ at Cp 1 over s, which is zone/(6·s) for normal deviations; of a
     radius or total deviation the root mean square at Cp 1 over that of the lot, so that a place that is off for all
     parts widens it too. Cpk is the distance of the mean from the nearer limit over 3·s; its interval by the spread of

@@ -96,8 +96,6 @@ def profile(
     The noise of the problem is widened by the variance factor, and a surrogate should predict. What was found to first
     order says where to look, and the threshold.
 
-    Notes
-    -----
     Theory page, equation (41).
     """
     lower, upper, middle = float(problem.lower[place]), float(problem.upper[place]), float(best[place])
@@ -260,8 +258,6 @@ def _left(problem: IdentificationProblem, coordinates: Float[np.ndarray, " param
 def simplest(choices: Sequence[ParameterChoice]) -> ParameterChoice:
     """Return the choice with the fewest parameters that is as good as the best within a standard error.
 
-    Notes
-    -----
     Differences of squared residuals are taken unit by unit, so what all choices of the same data share cancels.
     """
     best = min(choices, key=lambda item: item.score)

@@ -114,8 +114,6 @@ def motion_of(
     θc = θ0 + ∫Ω dt/i with the reducer's ratio i = 1 + (Z2/Z1)·zp; input speed Ω [rad/s], torque on the carrier [N·m],
     duration of all steps [s], θc at time 0 [rad].
 
-    Examples
-    --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> speed, torque = SpeedProfile.constant(525 * 2 * np.pi / 60), SpeedProfile.constant(-572.0)
     >>> found = motion_of(load_reducer("rv40e_xi2015"), speed, torque, duration=1.0, steps=10)
@@ -152,8 +150,6 @@ def nominal_acceleration(at: Positions, motion: Motion) -> Float[np.ndarray, "ti
 
     Own derivation: exact for rigid parts without errors.
 
-    Examples
-    --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> reducer, steady = load_reducer("rv40e_xi2015"), SpeedProfile.constant(525 * 2 * np.pi / 60)
     >>> motion = motion_of(reducer, steady, SpeedProfile.constant(-572.0), duration=0.1, steps=1)
@@ -216,8 +212,6 @@ def inertia_of(reducer: Reducer, density: float = 7850.0, output_inertia: float 
     Solid cylinders of radius R and width b have m = ρ·π·R²·b and J = m·R²/2. The density ρ is that of all parts
     [kg/m³]; the carrier turns the output inertia besides its own [kg·m²].
 
-    Examples
-    --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> found = inertia_of(load_reducer("rv40e_xi2015"))
     >>> f"{found.disc:.3f} kg, {found.disc_moment:.3e} kg·m²"

@@ -469,8 +469,6 @@ def simulate_prototype(
     [rad/s], the torque that on the carrier, negative against the rotation [N·m]. Errors are columns of
     `tolalloc.wings.motion.prototype.part_errors` [m]; progress is told which share is done.
 
-    Notes
-    -----
     Rigid bodies in the plane with large rotations; pins push along the normal of the exact profile, by the reducer's
     contact law. Generalised-α method of Chung and Hulbert (1993). The first stage is exact, so that the mean output
     speed is the input's over the ratio: 6.4815 rpm at 525 rpm in an RV-40E.

@@ -86,12 +86,8 @@ def modes(
     first one is zero. The modes hold for vibrations under which the same pins keep touching, at speeds whose forces of
     inertia are small beside the load.
 
-    Notes
-    -----
     Theory page (64).
 
-    Examples
-    --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> from tolalloc.wings.motion.motion import inertia_of
     >>> from tolalloc.reducers.unit_file import load_unit
@@ -138,8 +134,6 @@ def critical_speeds(
     output speed Ω. A mode is told by its rank in frequency at every angle, not by its shape; where two frequencies
     cross over a turn, their bands share the crossing.
 
-    Examples
-    --------
     >>> one = np.array([[100.0]])
     >>> found = Modes(carrier_angle=np.zeros(1), frequency=one, shape=one[np.newaxis], carrier_share=one)
     >>> round(critical_speeds(found, (40,), (0.0, 100.0))[0].slowest, 3)  # 2π·100 Hz/40 [rad/s]
@@ -197,8 +191,6 @@ def orders_against_speed(
     in `tolalloc.wings.motion.stepping.simulate`. A wave at resonance needs some twenty time steps; of the turns
     of each run the last is looked at.
 
-    Examples
-    --------
     >>> from tolalloc.wings.motion.motion import inertia_of, newmark
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))
