@@ -47,15 +47,12 @@ class DatumFlowChain:
             while path[-1] in on and path.count(path[-1]) == 1:
                 path.append(on[path[-1]])
             if path[-1] != self.datum:
-                circle = " on ".join(path[path.index(path[-1]) :])
-                raise InputError.at(
-                    "datum flow chain", f"part {part.name}", circle, f"parts that end on the datum {self.datum}"
-                )
+                circle, allowed = " on ".join(path[path.index(path[-1]) :]), f"parts that end on the datum {self.datum}"
+                raise InputError.at("datum flow chain", f"part {part.name}", circle, allowed)
         for at, part in enumerate(self.parts):
             if part.on not in names[: at + 1]:
-                raise InputError.at(
-                    "datum flow chain", f"part {part.name}", f"mounted before {part.on}", "a part after what it is on"
-                )
+                early, allowed = f"mounted before {part.on}", "a part after what it is on"
+                raise InputError.at("datum flow chain", f"part {part.name}", early, allowed)
         moved = [(column, part.name) for part in self.parts for column in (*part.tilts, *part.rotates)]
         for at, (column, name) in enumerate(moved):
             if column in dict(moved[:at]):

@@ -102,12 +102,9 @@ def kalman_filter(
         told, own = innovation[np.ix_(telling, telling)], scale[telling]
         # A combination of readings that is known before, judged on each reading's own scale.
         if telling.size and not eigvalsh(told / np.outer(own, own))[0] > _NOTHING_NEW:
-            raise InputError.at(
-                f"{place}, step {step + 1}",
-                "measure",
-                "a reading that is known without being taken",
-                "readings that each tell something new, or a measurement noise above 0",
-            )
+            known = "a reading that is known without being taken"
+            allowed = "readings that each tell something new, or a measurement noise above 0"
+            raise InputError.at(f"{place}, step {step + 1}", "measure", known, allowed)
         gain = np.zeros((space.states, len(observing)))
         gain[:, telling] = solve(told, observing[telling] @ covariance, assume_a="pos").T
         left = identity - gain @ observing

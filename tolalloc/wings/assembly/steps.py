@@ -164,9 +164,8 @@ def _check_names(chain: DatumFlowChain, step: AssemblyStep, where: str) -> None:
     for name in (step.mount, *step.adjust, *step.effort, *_measured(step)):
         if name not in chain.names:
             if name == chain.datum:
-                raise InputError.at(
-                    where, "measure", name, f"parts alone: everything is measured against {name} anyway"
-                )
+                allowed = f"parts alone: everything is measured against {name} anyway"
+                raise InputError.at(where, "measure", name, allowed)
             if "-" in name and all(each.strip() in chain.names for each in name.split("-")):
                 raise InputError.at(where, "measure", name, "one part - another, with spaces around the sign")
             raise UnknownNameError.among(where, "part", name, chain.names)

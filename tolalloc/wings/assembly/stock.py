@@ -203,9 +203,8 @@ def load_parts(path: str | Path, reducer: Reducer) -> tuple[MeasuredPart, ...]:
         if error not in known[kind]:
             raise UnknownNameError.among(place, f"error of a {kind}", error, known[kind])
         if error in errors.setdefault(part, {}):
-            raise InputError.at(
-                place, f"error of part {part}", error, "each error once, and this one stands further up"
-            )
+            allowed = "each error once, and this one stands further up"
+            raise InputError.at(place, f"error of part {part}", error, allowed)
         errors[part][error] = _deviation(place, error, value, unit)
     parts = tuple(MeasuredPart(name=name, kind=kind, errors=errors[name]) for name, kind in kinds.items())
     count_units(parts, places_of(reducer), table.path)

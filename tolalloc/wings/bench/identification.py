@@ -56,12 +56,10 @@ class IdentificationRequest:
     data: str = "measurements"  # Where the data were read, for errors
 
     def __post_init__(self) -> None:
-        place = "identification"
-        names = [item.name for item in self.parameters]
+        place, names = "identification", [item.name for item in self.parameters]
         if not set(names) - {BIAS}:
-            raise InputError.of_argument(
-                place, "parameters", names, "one or more besides the bias, which is the baseline"
-            )
+            allowed = "one or more besides the bias, which is the baseline"
+            raise InputError.of_argument(place, "parameters", names, allowed)
         for name in names:
             if names.count(name) > 1:
                 raise InputError.of_argument(place, "parameters", name, "each parameter once")

@@ -353,10 +353,8 @@ def _stated(column: GaugedColumn, stated: TextTable | None) -> float:
         return 0.0
     factor, (shown,) = column_readings(stated, column.header, _LENGTHS)
     if not (np.isnan(shown) or 0.0 < shown <= LARGEST_DEVIATION * MICROMETRE):
-        place = f"{stated.path}, row {stated.rows[0]}"
-        raise InputError.at(
-            place, f"the gauge of {column.header!r}", float(f"{shown / factor:.9g}"), "above 0, or empty"
-        )
+        place, value = f"{stated.path}, row {stated.rows[0]}", float(f"{shown / factor:.9g}")
+        raise InputError.at(place, f"the gauge of {column.header!r}", value, "above 0, or empty")
     part = 0.5 if split_header(column.header)[0].endswith(".diameter") else 1.0
     return 0.0 if np.isnan(shown) else float(shown) * part
 

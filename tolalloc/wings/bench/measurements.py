@@ -219,12 +219,8 @@ def _peak_to_peak(data: Mapping[str, Any], path: Path, positions: Mapping[str, i
     for row, name, cells, value in zip(table.rows, names, table.cells, values, strict=True):
         units.append(_position(name, f"{table.path}, row {row}", positions))
         if not 0.0 <= value <= LARGEST_RANGE:
-            raise InputError.at(
-                f"{table.path}, row {row} (unit {name})",
-                header,
-                cells[table.headers.index(header)],
-                f"a number from 0 to {LARGEST_RANGE / factor:g}",
-            )
+            cell, allowed = cells[table.headers.index(header)], f"a number from 0 to {LARGEST_RANGE / factor:g}"
+            raise InputError.at(f"{table.path}, row {row} (unit {name})", header, cell, allowed)
     require_moving(table.path, header, values / factor)
     return MeasuredPeakToPeak(
         unit=np.array(units), values=values, torque=record.torque_nm, noise=_in_radians(record.noise_arcsec)

@@ -19,7 +19,7 @@ from tolalloc.wings.assembly.orientations import TransmissionEffect
 from tolalloc.wings.assembly.plan import AngularRequirements, AssemblyPlan
 from tolalloc.wings.assembly.steps import AssemblyStep, adjustable, efforts
 from tolalloc.wings.assembly.telling import tables
-from tolalloc.wings.assembly.telling.tables import AdjustedAngle, at_state_weight, has_limits, norm_of
+from tolalloc.wings.assembly.telling.tables import at_state_weight, has_limits, norm_of
 from tolalloc.wings.assembly.telling.tolerances import (
     certificate_table,
     cost_sentences,
@@ -158,10 +158,13 @@ class AssemblyTeller(Teller[AssemblyResult]):
         if not has_limits(self.result):
             return ()
         measured, rows = self.result.measured, tables.characteristics(self.result)
-        missed, doubted = (
-            ", ".join(self._limited(row) for row in rows if row.kept(measured=measured is not None) == word)
-            for word in ("no", "in doubt")
-        )
+        key = "limited_measured" if measured else "limited"
+
+        def limited(word: str) -> str:
+            found = [row for row in rows if row.kept(measured=measured is not None) == word]
+            return ", ".join(_say(key, **vars(row) | {"after": abs(row.after), "missed": row.noise}) for row in found)
+
+        missed, doubted = limited("no"), limited("in doubt")
         by, remedy = _say("by_measured" if measured else "by_expected"), ""
         if measured:
             keeping = measured.keeping
@@ -170,10 +173,6 @@ class AssemblyTeller(Teller[AssemblyResult]):
             *((_say("warn_missed", by=by, missed=missed, remedy=remedy),) if missed else ()),
             *((_say("warn_doubted", doubted=doubted),) if doubted else ()),
         )
-
-    def _limited(self, row: AdjustedAngle) -> str:
-        key = "limited_measured" if self.result.measured else "limited"
-        return _say(key, angle=row.angle, part=row.part, after=abs(row.after), missed=row.noise, limit=row.limit)
 
     @property
     def _fewer(self) -> tuple[str, ...]:

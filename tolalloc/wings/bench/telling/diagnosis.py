@@ -157,9 +157,7 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
             *self.result.reducer.assumptions,
             _say("assume_noise", reading=noise.reading / ARCSECOND),
             _say(
-                "assume_discrepancy",
-                discrepancy=noise.discrepancy / ARCSECOND,
-                angle=noise.correlation_angle / DEGREE,
+                "assume_discrepancy", discrepancy=noise.discrepancy / ARCSECOND, angle=noise.correlation_angle / DEGREE
             ),
             _say("assume_prior"),
             _say("assume_angle"),
@@ -186,15 +184,11 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
             "not told apart": [list(group.sources) for group in found.groups],
             "curves solved [-]": found.evaluations,
             "curves failed [-]": found.failed,
-            **self._advice_summary,
+            **(self._advice_summary(self.result.advice) if self.result.advice else {}),
             "warnings": list(self.warnings),
         }
 
-    @property
-    def _advice_summary(self) -> dict[str, Any]:
-        advice = self.result.advice
-        if not advice:
-            return {}
+    def _advice_summary(self, advice: Advice) -> dict[str, Any]:
         measure = advice.next.source if advice.next else None
         tables = {"readings": self._next.records(), "decisions": self._decisions(advice).records()}
         return {"measure next": measure, "decision": advice.best, **tables}
@@ -212,9 +206,13 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
     @cached_property
     def sections(self) -> tuple[Section, ...]:
         """Sections in the order of the questions that a reader has."""
-        groups = self._groups
+        groups, unit = self._groups, self.header.cost_unit
+        advice: tuple[Section, ...] = ()
+        if found := self.result.advice:
+            tables = (("next", self._next.frame(unit)), ("decisions", self._decisions(found).frame(unit)))
+            advice = (Section(heading=_say("next_heading"), paragraphs=(_say("next_meaning"),), tables=tables),)
         return (
-            *self._advice_section,
+            *advice,
             Section(
                 heading=_say("dominant_heading"),
                 paragraphs=(_say("dominant"),),
@@ -230,14 +228,6 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
             Section(heading=_say("curve_heading"), figures=self._curve_figures()),
             Section(heading=_say("columns_heading"), tables=(("columns", self._columns.frame()),)),
         )
-
-    @property
-    def _advice_section(self) -> tuple[Section, ...]:
-        unit, advice = self.header.cost_unit, self.result.advice
-        if not advice:
-            return ()
-        tables = (("next", self._next.frame(unit)), ("decisions", self._decisions(advice).frame(unit)))
-        return (Section(heading=_say("next_heading"), paragraphs=(_say("next_meaning"),), tables=tables),)
 
     def _dominant_figure(self) -> Figure:
         rows = self._sources.frame()

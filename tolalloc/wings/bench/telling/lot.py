@@ -162,7 +162,7 @@ class LotTeller(Teller[LotResult]):
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """What a reader must know before acting on it."""
-        rows = self.result.capabilities
+        rows, curves = self.result.capabilities, self.result.curves
         return (
             *(_say("warn_far", source=own.source.name, count=own.far, parts=own.parts) for own in rows if own.far),
             *(
@@ -170,17 +170,11 @@ class LotTeller(Teller[LotResult]):
                 for own in rows
                 if own.clipped
             ),
-            *self._doubts_of_curves,
+            *((_say("warn_failed", failed=self.header.failed),) if curves and self.header.failed else ()),
+            *(curves.model.mismatches if curves else ()),
+            *(_say("warn_repaired", repair=own) for own in (curves.repairs if curves else ())),
             *self.result.stated.notes,
         )
-
-    @property
-    def _doubts_of_curves(self) -> tuple[str, ...]:
-        curves = self.result.curves
-        if not curves:
-            return ()
-        failed = (_say("warn_failed", failed=self.header.failed),) if self.header.failed else ()
-        return (*failed, *curves.model.mismatches, *(_say("warn_repaired", repair=own) for own in curves.repairs))
 
     @property
     def _assumed_of_curves(self) -> tuple[str, ...]:
