@@ -103,6 +103,8 @@ def _process(requirements: AngularRequirements, at: int) -> Process:
     """Return how the tolerance at a position among all is made, over arcseconds."""
     own, form = requirements, requirements.form
     fixed, factor, scale = (float(each.flat[at]) for each in (own.fixed, own.factor, own.scale))
+    if form not in ("reciprocal", "exponential"):
+        raise InputError.at("angular requirements", "form", form, "reciprocal or exponential")
     cost: ClosedForm = Reciprocal(fixed=fixed, factor=factor)
     if form == "exponential":
         cost = Exponential(fixed=fixed, factor=factor, scale=scale)
