@@ -80,7 +80,7 @@ def search(
     own = SeedTree(seed).child("identification", algorithm).integer()
     genes = _Coordinates(problem)
     minimize(genes, (begin or ALGORITHMS[algorithm])(), ("n_gen", GENERATIONS), seed=own, copy_algorithm=False)
-    return Identified.among(genes.batches, algorithm, seed, f"{GENERATIONS} generations done")
+    return Identified.among(genes.batches, algorithm, f"{GENERATIONS} generations done")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,7 +166,7 @@ def compare(answer: IdentificationResult, seeds: int, progress: Progress) -> tup
         for seed in range(1, 1 + seeds):
             if name == GAUSS_NEWTON:  # from random starts, as every other method
                 begin = starts(quick, STARTS + 1, SeedTree(seed).child("identification", name))[1:]
-                runs.append(gauss_newton(quick, begin, seed))
+                runs.append(gauss_newton(quick, begin))
             else:
                 runs.append(search(quick, name, seed))
         best = min(runs, key=lambda run: run.objective)

@@ -88,7 +88,7 @@ def _tables(measurements: Measurements) -> Iterator[_Table]:
             rows=[
                 (names[unit], float(value) / ARCSECOND) for unit, value in zip(table.unit, table.values, strict=True)
             ],
-            comments=table.repairs,
+            comments=(),
         )
     for number, curve in enumerate(measurements.curves, 1):
         yield _Table(

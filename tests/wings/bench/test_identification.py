@@ -217,7 +217,8 @@ def test_a_profile_that_is_doubted_holds_the_first_order_interval_cut_at_the_bou
     sharp = profile(problem, found, 0, information(problem, problem.predictor(found), found))
     wider = sharp.widened(np.array([-100.0, sharp.interval[0]]))
     assert wider.interval == (problem.lower[0], sharp.interval[1])
-    assert wider.open_ends == (True, False)
+    assert wider.interval[0] == wider.coordinate[0]
+    assert wider.interval[1] < wider.coordinate[-1]
 
 
 def written_of(problem: IdentificationProblem) -> tuple[np.ndarray, IdentifiedStiffness]:

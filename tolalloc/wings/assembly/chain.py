@@ -47,15 +47,12 @@ class DatumFlowChain:
             while path[-1] in on and path.count(path[-1]) == 1:
                 path.append(on[path[-1]])
             if path[-1] != self.datum:
-                circle = " on ".join(path[path.index(path[-1]) :])
-                raise InputError.at(
-                    "datum flow chain", f"part {part.name}", circle, f"parts that end on the datum {self.datum}"
-                )
+                circle, allowed = " on ".join(path[path.index(path[-1]) :]), f"parts that end on the datum {self.datum}"
+                raise InputError.at("datum flow chain", f"part {part.name}", circle, allowed)
         for at, part in enumerate(self.parts):
             if part.on not in names[: at + 1]:
-                raise InputError.at(
-                    "datum flow chain", f"part {part.name}", f"mounted before {part.on}", "a part after what it is on"
-                )
+                early, allowed = f"mounted before {part.on}", "a part after what it is on"
+                raise InputError.at("datum flow chain", f"part {part.name}", early, allowed)
         moved = [(column, part.name) for part in self.parts for column in (*part.tilts, *part.rotates)]
         for at, (column, name) in enumerate(moved):
             if column in dict(moved[:at]):
@@ -86,8 +83,6 @@ class DatumFlowChain:
     def transform(self) -> Float[np.ndarray, "state error"]:
         """M: orientations against the datum, in its axes, per error of the parts in their own axes [rad/rad].
 
-        Notes
-        -----
         zhang2025's differential rotation vectors: d_i = Σ R_a θ_a over the part itself and all that it stands on.
         """
         return _from_blocks(self.carries, np.broadcast_to(self.axes, (len(self.parts), *self.axes.shape)))
@@ -96,8 +91,6 @@ class DatumFlowChain:
     def twist_transform(self) -> Float[np.ndarray, "state error"]:
         """The same for twists, three rotations before three displacements of a part's axis [rad, m per rad, m].
 
-        Notes
-        -----
         A rotation R_a θ_a of part a moves the axis of part i by R_a θ_a × (p_i − p_a).
         """
         count = len(self.parts)

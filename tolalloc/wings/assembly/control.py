@@ -29,8 +29,6 @@ class Regulator:
 def regulator(space: StateSpace, final_weight: Float[np.ndarray, "state state"]) -> Regulator:
     """Return the adjustments that minimise xᵀQx of the final errors, Q the final weight, plus the sum of uᵀRu.
 
-    Notes
-    -----
     zhang2025's K = R⁻¹BᵀP[I + BR⁻¹BᵀP]⁻¹ equals (R + BᵀPB)⁻¹BᵀP, a symmetric positive definite system, and
     P = (I − BK)ᵀP(I − BK) + KᵀRK stays positive where P falls by many orders in one step. Where a later step cannot
     reach every state, gains lose digits as Q/R grows, 1e-16·Q/R of them: far beyond 1e8 take `limiting_regulator`.
@@ -52,8 +50,6 @@ def limiting_regulator(space: StateSpace, final_weight: Float[np.ndarray, "state
 
     Its cost to go is the effort alone, the least with which the errors fall as far as they can.
 
-    Notes
-    -----
     The adjustments of all remaining steps, each times √R, tend to the shortest least-squares solution: a
     pseudoinverse, so that no large number has to stand for infinity.
     """
@@ -89,14 +85,8 @@ def kalman_filter(
 ) -> KalmanFilter:
     """Return the best linear estimator of the state from all readings so far.
 
-    Parameters
-    ----------
-    variances
-        Variance of every part error [rad²].
-    measurement_noise, adjustment_noise
-        Standard deviation of one reading, and of what an adjustment misses, per axis and step [rad].
-    place
-        File or caller for the sentence.
+    Variances are those of every part error [rad²]; noise is the standard deviation of one reading, and of what an
+    adjustment misses, per axis and step [rad].
     """
     identity = np.eye(space.states)
     gains, covariances = list[Float[np.ndarray, "state reading"]](), list[Float[np.ndarray, "state state"]]()
@@ -112,12 +102,9 @@ def kalman_filter(
         told, own = innovation[np.ix_(telling, telling)], scale[telling]
         # A combination of readings that is known before, judged on each reading's own scale.
         if telling.size and not eigvalsh(told / np.outer(own, own))[0] > _NOTHING_NEW:
-            raise InputError.at(
-                f"{place}, step {step + 1}",
-                "measure",
-                "a reading that is known without being taken",
-                "readings that each tell something new, or a measurement noise above 0",
-            )
+            known = "a reading that is known without being taken"
+            allowed = "readings that each tell something new, or a measurement noise above 0"
+            raise InputError.at(f"{place}, step {step + 1}", "measure", known, allowed)
         gain = np.zeros((space.states, len(observing)))
         gain[:, telling] = solve(told, observing[telling] @ covariance, assume_a="pos").T
         left = identity - gain @ observing

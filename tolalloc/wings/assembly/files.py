@@ -115,16 +115,10 @@ class PartRecord(Record):
 
     def part(self) -> ChainPart:
         """Return the part in SI units."""
-        x, y, z = (float(value) for value in DEGREE * np.array(self.turned_deg))
-        across, up, along = (float(value) for value in MILLIMETRE * np.array(self.position_mm))
-        return ChainPart(
-            name=self.name,
-            on=self.on,
-            turned=(x, y, z),
-            position=(across, up, along),
-            tilts=self.tilts,
-            rotates=self.rotates,
-        )
+        x, y, z = (DEGREE * own for own in self.turned_deg)
+        across, up, along = (MILLIMETRE * own for own in self.position_mm)
+        own = self.model_dump(include={"name", "on", "tilts", "rotates"})
+        return ChainPart(**own, turned=(x, y, z), position=(across, up, along))
 
 
 class NoiseRecord(Record):

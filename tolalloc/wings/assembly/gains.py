@@ -18,8 +18,6 @@ from tolalloc.wings.assembly.trajectory import Trajectory, drawn, foreseen, rand
 class FinalErrors:
     """Final state and adjustments as linear maps of everything random.
 
-    Notes
-    -----
     Part errors and noise are independent of each other, so covariance and expected effort are affine in the part
     variances as long as the gains stay as they are.
     """
@@ -143,8 +141,6 @@ class StateWeightSweep:
 def state_weight_sweep(plan: AssemblyPlan, state_weights: Float[np.ndarray, " state_weight"]) -> StateWeightSweep:
     """Return what is to be expected of an assembly over the precision weight, ascending [-].
 
-    Notes
-    -----
     The estimator does not depend on Q (separation). At Q = 0 nothing is turned, so nothing is missed.
     """
     noise = plan.measurement_noise, plan.adjustment_noise
@@ -177,8 +173,6 @@ def norms(
 ) -> Float[np.ndarray, "state_weight *samples"]:
     """Return the weighted norm of the final errors of parts that are measured beforehand, over the precision weight.
 
-    Notes
-    -----
     It is √(xᵀQx) of the final errors at Q = 1 times the plan's weights: the plain norm where all weights are 1 [rad].
     With S = √Q₁ W √Q₁ ⪰ 0 the weighted final state is (I + qS)⁻¹ times the unadjusted one: each of its coordinates
     along the eigenvectors of S falls and is convex in q, and so is the norm. A single angle need not fall.

@@ -134,8 +134,6 @@ def assigned(at: int) -> MountingStep:
 def turned(stock: PartStock, mountings: Mountings, _peaks: Peaks) -> Asking[Trial]:
     """Return every unit in the best of all mountings of the parts that it has, its sun meshed as it is.
 
-    Notes
-    -----
     A sun's teeth are tried by `assigned` alone: they would multiply all else.
     """
     ways = np.array([units_from(stock, unit[:, 0].tolist(), _turns_but_the_suns(stock, unit)) for unit in mountings])
@@ -218,14 +216,8 @@ def best_mounting(
 ) -> FoundMounting:
     """Return the mounting with the least mean peak-to-peak that was found; of equals, the one with the least largest.
 
-    Parameters
-    ----------
-    seeds
-        Node of the seed tree, for all starts but the first, which takes the parts as they come.
-    starts
-        Starts of the search for several units; for one unit all mountings are tried [-].
-    largest_failed_share
-        Largest share of units without an answer [-].
+    For one unit all mountings are tried; for several the first start takes the parts as they come, and the seeds are
+    those of all others.
     """
     if starts < 1:
         raise InputError.at("mounting", "number of starts", starts, "1 or more")

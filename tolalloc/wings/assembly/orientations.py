@@ -53,12 +53,8 @@ def transmission_curves(
 ) -> TransmissionCurves:
     """Return the transmission of a few samples over one output turn, at the coarse angles of the model's search.
 
-    Parameters
-    ----------
-    errors
-        Deviations in the order of the model's columns, `OrientationResponse.errors` [m, angles rad].
-    torque
-        Torque on the carrier; negative resists the rotation [N·m].
+    Errors are in the order of the model's columns, `OrientationResponse.errors` [m, angles rad]; a negative torque on
+    the carrier resists the rotation [N·m].
     """
     solved = Solved.of(model.equilibria(errors, torque))
     found, pins = solved.equilibria, solved.forces.pins
@@ -100,19 +96,15 @@ def _loaded(kernel: KernelResponse, errors: Float[np.ndarray, "chunk all_columns
     return np.hstack([peak_to_peak, np.concatenate(values)]), np.maximum(found.status, np.concatenate(status))
 
 
+RATED_PEAK_TO_PEAK = "peak-to-peak transmission error, rated torque [arcsec]"
+PIN_FORCE = "largest pin force, rated torque [N]"
+DISC_FORCE = "largest sum of pin forces of a disc, rated torque [N]"
+LINE_LOAD = "largest line load, rated torque [N/mm]"
+PRESSURE = "peak pressure, rated torque [MPa]"
+_RATED = (RATED_PEAK_TO_PEAK, PIN_FORCE, DISC_FORCE, LINE_LOAD, PRESSURE, "pins in contact, mean, rated torque [-]")
 TRANSMISSION = (
     Reading(outputs=(PEAK_TO_PEAK, "mean transmission error [arcsec]"), read=_unloaded),
-    Reading(
-        outputs=(
-            "peak-to-peak transmission error, rated torque [arcsec]",
-            "largest pin force, rated torque [N]",
-            "largest sum of pin forces of a disc, rated torque [N]",
-            "largest line load, rated torque [N/mm]",
-            "peak pressure, rated torque [MPa]",
-            "pins in contact, mean, rated torque [-]",
-        ),
-        read=_loaded,
-    ),
+    Reading(outputs=_RATED, read=_loaded),
 )
 """What orientations change: at the test torque, and at rated torque at every coarse angle of the model's search."""
 
@@ -185,13 +177,8 @@ class OrientationResponse:
     def _kernel(self) -> KernelResponse:
         names = tuple(self._moved(np.zeros((1, len(self.columns)))))
         others = {name: 0.0 for name in self.model.columns if name not in names}
-        return KernelResponse(
-            model=self.model,
-            torque=self.torque,
-            columns=names,
-            fixed=others | self.model.reducer.modification.deviations,
-            observe=self.observe,
-        )
+        fixed = others | self.model.reducer.modification.deviations
+        return KernelResponse(model=self.model, torque=self.torque, columns=names, fixed=fixed, observe=self.observe)
 
     def _moved(self, x: Float[np.ndarray, "sample column"]) -> dict[str, Float[np.ndarray, " sample"]]:
         return self.chain.columns(x.reshape(-1, len(self.chain.parts), 3))
@@ -207,18 +194,9 @@ def transmission_effect(
     seeds: SeedTree,
     observe: Observer,
 ) -> TransmissionEffect:
-    """Return what the final angles do to the transmission.
+    """Return what the final angles do to the transmission, at every precision Q [-] of a plan that names a reducer.
 
-    Parameters
-    ----------
-    plan
-        The assembly; it names a reducer.
-    errors
-        Measured errors of the parts; unless given, parts are drawn from the plan's tolerances [rad].
-    state_weights
-        Q [-].
-    observe
-        Told the statuses of each chunk.
+    Unless errors of the parts were measured [rad], parts are drawn from the plan's tolerances.
     """
     reducer = load_reducer(plan.reducer)
     torque = reducer.load.test_torque

@@ -20,16 +20,10 @@ from tolalloc.reducers.reducer.design import Reducer
 
 
 class RingShift(NamedTuple):
-    """Turn by whole members of a ring of like ones: bores, teeth or pins.
+    """Turn by whole members of a ring of like ones: bores, teeth or pins."""
 
-    Parameters
-    ----------
-    by, of
-        Members turned by, and members of the ring [-].
-    """
-
-    by: int = 0
-    of: int = 1
+    by: int = 0  # Members turned by [-]
+    of: int = 1  # Members of the ring [-]
 
     @property
     def angle(self) -> float:
@@ -91,8 +85,6 @@ def sun_turn(reducer: Reducer, teeth: int) -> PartTurn:
 def disc_turns(reducer: Reducer, made_for: int, disc: int) -> tuple[PartTurn, ...]:
     """Return the turns in which a disc made for one place fits another, places counted from 0.
 
-    Notes
-    -----
     A disc's teeth stand turned by −ψ_j/zc against its carrier's frame. Turned by m crank positions, the disc fits where
     its teeth fall on those of the place: where zc·m/n_crank + (difference of places)/n_disc is whole, so many teeth.
     """
@@ -109,8 +101,6 @@ def disc_turns(reducer: Reducer, made_for: int, disc: int) -> tuple[PartTurn, ..
 def places_of(reducer: Reducer) -> tuple[MountingPlace, ...]:
     """Return the places of one unit.
 
-    Notes
-    -----
     The housing has one turn: turned by m pins, it meets the same states of the inner parts m pin pitches of the carrier
     earlier, as zc + 1 = zp, and a sun m·Z2 teeth further on. So only the start of the output turn moves.
 
@@ -166,8 +156,6 @@ def owned_columns(columns: Iterable[str], places: Iterable[MountingPlace]) -> tu
 def _terms(column: str, turn: PartTurn) -> tuple[tuple[str, float], ...]:
     """Return the columns that an error becomes by a turn, and its share in each [-].
 
-    Notes
-    -----
     A wave f(θ) becomes f(θ − turn), and its two amplitudes turn as a vector does, by its order times the angle. The
     place of a single pin is counted radially and tangentially, so it keeps its components.
     """
@@ -203,8 +191,6 @@ def _turned(columns: Mapping[str, float], turn: PartTurn) -> dict[str, float]:
 def mounted(errors: Mapping[str, float], place: MountingPlace, turn: PartTurn) -> dict[str, float]:
     """Return the columns of the model that a part's own errors give [m, angles rad].
 
-    Notes
-    -----
     Exact: the columns are linear in the errors, and a unit is the sum over its parts.
     """
     named = {own: source for source, own in place.owned.items()}

@@ -87,8 +87,6 @@ def observed(chain: DatumFlowChain, step: AssemblyStep) -> Float[np.ndarray, "re
 class StateSpace:
     """Steps mount → measure → adjust: z = x + F w, y = C z + v, x⁺ = z + B (u + n).
 
-    Notes
-    -----
     zhang2025's equations with A = 1, in the causal order: what a step brings in is measured before it is adjusted;
     otherwise the last part's error could never be taken out.
     """
@@ -116,11 +114,8 @@ def state_space(
 ) -> StateSpace:
     """Return the linear system of an assembly.
 
-    Parameters
-    ----------
-    transform
-        `DatumFlowChain.transform` unless given, or `DatumFlowChain.twist_transform` for six coordinates a part
-        [rad/rad].
+    The transform is `DatumFlowChain.transform` unless given, or `DatumFlowChain.twist_transform` for six coordinates a
+    part.
     """
     whole = chain.transform if transform is None else transform
     size = whole.shape[0] // len(chain.parts)
@@ -137,8 +132,6 @@ def state_space(
 def check_steps(chain: DatumFlowChain, steps: Sequence[AssemblyStep], place: str) -> None:
     """Refuse steps that cannot be carried out, in a sentence about a place, such as their file.
 
-    Notes
-    -----
     Parts that are not there can be turned by `steps_in_order` with ``all`` only, zhang2025's own way.
     """
     mounted: list[str] = []
@@ -171,9 +164,8 @@ def _check_names(chain: DatumFlowChain, step: AssemblyStep, where: str) -> None:
     for name in (step.mount, *step.adjust, *step.effort, *_measured(step)):
         if name not in chain.names:
             if name == chain.datum:
-                raise InputError.at(
-                    where, "measure", name, f"parts alone: everything is measured against {name} anyway"
-                )
+                allowed = f"parts alone: everything is measured against {name} anyway"
+                raise InputError.at(where, "measure", name, allowed)
             if "-" in name and all(each.strip() in chain.names for each in name.split("-")):
                 raise InputError.at(where, "measure", name, "one part - another, with spaces around the sign")
             raise UnknownNameError.among(where, "part", name, chain.names)

@@ -143,8 +143,6 @@ class PartStock:
 class MeasuredPart:
     """One part and its errors; an error that is not named is 0.
 
-    Notes
-    -----
     A part's own frame is the one in which the model counts its errors when it stands unturned at the first place of its
     kind. A housing comes with its pins and with what stands fixed in it: ``carrier.assembly``, ``carrier.tilt`` and
     ``sun.assembly``; a crank with its planet, ``planet.eccentricity``, and that planet's share of the mesh,
@@ -160,8 +158,6 @@ class MeasuredPart:
 def count_units(parts: Sequence[MeasuredPart], places: Sequence[MountingPlace], origin: Path | str) -> int:
     """Return how many units the parts make [-].
 
-    Notes
-    -----
     A kind of which there is no part at all counts as exact.
     """
     needed, there = Counter(place.kind for place in places), Counter(part.kind for part in parts)
@@ -207,9 +203,8 @@ def load_parts(path: str | Path, reducer: Reducer) -> tuple[MeasuredPart, ...]:
         if error not in known[kind]:
             raise UnknownNameError.among(place, f"error of a {kind}", error, known[kind])
         if error in errors.setdefault(part, {}):
-            raise InputError.at(
-                place, f"error of part {part}", error, "each error once, and this one stands further up"
-            )
+            allowed = "each error once, and this one stands further up"
+            raise InputError.at(place, f"error of part {part}", error, allowed)
         errors[part][error] = _deviation(place, error, value, unit)
     parts = tuple(MeasuredPart(name=name, kind=kind, errors=errors[name]) for name, kind in kinds.items())
     count_units(parts, places_of(reducer), table.path)
@@ -246,8 +241,6 @@ def drawn_parts(errors: ErrorModel, reducer: Reducer, units: int, seeds: SeedTre
 
     What the error model does not list is exact.
 
-    Notes
-    -----
     A part keeps the zones of the place that it is drawn for, where the drawings of like parts differ. A kind of part
     without any error is left out.
     """

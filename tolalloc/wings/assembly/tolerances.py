@@ -61,8 +61,6 @@ def requirements_of(plan: AssemblyPlan) -> AngularRequirements:
 def angular_limits(plan: AssemblyPlan) -> AngularLimits:
     """Return the limits of a plan; what has no limit gets no row.
 
-    Notes
-    -----
     The tilt is limited as a whole, Var_x + Var_y, since its direction turns with the crank.
     """
     requirements, parts = requirements_of(plan), np.eye(len(plan.chain.names))
@@ -80,8 +78,6 @@ def angular_limits(plan: AssemblyPlan) -> AngularLimits:
 def angular_problem(plan: AssemblyPlan, errors: FinalErrors) -> AllocationProblem:
     """Return the allocation with tolerances and stacks in arcseconds, for the gains of given final errors.
 
-    Notes
-    -----
     With fixed gains nine times a final variance is Σ a_i·t_i² + 9ν, so it stays below T² where ‖√a∘t‖ ≤ √(T² − 9ν).
     The priced effort is affine in t² too: a quality loss and a constant, which is left out. Where the noise alone
     exceeds a limit the budget is negative, as no tolerance keeps it.
@@ -95,34 +91,24 @@ def angular_problem(plan: AssemblyPlan, errors: FinalErrors) -> AllocationProble
         PricedFeature(name=name, processes=(_process(requirements, at),), loss=float(loss))
         for at, (name, loss) in enumerate(zip(names, losses, strict=True))
     )
+    roots = np.sqrt(limits.by_tolerance(errors))
     stacks = tuple(
         Stack(name=name, worst_case=np.zeros(len(names)), root_sum_square=root_sum_square, budget=float(budget))
-        for name, root_sum_square, budget in zip(
-            limits.names, np.sqrt(limits.by_tolerance(errors)), budgets, strict=True
-        )
+        for name, root_sum_square, budget in zip(limits.names, roots, budgets, strict=True)
     )
     return AllocationProblem(features=features, stacks=stacks)
 
 
 def _process(requirements: AngularRequirements, at: int) -> Process:
     """Return how the tolerance at a position among all is made, over arcseconds."""
-    made = Process(
-        name=requirements.form,
-        cost=_cost(requirements, at),
-        minimum=requirements.smallest,
-        maximum=requirements.largest,
-    )
-    return made.rescaled(ARCSECOND)
-
-
-def _cost(requirements: AngularRequirements, at: int) -> ClosedForm:
-    """Return the cost of that tolerance, over radians."""
-    fixed, factor = float(requirements.fixed.flat[at]), float(requirements.factor.flat[at])
-    if requirements.form == "reciprocal":
-        return Reciprocal(fixed=fixed, factor=factor)
-    if requirements.form == "exponential":
-        return Exponential(fixed=fixed, factor=factor, scale=float(requirements.scale.flat[at]))
-    raise InputError.at("angular requirements", "form", requirements.form, "reciprocal or exponential")
+    own, form = requirements, requirements.form
+    fixed, factor, scale = (float(each.flat[at]) for each in (own.fixed, own.factor, own.scale))
+    if form not in ("reciprocal", "exponential"):
+        raise InputError.at("angular requirements", "form", form, "reciprocal or exponential")
+    cost: ClosedForm = Reciprocal(fixed=fixed, factor=factor)
+    if form == "exponential":
+        cost = Exponential(fixed=fixed, factor=factor, scale=scale)
+    return Process(name=form, cost=cost, minimum=own.smallest, maximum=own.largest).rescaled(ARCSECOND)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -216,19 +202,16 @@ def verify_angles(
 ) -> AngularVerification:
     """Return what assemblies of normally distributed parts, readings and adjustments show of an allocation.
 
-    Notes
-    -----
     An assembly is within a tilt limit where √(x² + y²) is, which is not what three standard deviations of x and y
     together promise of one normal angle: of assemblies that just keep a limit 99.73 % are within it where the tilt has
     one direction only, and 1 − exp(−9) = 99.988 % where it has none.
     """
-    squares = np.concatenate(
-        [
-            _final(plan, allocation, seeds.generator(index), min(CHUNK, assemblies - start)) ** 2
-            for index, start in enumerate(range(0, assemblies, CHUNK))
-        ]
-    )
-    limited = squares @ allocation.limits.counted.T
+    squares = []
+    for index, start in enumerate(range(0, assemblies, CHUNK)):
+        # A whole chunk is drawn, so that the first assemblies are the same however many follow.
+        standard = seeds.generator(index).standard_normal((CHUNK, random_numbers(plan.space)))[: assemblies - start]
+        squares.append(assembled(plan, allocation.gains, allocation.tolerances, standard).adjusted[:, -1] ** 2)
+    limited = np.concatenate(squares) @ allocation.limits.counted.T
     variance = limited.mean(axis=0)
     within: Bool[np.ndarray, "assembly limit"] = limited <= allocation.limits.values**2
     return AngularVerification(
@@ -239,15 +222,6 @@ def verify_angles(
         shares=tuple(wilson_interval(assemblies, int(each)) for each in within.sum(axis=0)),
         share=wilson_interval(assemblies, int(within.all(axis=1).sum())),
     )
-
-
-def _final(
-    plan: AssemblyPlan, allocation: AngularAllocation, generator: np.random.Generator, assemblies: int
-) -> Float[np.ndarray, "assembly state"]:
-    """Return final states of one chunk of assemblies [rad]."""
-    # A whole chunk is drawn, so that the first assemblies are the same however many follow.
-    standard = generator.standard_normal((CHUNK, random_numbers(plan.space)))[:assemblies]
-    return np.asarray(assembled(plan, allocation.gains, allocation.tolerances, standard).adjusted[:, -1])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -266,27 +240,19 @@ class RetunedAllocation:
 def retuned_allocation(plan: AssemblyPlan, most_filters: int = 100) -> RetunedAllocation:
     """Return allocations whose filters are tuned again until the tolerances settle.
 
-    Parameters
-    ----------
-    most_filters
-        Filters after which the iteration ends, settled or not [-].
-
-    Notes
-    -----
     Every allocation keeps the limits with its own gains, so each is one that can be built, whether or not the iteration
     settles. Gains and tolerances together are not a convex program: neither the fixed point nor the best of the
     allocations is claimed to be the cheapest of all filters. The iteration ends where no tolerances keep the limits.
     """
-    found = [allocate_angles(plan)]
-    while len(found) < most_filters:
+    found, settled = [allocate_angles(plan)], False
+    while len(found) < most_filters and not settled:
         last = found[-1]
         following = allocated(plan, tuned_gains(plan, last.gains.state_weight, last.tolerances))
         if following is None:
             break
         found.append(following)
-        if np.abs(following.tolerances / last.tolerances - 1).max() <= _TOLERANCES_SETTLED:
-            return RetunedAllocation(allocations=tuple(found), settled=True)
-    return RetunedAllocation(allocations=tuple(found), settled=False)
+        settled = bool(np.abs(following.tolerances / last.tolerances - 1).max() <= _TOLERANCES_SETTLED)
+    return RetunedAllocation(allocations=tuple(found), settled=settled)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -316,33 +282,22 @@ def best_state_weight(
 ) -> StateWeightCost:
     """Return what tolerances and effort cost over the precision, with the filter of the plan's tolerances.
 
-    Parameters
-    ----------
-    lowest, highest
-        Precisions between which the best one is looked for, above 0 [-].
-    points
-        Precisions of the curve, evenly spread by their logarithms [-].
+    The points of the curve are evenly spread by their logarithms; the best one is looked for between the lowest and the
+    highest [-].
 
-    Notes
-    -----
     The best of the points is refined between its neighbours. The total need not have one minimum alone, so what lies
     between other points is not searched.
     """
     if not 0 < lowest < highest < inf or points < 3:
-        raise InputError.at(
-            plan.name,
-            "range and points of the precision",
-            (lowest, highest, points),
-            "two numbers above 0, the smaller one first, and 3 points or more",
-        )
+        allowed = "two numbers above 0, the smaller one first, and 3 points or more"
+        raise InputError.at(plan.name, "range and points of the precision", (lowest, highest, points), allowed)
     state_weights = np.geomspace(lowest, highest, points)
     found = [_at(plan, float(state_weight)) for state_weight in state_weights]
     cost = np.array([np.nan if each is None else each.cost for each in found])
     effort_cost = np.array([np.nan if each is None else each.effort_cost for each in found])
     if np.isnan(cost).all():
-        raise InputError.at(
-            plan.name, "range of the precision", (lowest, highest), "one where some tolerances keep the limits"
-        )
+        allowed = "one where some tolerances keep the limits"
+        raise InputError.at(plan.name, "range of the precision", (lowest, highest), allowed)
     at = int(np.nanargmin(cost + effort_cost))
     around = np.log(state_weights[[max(at - 1, 0), min(at + 1, points - 1)]])
     refined = minimize_scalar(

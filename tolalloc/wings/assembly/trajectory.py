@@ -26,14 +26,11 @@ class Trajectory:
 
 def foreseen(space: StateSpace, regulator: Regulator, errors: Float[np.ndarray, "*samples error"]) -> Trajectory:
     """Return assemblies of parts that are all measured before the first is mounted, errors in their own axes [rad]."""
-    exact = np.zeros((*errors.shape[:-1], *space.effort.shape))
-    return _march(
-        space,
-        regulator,
-        errors,
-        exact,
-        lambda step, mounted: mounted + errors @ space.entering[step + 1 :].sum(axis=0).T,
-    )
+
+    def estimate(step: int, mounted: State) -> State:
+        return np.asarray(mounted + errors @ space.entering[step + 1 :].sum(axis=0).T)
+
+    return _march(space, regulator, errors, np.zeros((*errors.shape[:-1], *space.effort.shape)), estimate)
 
 
 def simulated(
@@ -77,24 +74,14 @@ def drawn(
 ) -> Trajectory:
     """Return simulated assemblies from standard normal numbers.
 
-    Parameters
-    ----------
-    deviations
-        Standard deviations of every part error, of a reading, and of what an adjustment misses [rad].
-    standard
-        `random_numbers` per assembly: those of the part errors, of the readings, of the adjustments [-].
+    Deviations are the standard ones of every part error, of a reading, and of what an adjustment misses [rad]; of the
+    numbers, `random_numbers` per assembly, those of the part errors come first, then of the readings [-].
     """
     of_parts, of_reading, of_adjustment = deviations
     parts = space.entering.shape[2]
     errors, readings, missed = np.split(standard, [parts, standard.shape[-1] - space.effort.size], axis=-1)
-    return simulated(
-        space,
-        regulator,
-        kalman,
-        of_parts * errors,
-        of_reading * readings,
-        of_adjustment * missed.reshape(*standard.shape[:-1], *space.effort.shape),
-    )
+    missed = of_adjustment * missed.reshape(*standard.shape[:-1], *space.effort.shape)
+    return simulated(space, regulator, kalman, of_parts * errors, of_reading * readings, missed)
 
 
 def _march(

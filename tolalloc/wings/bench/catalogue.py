@@ -100,12 +100,9 @@ def identify_from_catalogue(reducer: Reducer) -> CatalogueResult:
         near, far = far, far + direction * log(2.0)
         if abs(far) > log(_FARTHEST) or isnan(off(far)):
             limit = exp(direction * last) * stated.torsional_rigidity * ARCMINUTE
-            raise InputError.at(
-                reducer.name,
-                "[catalogue] torsional_rigidity_nm_per_arcmin",
-                round(stated.torsional_rigidity * ARCMINUTE, 6),
-                f"at {'most' if direction > 0 else 'least'} {limit:.3g}, with bearings of any stiffness",
-            )
+            allowed = f"at {'most' if direction > 0 else 'least'} {limit:.3g}, with bearings of any stiffness"
+            value = round(stated.torsional_rigidity * ARCMINUTE, 6)
+            raise InputError.at(reducer.name, "[catalogue] torsional_rigidity_nm_per_arcmin", value, allowed)
     exponent = near if near == far else float(brentq(off, near, far, xtol=1e-10))
     return CatalogueResult(
         catalogue=stated,

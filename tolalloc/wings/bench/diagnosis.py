@@ -98,11 +98,6 @@ class Diagnosis:
     failed: int
 
     @property
-    def column_mean(self) -> Float[np.ndarray, " column"]:
-        """Mean of every column [m, angles rad]."""
-        return np.asarray(self.deviations.mean(axis=0))
-
-    @property
     def column_interval(self) -> Float[np.ndarray, "2 column"]:
         """95 % interval of every column [m, angles rad]."""
         return np.asarray(np.quantile(self.deviations, TAILS, axis=0))
@@ -126,8 +121,6 @@ def diagnose(
     vary [m]. The named sources contain the dominant one with the probability ``level`` [-]. Each stage of the work is
     told as it begins. What gauges have read of its parts already narrows them too.
 
-    Notes
-    -----
     Bayes' rule with the drawings as prior. The map from errors to curve has kinks wherever a pin takes over, and one
     curve has many near explanations: scouts led from the prior towards the curve find them, damped Gauss–Newton steps
     climb down, and sequential Monte Carlo on the kernel samples the errors around the best one.

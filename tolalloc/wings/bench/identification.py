@@ -56,12 +56,10 @@ class IdentificationRequest:
     data: str = "measurements"  # Where the data were read, for errors
 
     def __post_init__(self) -> None:
-        place = "identification"
-        names = [item.name for item in self.parameters]
+        place, names = "identification", [item.name for item in self.parameters]
         if not set(names) - {BIAS}:
-            raise InputError.of_argument(
-                place, "parameters", names, "one or more besides the bias, which is the baseline"
-            )
+            allowed = "one or more besides the bias, which is the baseline"
+            raise InputError.of_argument(place, "parameters", names, allowed)
         for name in names:
             if names.count(name) > 1:
                 raise InputError.of_argument(place, "parameters", name, "each parameter once")
@@ -138,7 +136,7 @@ def identify(
     _require_close(request, data, surrogate)
     quick = problem.of(request.parameters, surrogate)
     progress.begin("Gauss–Newton")
-    found = _found(problem, quick, request.seed, seeds)
+    found = _found(problem, quick, seeds)
     prediction = kernel(found.coordinates)
     own = information(problem, prediction, found.coordinates)
     widened = problem.widened(own.variance_factor)
@@ -207,13 +205,13 @@ def _require_close(request: IdentificationRequest, data: AllReadings, surrogate:
         )
 
 
-def _found(problem: IdentificationProblem, quick: IdentificationProblem, seed: int, seeds: SeedTree) -> Identified:
+def _found(problem: IdentificationProblem, quick: IdentificationProblem, seeds: SeedTree) -> Identified:
     """Return the least objective on polynomials, finished on the model from there.
 
     The reducer as given is another start on the model, should polynomials lead astray.
     """
-    near = gauss_newton(quick, starts(quick, STARTS, seeds.child("starts")), seed)
-    return gauss_newton(problem, np.stack([near.coordinates, problem.start]), seed).after(near)
+    near = gauss_newton(quick, starts(quick, STARTS, seeds.child("starts")))
+    return gauss_newton(problem, np.stack([near.coordinates, problem.start])).after(near)
 
 
 def judged_choices(quick: IdentificationProblem, surrogate: Surrogate, reducer: Reducer) -> tuple[ParameterChoice, ...]:

@@ -78,8 +78,6 @@ class Information:
     def covariance(self) -> Float[np.ndarray, "parameter parameter"]:
         """Covariance of the coordinates from the readings and the bounds together [-].
 
-        Notes
-        -----
         Bounds enter as a prior with the variance of an even distribution between them, (upper − lower)²/12, so a
         coordinate of which the readings say nothing has that variance and no more. Where readings say much, it is the
         inverse of their information. Theory page, equation (40).
@@ -121,8 +119,6 @@ def information(
 ) -> Information:
     """Return what the readings say around a point, given what should have been read there.
 
-    Notes
-    -----
     Theory page, equation (39).
     """
     readings, freedom = problem.data.measured.size, problem.freedom

@@ -21,8 +21,6 @@ _STEPS = 40
 class IdentificationProblem:
     """Half the sum of squares of all residuals over their noise, and of the coordinates over their prior deviation.
 
-    Notes
-    -----
     liu2020, equations (15)–(16), with weights. Theory page, equation (38).
     """
 
@@ -131,7 +129,6 @@ def require_enough(problem: IdentificationProblem) -> None:
 
 NAME = "Gauss–Newton"
 
-
 Batch = tuple[Float[np.ndarray, "point parameter"], Float[np.ndarray, " point"]]
 """Points that were tried together, and the objective at each [-]."""
 
@@ -141,7 +138,6 @@ class Identified:
     """Answer of one run of one method, and how it got there."""
 
     method: str  # Name of the method
-    seed: int | None  # Seed of the run; none if nothing is random [-]
     coordinates: Float[np.ndarray, " parameter"]  # Where the least objective was found [-]
     objective: float  # Half the weighted sum of squares there [-]
     evaluated: Int[np.ndarray, " batch"]  # How often all readings were predicted up to the end of each batch [-]
@@ -149,7 +145,7 @@ class Identified:
     status: str  # Why it ended
 
     @classmethod
-    def among(cls, batches: Sequence[Batch], method: str, seed: int | None, status: str) -> Identified:
+    def among(cls, batches: Sequence[Batch], method: str, status: str) -> Identified:
         """Return the best of all points that a method tried."""
         coordinates, objective, least = np.zeros(batches[0][0].shape[1]), np.inf, []
         for points, objectives in batches:
@@ -159,7 +155,6 @@ class Identified:
             least.append(objective)
         return cls(
             method=method,
-            seed=seed,
             coordinates=coordinates,
             objective=objective,
             evaluated=np.cumsum([objectives.size for _, objectives in batches]),
@@ -187,12 +182,8 @@ def starts(problem: IdentificationProblem, count: int, seeds: SeedTree) -> Float
     return np.concatenate([problem.start[np.newaxis], problem.lower + scattered * (problem.upper - problem.lower)])
 
 
-def gauss_newton(
-    problem: IdentificationProblem, start: Float[np.ndarray, "start parameter"], seed: int | None = None
-) -> Identified:
-    """Return the least objective that any start leads to.
-
-    One row for each start; the seed that they came from is for the record.
+def gauss_newton(problem: IdentificationProblem, start: Float[np.ndarray, "start parameter"]) -> Identified:
+    """Return the least objective that any start, a row each, leads to.
 
     References
     ----------
@@ -206,7 +197,7 @@ def gauss_newton(
         reached = min(float(objectives[0]) for _, objectives in batches[begun:])
         if reached < least:
             least, status = reached, "converged" if converged else f"stopped after {_STEPS} steps"
-    return Identified.among(batches, NAME, seed, status)
+    return Identified.among(batches, NAME, status)
 
 
 def _descend(problem: IdentificationProblem, start: Float[np.ndarray, " parameter"], batches: list[Batch]) -> bool:

@@ -97,8 +97,6 @@ class PredictedOrder:
     def judged(self, waves: Complex[np.ndarray, " unit"]) -> LotOrder:
         """Return an order of a lot beside its prediction.
 
-        Notes
-        -----
         Noise and discrepancy are known as bounds, so that a lot is held to be too small against lots without them, and
         too large against lots with them: twice the smaller tail, the lot counted as one of the simulated ones.
         """
@@ -156,8 +154,6 @@ def _require_close(file: Path, curve: Cleaned, highest: float) -> None:
 def predicted_orders(curves: LotCurves, lots: int, seed: int) -> tuple[PredictedOrder, ...]:
     """Return what so many simulated lots of the drawing do in every order.
 
-    Notes
-    -----
     Units are drawn on the model, lots from these units. What the model leaves out is one function for all units of a
     lot, an assumption. What so many units leave open of their own mean square, its standard error, is added to every
     lot.
@@ -213,8 +209,6 @@ def with_sources(
 ) -> tuple[LotOrder, ...]:
     """Return the orders and which of them moved, of each that did the sources that make it in units of the drawing.
 
-    Notes
-    -----
     The total effect of a source, the mean of ½|w − w'|² over the variance of the wave, w' with that source drawn again
     (Jansen, Computer Physics Communications 117, 1999, 35–43). Sources act on each other, so that shares sum to more
     than 1; one that does nothing alone is found too.

@@ -315,8 +315,6 @@ def _apart(table: TextTable) -> tuple[TextTable, TextTable | None]:
 def _without_gauge(path: Path, column: GaugedColumn, names: Sequence[str], stated: TextTable | None) -> GaugedColumn:
     """Return a column part by part, with what its gauge adds to it; unchanged where nothing is known of the gauge.
 
-    Notes
-    -----
     The variance of one reading is stated, or pooled from parts that were read again, Σ(y − ȳ)²/Σ(r − 1); a mean of r of
     them has 1/r of it, and parts with different r the mean of that, to first order.
     """
@@ -355,10 +353,8 @@ def _stated(column: GaugedColumn, stated: TextTable | None) -> float:
         return 0.0
     factor, (shown,) = column_readings(stated, column.header, _LENGTHS)
     if not (np.isnan(shown) or 0.0 < shown <= LARGEST_DEVIATION * MICROMETRE):
-        place = f"{stated.path}, row {stated.rows[0]}"
-        raise InputError.at(
-            place, f"the gauge of {column.header!r}", float(f"{shown / factor:.9g}"), "above 0, or empty"
-        )
+        place, value = f"{stated.path}, row {stated.rows[0]}", float(f"{shown / factor:.9g}")
+        raise InputError.at(place, f"the gauge of {column.header!r}", value, "above 0, or empty")
     part = 0.5 if split_header(column.header)[0].endswith(".diameter") else 1.0
     return 0.0 if np.isnan(shown) else float(shown) * part
 
@@ -515,8 +511,6 @@ def _plain(source: Source) -> Source:
 def _capability(source: Source, columns: Sequence[GaugedColumn], lots: Lots) -> LotCapability:
     """Return the capability of a source and its row in the table of the lot.
 
-    Notes
-    -----
     Cp is that of a tolerance table: of a size the σ at Cp 1 over s, which is zone/(6·s) for normal deviations; of a
     radius or total deviation the root mean square at Cp 1 over that of the lot, so that a place that is off for all
     parts widens it too. Cpk is the distance of the mean from the nearer limit over 3·s; its interval by the spread of

@@ -66,7 +66,6 @@ class MeasuredPeakToPeak:
     values: Float[np.ndarray, " n"]  # Peak-to-peaks, output side [rad]
     torque: float  # Torque on the carrier, negative against the rotation [N·m]
     noise: float | None = None  # Standard deviation of one value, None where the file does not state it [rad]
-    repairs: tuple[str, ...] = ()  # What was mended, prefixed by the file
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,9 +85,8 @@ class Measurements:
     @property
     def repairs(self) -> tuple[str, ...]:
         """Everything that was mended, each prefixed by its file."""
-        table = self.peak_to_peak.repairs if self.peak_to_peak else ()
-        curves = tuple(repair for curve in self.curves for repair in curve.repairs)
-        return table + curves + tuple(repair for loop in self.loops for repair in loop.repairs)
+        shapes: tuple[MeasuredCurve | MeasuredLoop, ...] = (*self.curves, *self.loops)
+        return tuple(repair for own in shapes for repair in own.repairs)
 
 
 def _loaded(torque: float) -> float:
@@ -221,12 +219,8 @@ def _peak_to_peak(data: Mapping[str, Any], path: Path, positions: Mapping[str, i
     for row, name, cells, value in zip(table.rows, names, table.cells, values, strict=True):
         units.append(_position(name, f"{table.path}, row {row}", positions))
         if not 0.0 <= value <= LARGEST_RANGE:
-            raise InputError.at(
-                f"{table.path}, row {row} (unit {name})",
-                header,
-                cells[table.headers.index(header)],
-                f"a number from 0 to {LARGEST_RANGE / factor:g}",
-            )
+            cell, allowed = cells[table.headers.index(header)], f"a number from 0 to {LARGEST_RANGE / factor:g}"
+            raise InputError.at(f"{table.path}, row {row} (unit {name})", header, cell, allowed)
     require_moving(table.path, header, values / factor)
     return MeasuredPeakToPeak(
         unit=np.array(units), values=values, torque=record.torque_nm, noise=_in_radians(record.noise_arcsec)

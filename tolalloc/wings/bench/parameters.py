@@ -87,26 +87,16 @@ class Parameter:
 def parameter(
     name: str, reducer: Reducer, bounds: tuple[float, float] | None = None, prior: float = inf, place: str = "identify"
 ) -> Parameter:
-    """Return a parameter that begins at the reducer's value, or at no bias and the stated torque.
+    """Return a parameter of `SYMBOLS` that begins at the reducer's value, or at no bias and the stated torque.
 
-    Parameters
-    ----------
-    name
-        One of `SYMBOLS`, of an interface that the reducer has.
-    reducer
-        Where a stiffness begins.
-    bounds
-        Lower and upper bound; half to double a stiffness, ±60 arcsec, a tenth to ten times the torque unless given.
-    prior
-        Relative standard deviation that is known beforehand, for the bias in arcseconds [-].
-    place
-        Where the user wrote it, for errors.
+    Bounds are half to double a stiffness, ±60 arcsec, a tenth to ten times the torque unless given; the prior is a
+    relative standard deviation, of the bias one in arcseconds.
     """
     known = [own for own in SYMBOLS if own in (BIAS, TORQUE) or getattr(reducer.stiffness, own)]
     if name not in known:
         raise UnknownNameError.among(place, "parameter", name, known)
-    start = {BIAS: 0.0, TORQUE: 1.0}.get(name) if name in (BIAS, TORQUE) else float(getattr(reducer.stiffness, name))
-    assert start is not None
+    starts = {BIAS: 0.0, TORQUE: 1.0}
+    start = starts[name] if name in starts else float(getattr(reducer.stiffness, name))
     low, high = bounds or _WIDEST.get(name) or (start / _STIFFNESS_SPAN, start * _STIFFNESS_SPAN)
     floor, ceiling = {BIAS: (-3600.0, 3600.0), TORQUE: (1e-3, 1e3)}.get(name, (1e4, 1e13))
     allowed = _ALLOWED.get(name, "two stiffnesses from 1e4 to 1e13 N/m") + ", the smaller one first"

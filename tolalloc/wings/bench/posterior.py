@@ -253,8 +253,6 @@ def bridge(
     leaves the effective share of the particles, which sets its length, and makes at most so many moves; settling are
     the moves at the end of the way.
 
-    Notes
-    -----
     Sequential Monte Carlo over start^(1−t)·target^t: at each t the particles are weighed, resampled and moved. A move
     is a step of an autoregressive process that has the particles' mean and covariance, accepted by Metropolis–Hastings,
     so that a normal density in any number of dimensions needs few of them.

@@ -160,8 +160,6 @@ class SimulatedLaw:
     def process_ends(self, ratio: float) -> tuple[float, float]:
         """Return where the standard deviation of the process lies if that of a lot's readings is one, both over σ [-].
 
-        Notes
-        -----
         A generalized interval: quantiles of (s/q)² − g², q and g of every simulated lot.
 
         References
@@ -253,12 +251,7 @@ class GaugedProcess:
 class Lots:
     """Simulated lots of the drawing's processes, drawn once for all sources that are distributed alike.
 
-    Parameters
-    ----------
-    tests
-        Tests that are made of the lot [-].
-    level
-        False-alarm rate of all of them together [-].
+    They are as many as tests of a lot with one false-alarm rate, the level, ask for.
     """
 
     def __init__(self, tests: int, level: float, seed: int) -> None:

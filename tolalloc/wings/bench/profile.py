@@ -40,14 +40,9 @@ class ParameterProfile:
         return replace(self, interval=(min(self.interval[0], float(low)), max(self.interval[1], float(high))))
 
     @property
-    def open_ends(self) -> tuple[bool, bool]:
-        """Whether the interval reaches the lower and the upper bound."""
-        return bool(self.interval[0] <= self.coordinate[0]), bool(self.interval[1] >= self.coordinate[-1])
-
-    @property
     def is_identified(self) -> bool:
         """Whether the readings keep the parameter away from at least one of its bounds."""
-        return not all(self.open_ends)
+        return bool(self.interval[0] > self.coordinate[0] or self.interval[1] < self.coordinate[-1])
 
 
 @dataclass(frozen=True)
@@ -101,8 +96,6 @@ def profile(
     The noise of the problem is widened by the variance factor, and a surrogate should predict. What was found to first
     order says where to look, and the threshold.
 
-    Notes
-    -----
     Theory page, equation (41).
     """
     lower, upper, middle = float(problem.lower[place]), float(problem.upper[place]), float(best[place])
@@ -265,8 +258,6 @@ def _left(problem: IdentificationProblem, coordinates: Float[np.ndarray, " param
 def simplest(choices: Sequence[ParameterChoice]) -> ParameterChoice:
     """Return the choice with the fewest parameters that is as good as the best within a standard error.
 
-    Notes
-    -----
     Differences of squared residuals are taken unit by unit, so what all choices of the same data share cancels.
     """
     best = min(choices, key=lambda item: item.score)

@@ -392,12 +392,11 @@ def whole_turns(readings: RawReadings) -> tuple[RawReadings, str]:
     span, turns = float(angle[-1] - angle[0]), turns_covered(angle)
     if turns == 0:
         if span < SMALLEST_COVER * TURN:
-            raise InputError.at(
-                readings.path,
-                "the part of a turn that its angles cover",
+            covered, allowed = (
                 float(f"{span / TURN:.3g}"),
                 f"{SMALLEST_COVER:g} or more, in the unit that the header states",
             )
+            raise InputError.at(readings.path, "the part of a turn that its angles cover", covered, allowed)
         return readings, f"covers {span / TURN:.3g} of a turn"
     # The first reading kept is the nearest to where the turns begin, the last ends half a step before it comes again,
     # so that a closing reading at 360° is not there twice and the seam has the width of a step.
@@ -493,12 +492,11 @@ def _in_turn(readings: RawReadings, steps: tuple[Step, ...]) -> tuple[RawReading
 def _without_mean(readings: RawReadings, values: Float[np.ndarray, " reading"]) -> Float[np.ndarray, " reading"]:
     """Return the values less their mean, or refuse a range that no reducer has."""
     if np.ptp(values) > LARGEST_RANGE:
-        raise InputError.at(
-            readings.path,
-            "the range of its values",
-            f"{np.ptp(values) / DEGREE:.3g} deg",
+        span, allowed = (
+            np.ptp(values) / DEGREE,
             f"up to {LARGEST_RANGE / DEGREE:g} deg, in the unit that the header states",
         )
+        raise InputError.at(readings.path, "the range of its values", f"{span:.3g} deg", allowed)
     return np.asarray(values - values.mean())
 
 

@@ -233,8 +233,6 @@ def worth_of(
     Costs are those of each decision for each of the units that are equally likely, shown is what an exact gauge would
     read of them, gauge the standard deviation of the real one, in the unit of shown.
 
-    Notes
-    -----
     Expected value of sample information, E[min E[L_d | reading]] against min E[L_d]. A reading is told as one of
     classes of equal probability, into which the gauge's error spreads each unit by its normal probability p_jk; no
     class has so few units that chance decides in it. What to do in a class is learnt from one half of the units and

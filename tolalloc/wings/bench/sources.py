@@ -63,8 +63,6 @@ def has_half_turn(reducer: Reducer, columns: Sequence[str]) -> bool:
 def half_turn(columns: Sequence[str], reducer: Reducer) -> Float[np.ndarray, "column column"]:
     """Return the matrix that takes a unit's columns to those of its twin [-].
 
-    Notes
-    -----
     Vectors change sign. Tilts act by their height above the middle between the discs: the discs are exchanged, so
     height and vector both change sign and a tilt keeps its own. Pin k becomes pin k + zp/2, its place counted from its
     own radius; a wave of order h along the ring of pins or around a gear lags by hπ. A disc's own angle counts from a

@@ -18,7 +18,6 @@ from tolalloc.reducers.reducer.design import Reducer
 BLENDS = {"linear": Polynomial([0, 1]), "step": Polynomial([0, 0, 3, -2])}
 """From 0 to 1 between two given times: along a straight line, or by the cubic that starts and ends level."""
 
-
 _OverTime = Float[np.ndarray, " time"]
 _Piece = tuple[Int[np.ndarray, " time"], _OverTime, _OverTime, _OverTime, _OverTime]
 """The piece of a profile that each time lies in: number, first value, rise to the last, length, share gone."""
@@ -115,8 +114,6 @@ def motion_of(
     θc = θ0 + ∫Ω dt/i with the reducer's ratio i = 1 + (Z2/Z1)·zp; input speed Ω [rad/s], torque on the carrier [N·m],
     duration of all steps [s], θc at time 0 [rad].
 
-    Examples
-    --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> speed, torque = SpeedProfile.constant(525 * 2 * np.pi / 60), SpeedProfile.constant(-572.0)
     >>> found = motion_of(load_reducer("rv40e_xi2015"), speed, torque, duration=1.0, steps=10)
@@ -153,8 +150,6 @@ def nominal_acceleration(at: Positions, motion: Motion) -> Float[np.ndarray, "ti
 
     Own derivation: exact for rigid parts without errors.
 
-    Examples
-    --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> reducer, steady = load_reducer("rv40e_xi2015"), SpeedProfile.constant(525 * 2 * np.pi / 60)
     >>> motion = motion_of(reducer, steady, SpeedProfile.constant(-572.0), duration=0.1, steps=1)
@@ -217,8 +212,6 @@ def inertia_of(reducer: Reducer, density: float = 7850.0, output_inertia: float 
     Solid cylinders of radius R and width b have m = ρ·π·R²·b and J = m·R²/2. The density ρ is that of all parts
     [kg/m³]; the carrier turns the output inertia besides its own [kg·m²].
 
-    Examples
-    --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> found = inertia_of(load_reducer("rv40e_xi2015"))
     >>> f"{found.disc:.3f} kg, {found.disc_moment:.3e} kg·m²"
@@ -260,8 +253,7 @@ class Damping:
     mass_proportional: float = 0.0  # Damping per mass of every coordinate [1/s]
     stiffness_proportional: float = 0.0  # Damping per stiffness of every interface without play [s]
     # Further damping per stiffness of single interfaces, by their field of
-    # `tolalloc.reducers.reducer.stiffness.Stiffness`
-    # [s]
+    # `tolalloc.reducers.reducer.stiffness.Stiffness` [s]
     interfaces: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -275,13 +267,7 @@ class Damping:
         return self.stiffness_proportional + self.interfaces.get(interface, 0.0)
 
     def check(self, groups: list[SpringGroup]) -> None:
-        """Make sure that every interface with damping of its own is there and has no play.
-
-        Raises
-        ------
-        InputError
-            One that is not.
-        """
+        """Make sure that every interface with damping of its own is there and has no play."""
         allowed = [group.stiffness_name for group in groups if group.contact == "bilateral"]
         for name in self.interfaces:
             if name not in allowed:

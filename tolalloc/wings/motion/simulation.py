@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -184,14 +184,12 @@ def prepare_simulation(asked: SimulationRequest) -> PreparedSimulation:
         # The prototype takes the unit's own modification from the teeth.
         reducer = replace(with_ideal_gears(reducer), modification=unit.modification(reducer))
     if asked.pin_stiffness is not None:
-        constant = replace(
-            reducer.stiffness, pin_contact=asked.pin_stiffness, pin_contact_law="constant", pin_bending=inf
-        )
-        reducer = replace(reducer, stiffness=constant)
+        own: dict[str, Any] = {"pin_contact": asked.pin_stiffness, "pin_contact_law": "constant", "pin_bending": inf}
+        reducer = replace(reducer, stiffness=replace(reducer.stiffness, **own))
     torque = -reducer.load.rated_torque if asked.torque_nm is None else asked.torque_nm
     if not -LARGEST_TORQUE * reducer.load.rated_torque <= torque < 0.0:
-        lowest = f"{-LARGEST_TORQUE * reducer.load.rated_torque:g}"
-        allowed = f"{lowest} N·m to below 0, which resists the rotation; a load that drives it is not simulated"
+        lowest = -LARGEST_TORQUE * reducer.load.rated_torque
+        allowed = f"{lowest:g} N·m to below 0, which resists the rotation; a load that drives it is not simulated"
         raise InputError.of_argument("simulation", "torque_nm", torque, allowed)
     prepared = PreparedSimulation(asked=asked, reducer=reducer, unit=unit, torque=torque)
     if prepared.crank_turns < 1:
@@ -333,14 +331,12 @@ class SimulationResult:
     @property
     def contacts(self) -> tuple[tuple[int, int], ...]:
         """Least and most pins that carry in the steady part, disc by disc [-]."""
-        counts = self.series.pins_in_contact[self.steady]
-        return tuple(zip(counts.min(axis=0).tolist(), counts.max(axis=0).tolist(), strict=True))
+        return _least_and_most(self.series.pins_in_contact[self.steady])
 
     @property
     def contacts_at_rest(self) -> tuple[tuple[int, int], ...]:
         """The same in the static model [-]."""
-        counts = (self.at_rest.pin_forces > 0).sum(axis=2)
-        return tuple(zip(counts.min(axis=0).tolist(), counts.max(axis=0).tolist(), strict=True))
+        return _least_and_most((self.at_rest.pin_forces > 0).sum(axis=2))
 
     @property
     def excitations(self) -> dict[str, float]:
@@ -367,6 +363,10 @@ class SimulationResult:
             return "transmission error"
         turns_back = (change[1:] * change[:-1]).sum() < TURNING_BACK * (change**2).sum()
         return "output acceleration" if turns_back else ""
+
+
+def _least_and_most(counts: Int[np.ndarray, "time disc"]) -> tuple[tuple[int, int], ...]:
+    return tuple(zip(counts.min(axis=0).tolist(), counts.max(axis=0).tolist(), strict=True))
 
 
 def rms(values: Float[np.ndarray, "..."]) -> float:
@@ -400,7 +400,6 @@ def simulate(prepared: PreparedSimulation, progress: Progress) -> SimulationResu
     count = round(prepared.crank_turns * prepared.crank_turn / motion.step)
     steady = slice(motion.time.size - count, motion.time.size)
     progress.begin("at rest")
-    at_rest = _at_rest(prepared, motion, steady)
     return SimulationResult(
         asked=asked,
         reducer=prepared.reducer,
@@ -410,7 +409,7 @@ def simulate(prepared: PreparedSimulation, progress: Progress) -> SimulationResu
         series=series,
         steady=steady,
         crank_turns=prepared.crank_turns,
-        at_rest=at_rest,
+        at_rest=_at_rest(prepared, motion, steady),
         natural_frequency=_natural_frequency(prepared, motion, steady),
         seconds=seconds,
     )
@@ -473,25 +472,16 @@ def _at_rest(prepared: PreparedSimulation, motion: Motion, steady: slice) -> AtR
     pins, worst = forces(found).pins[0], Status(int(found.status.max()))
     if worst is not Status.CONVERGED:
         raise SolveError(f"unit {prepared.unit.name}: no equilibrium at rest at some angle: {worst.sentence}.")
-    return AtRest(
-        steps=steps,
-        transmission_error=found.transmission_error[0],
-        pin_forces=pins,
-        seconds=time.perf_counter() - start,
-    )
+    seconds = time.perf_counter() - start
+    return AtRest(steps=steps, transmission_error=found.transmission_error[0], pin_forces=pins, seconds=seconds)
 
 
 def _natural_frequency(prepared: PreparedSimulation, motion: Motion, steady: slice) -> float | None:
     """Return the lowest natural frequency over the steady part [Hz]."""
     angle = motion.carrier_angle[steady]
+    angle = angle[:: -(-angle.size // MODE_ANGLES)]
     try:
-        found = modes(
-            prepared.model,
-            prepared.errors[0],
-            prepared.torque,
-            prepared.inertia,
-            angle[:: -(-angle.size // MODE_ANGLES)],
-        )
+        found = modes(prepared.model, prepared.errors[0], prepared.torque, prepared.inertia, angle)
     except InputError:  # springs that are not linear have no natural frequency
         return None
     return float(found.frequency.min())

@@ -25,9 +25,8 @@ class Modes:
     carrier_angle: Float[np.ndarray, " angle"]  # θc [rad]
     # Natural frequencies; the first is zero but for rounding where no pin carries [Hz]
     frequency: Float[np.ndarray, "angle mode"]
-    # Change of every coordinate of `tolalloc.reducers.equivalent.springs.Coordinates`, of any sign, such that
-    # every mode
-    # has unit modal mass [1/√kg, rotations rad/√(kg·m²)]
+    # Change of every coordinate of `tolalloc.reducers.equivalent.springs.Coordinates`, of any sign; every mode has unit
+    # modal mass [1/√kg, rotations rad/√(kg·m²)]
     shape: Float[np.ndarray, "angle mode coordinate"]
     # Share of the carrier's rotation in the kinetic energy of each mode; over all modes they add up to 1 [-]
     carrier_share: Float[np.ndarray, "angle mode"]
@@ -87,12 +86,8 @@ def modes(
     first one is zero. The modes hold for vibrations under which the same pins keep touching, at speeds whose forces of
     inertia are small beside the load.
 
-    Notes
-    -----
     Theory page (64).
 
-    Examples
-    --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> from tolalloc.wings.motion.motion import inertia_of
     >>> from tolalloc.reducers.unit_file import load_unit
@@ -139,8 +134,6 @@ def critical_speeds(
     output speed Ω. A mode is told by its rank in frequency at every angle, not by its shape; where two frequencies
     cross over a turn, their bands share the crossing.
 
-    Examples
-    --------
     >>> one = np.array([[100.0]])
     >>> found = Modes(carrier_angle=np.zeros(1), frequency=one, shape=one[np.newaxis], carrier_share=one)
     >>> round(critical_speeds(found, (40,), (0.0, 100.0))[0].slowest, 3)  # 2π·100 Hz/40 [rad/s]
@@ -149,15 +142,13 @@ def critical_speeds(
     if min(orders, default=1) < 1:
         raise InputError.at("speeds", "orders", orders, "1 or more waves per output turn")
     bands = np.stack([modes.frequency.min(axis=0), modes.frequency.max(axis=0)], axis=1)
-    share, found = modes.carrier_share.mean(axis=0), []
+    share, found = modes.carrier_share.mean(axis=0).tolist(), []
     for order in orders:
         for mode, band in enumerate(bands):
             slowest, fastest = (float(speed) for speed in 2 * pi * band / order)
             if slowest <= output_speeds[1] and fastest >= output_speeds[0]:
-                carrier = float(share[mode])
-                found.append(
-                    CriticalSpeed(order=order, mode=mode, slowest=slowest, fastest=fastest, carrier_share=carrier)
-                )
+                own = {"slowest": slowest, "fastest": fastest, "carrier_share": share[mode]}
+                found.append(CriticalSpeed(order=order, mode=mode, **own))
     return tuple(sorted(found, key=lambda meeting: (meeting.slowest, meeting.fastest)))
 
 
@@ -172,9 +163,8 @@ class OrdersAgainstSpeed:
     peak_to_peak: Float[np.ndarray, "sample speed"]  # Peak-to-peak transmission error of the last turn [rad]
     # Largest difference between the second halves of the last turn and of the one before it [rad]
     unsettled: Float[np.ndarray, "sample speed"]
-    status: UInt8[
-        np.ndarray, "sample speed"
-    ]  # Worst value of `tolalloc.reducers.equivalent.model.Status` of all steps [-]
+    # Worst value of `tolalloc.reducers.equivalent.model.Status` of all steps [-]
+    status: UInt8[np.ndarray, "sample speed"]
 
 
 def orders_against_speed(
@@ -201,8 +191,6 @@ def orders_against_speed(
     in `tolalloc.wings.motion.stepping.simulate`. A wave at resonance needs some twenty time steps; of the turns
     of each run the last is looked at.
 
-    Examples
-    --------
     >>> from tolalloc.wings.motion.motion import inertia_of, newmark
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> model = EquivalentModel(load_reducer("rv20e_liu2020"))

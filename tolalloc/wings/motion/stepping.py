@@ -205,17 +205,11 @@ def _record(steps: Steps, samples: int, observe: Int[np.ndarray, " observed"]) -
     slot[observe] = np.arange(observe.size)
     curve, whole = (samples, times), (samples, observe.size, size)
     return StepRecord(
-        rotation=np.empty(curve),
-        speed=np.empty(curve),
-        acceleration=np.empty(curve),
-        input_torque=np.empty(curve),
+        **{name: np.empty(curve) for name in ("rotation", "speed", "acceleration", "input_torque", "residual")},
+        **{name: np.empty(whole) for name in ("coordinate", "velocity", "second")},
         touching=np.empty((*curve, reducer.disc_count), np.uint16),
         status=np.empty(curve, np.uint8),
-        residual=np.empty(curve),
         slot=slot,
-        coordinate=np.empty(whole),
-        velocity=np.empty(whole),
-        second=np.empty(whole),
         pin_force=np.empty((samples, observe.size, reducer.disc_count, reducer.cycloid_stage.pin_count)),
     )
 
@@ -239,13 +233,9 @@ def simulate(
     Errors are deviations in the order of the model's columns [m, angles rad]. The whole state is given at the steps
     with the numbers to observe, each once.
 
-    Notes
-    -----
     Theory pages (61) to (63). Gaps are linear in the displacements, as in the static model; waves are drawn well with
     20 steps or more.
 
-    Examples
-    --------
     Under a constant load the drive needs T/i of the torque on the carrier, whatever the masses.
 
     >>> from tolalloc.reducers.reducer.files import load_reducer

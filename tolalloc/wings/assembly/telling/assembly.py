@@ -19,7 +19,7 @@ from tolalloc.wings.assembly.orientations import TransmissionEffect
 from tolalloc.wings.assembly.plan import AngularRequirements, AssemblyPlan
 from tolalloc.wings.assembly.steps import AssemblyStep, adjustable, efforts
 from tolalloc.wings.assembly.telling import tables
-from tolalloc.wings.assembly.telling.tables import AdjustedAngle, at_state_weight, has_limits, norm_of
+from tolalloc.wings.assembly.telling.tables import at_state_weight, has_limits, norm_of
 from tolalloc.wings.assembly.telling.tolerances import (
     certificate_table,
     cost_sentences,
@@ -96,8 +96,7 @@ class AssemblyTeller(Teller[AssemblyResult]):
     @property
     def _diminishing(self) -> str:
         """Where another unit of precision buys little, and where it makes things worse."""
-        sweep = self.result.sweep
-        found = sweep.diminished(LITTLE)
+        sweep, found = self.result.sweep, self.result.sweep.diminished(LITTLE)
         floor = _say("floor", floor=sweep.noise_floor / ARCSECOND) if self.result.measured else ""
         if found is None:
             return _say("not_diminished", largest=sweep.state_weights[-1], share=sweep.next_unit[-1], floor=floor)
@@ -126,10 +125,10 @@ class AssemblyTeller(Teller[AssemblyResult]):
     @property
     def _not_there(self) -> tuple[str, ...]:
         """Which steps turn parts that are mounted later."""
-        order = [step.mount for step in self.result.plan.steps]
-        steps = [
-            str(at + 1) for at, step in enumerate(self.result.plan.steps) if set(step.adjust) - set(order[: at + 1])
-        ]
+        mounted, steps = set[str](), list[str]()
+        for number, step in enumerate(self.result.plan.steps, start=1):
+            mounted.add(step.mount)
+            steps += [str(number)] if set(step.adjust) - mounted else []
         return (_say("warn_not_there", steps=", ".join(steps)),) if steps else ()
 
     @property
@@ -159,12 +158,14 @@ class AssemblyTeller(Teller[AssemblyResult]):
         if not has_limits(self.result):
             return ()
         measured, rows = self.result.measured, tables.characteristics(self.result)
-        missed, doubted = (
-            ", ".join(self._limited(row) for row in rows if row.kept(measured=measured is not None) == word)
-            for word in ("no", "in doubt")
-        )
-        by = _say("by_measured" if measured else "by_expected")
-        remedy = ""
+        key = "limited_measured" if measured else "limited"
+
+        def limited(word: str) -> str:
+            found = [row for row in rows if row.kept(measured=measured is not None) == word]
+            return ", ".join(_say(key, **vars(row) | {"after": abs(row.after), "missed": row.noise}) for row in found)
+
+        missed, doubted = limited("no"), limited("in doubt")
+        by, remedy = _say("by_measured" if measured else "by_expected"), ""
         if measured:
             keeping = measured.keeping
             remedy = f" {_say('never_keeping') if keeping is None else _say('keeping', precision=keeping)}"
@@ -172,10 +173,6 @@ class AssemblyTeller(Teller[AssemblyResult]):
             *((_say("warn_missed", by=by, missed=missed, remedy=remedy),) if missed else ()),
             *((_say("warn_doubted", doubted=doubted),) if doubted else ()),
         )
-
-    def _limited(self, row: AdjustedAngle) -> str:
-        key = "limited_measured" if self.result.measured else "limited"
-        return _say(key, angle=row.angle, part=row.part, after=abs(row.after), missed=row.noise, limit=row.limit)
 
     @property
     def _fewer(self) -> tuple[str, ...]:
@@ -206,27 +203,25 @@ class AssemblyTeller(Teller[AssemblyResult]):
         """Steps, precision, transmission, tolerances, finite rotations."""
         own, effect, measured = self.result, self.result.transmission, self.result.measured
         tolerances, precision = limited_tolerances(own), own.plan.state_weight
-        return (
-            self._steps,
-            self._sweep,
-            *((transmission_section(effect, precision, measured=measured is not None),) if effect else ()),
-            *((tolerance_section(own.plan, tolerances),) if tolerances else ()),
-            *((_finite(measured),) if measured else ()),
-        )
+        found = [self._steps, self._sweep]
+        if effect:
+            found.append(transmission_section(effect, precision, measured=measured is not None))
+        if tolerances:
+            found.append(tolerance_section(own.plan, tolerances))
+        if measured:
+            said = _say("section_finite", name=measured.name, difference=measured.finite_difference / ARCSECOND)
+            found.append(Section(heading=_say("finite_heading"), paragraphs=(said,)))
+        return tuple(found)
 
     @property
     def _steps(self) -> Section:
         """How errors build up and are adjusted."""
         own, measured = self.result, self.result.measured
-        explained = (
-            (_say("section_measured"), *self._larger_angles(measured)) if measured else (_say("section_expected"),)
-        )
+        first = _say("section_steps", measured="" if measured else "then measured, ", datum=own.plan.chain.datum)
+        known = (_say("section_measured"), *self._larger_angles(measured)) if measured else (_say("section_expected"),)
         return Section(
             heading=_say("steps_heading"),
-            paragraphs=(
-                _say("section_steps", measured="" if measured else "then measured, ", datum=own.plan.chain.datum),
-                *explained,
-            ),
+            paragraphs=(first, *known),
             figures=self._step_figures,
             tables=(
                 ("steps", self._step_frame),
@@ -288,12 +283,11 @@ class AssemblyTeller(Teller[AssemblyResult]):
     @property
     def terminal(self) -> tuple[tuple[pd.DataFrame, str], ...]:
         """Every step, and what it leaves in the end."""
-        listed, steps = self._step_frame, []
+        own, listed, steps = self.result, self._step_frame, []
         said = [name for name in ("step [-]", "mount", "measure") if name in listed]
         for (step, *done), rows in listed.groupby(said, sort=False):
             work = ", ".join(f"{verb} {what}" for verb, what in zip(said[1:], done, strict=True))
             steps.append((rows.drop(columns=said), _say("terminal_step", step=step, work=work)))
-        own = self.result
         name = own.measured.name if own.measured else own.plan.name
         final = _say("terminal_final", name=name, datum=own.plan.chain.datum)
         return (*steps, (self.characteristics, final))
@@ -301,25 +295,18 @@ class AssemblyTeller(Teller[AssemblyResult]):
     @property
     def _step_figures(self) -> tuple[Figure, ...]:
         """Tilt and rotation of every characteristic from the step that mounts it."""
-        kind = "" if self.result.measured else ", three standard deviations"
+        kind, plan = "" if self.result.measured else ", three standard deviations", self.result.plan
+        mounted = [step.mount for step in plan.steps]
+        where, figures = np.arange(1, len(mounted) + 1)[:, np.newaxis] + [0.0, 0.5], []
         angles = zip(("tilt", "rotation"), tables.tilt_and_rotation(tables.states(self.result)), strict=True)
-        return tuple(self._over_steps(name, f"{name}{kind} [arcsec]", values) for name, values in angles)
-
-    def _over_steps(self, name: str, y_label: str, angles: Float[np.ndarray, "step 2 part"]) -> Figure:
-        mounted = [step.mount for step in self.result.plan.steps]
-        where = np.arange(1, len(mounted) + 1)[:, np.newaxis] + [0.0, 0.5]
-        return Figure(
-            name=name,
-            title=_say("steps_figure", angle=name.capitalize()),
-            x_label="step [-]",
-            y_label=y_label,
-            series=tuple(
-                Series.line(
-                    part, where[mounted.index(part) :].ravel(), angles[mounted.index(part) :, :, at].ravel() / ARCSECOND
-                )
-                for at, part in enumerate(self.result.plan.chain.names)
-            ),
-        )
+        for name, values in angles:
+            lines = []
+            for at, part in enumerate(plan.chain.names):
+                there = slice(mounted.index(part), None)
+                lines.append(Series.line(part, where[there].ravel(), values[there, :, at].ravel() / ARCSECOND))
+            title, y_label = _say("steps_figure", angle=name.capitalize()), f"{name}{kind} [arcsec]"
+            figures.append(Figure(name=name, title=title, x_label="step [-]", y_label=y_label, series=tuple(lines)))
+        return tuple(figures)
 
     @property
     def _sweep_figures(self) -> tuple[Figure, Figure]:
@@ -327,16 +314,15 @@ class AssemblyTeller(Teller[AssemblyResult]):
         own, sweep = self.result, self.result.sweep
         total, floor = sweep.total / ARCSECOND, (sweep.noise_floor / ARCSECOND, "")
         turned = sweep.state_weights > 0
-        x = list(sweep.state_weights[turned])
+        x = sweep.state_weights[turned]
         series = [Series.line("to be expected of all angles, rms", x, total[turned])]
         if own.measured:
             name, norms = f"{norm_of(own)} of {own.measured.name}", own.measured.norms[turned] / ARCSECOND
             series.append(Series.line(name, x, norms))
         asked = own.plan.state_weight
         if asked > 0:  # 0 has no place on a logarithmic axis
-            at = total[at_state_weight(own)]
-            series.append(Series.points(f"at Q = {asked:g}", [asked], [at]))
-        effort = list(sweep.effort / ARCSECOND**2)
+            series.append(Series.points(f"at Q = {asked:g}", [asked], [total[at_state_weight(own)]]))
+        effort = Series.line("to be expected", sweep.effort / ARCSECOND**2, total)
         return (
             Figure(
                 name="precision",
@@ -352,7 +338,7 @@ class AssemblyTeller(Teller[AssemblyResult]):
                 title=_say("effort_figure"),
                 x_label="expected effort, Σ uᵀRu [arcsec²]",
                 y_label="all final angles together, rms [arcsec]",
-                series=(Series.line("to be expected", effort, total),),
+                series=(effort,),
                 horizontal=(floor,),
             ),
         )
@@ -385,13 +371,6 @@ class AssemblyTeller(Teller[AssemblyResult]):
             "tolerances": _tolerances_record(plan, tolerances) if tolerances else None,
             "warnings": list(self.warnings),
         }
-
-
-def _finite(measured: AdjustedParts) -> Section:
-    difference = measured.finite_difference / ARCSECOND
-    return Section(
-        heading=_say("finite_heading"), paragraphs=(_say("section_finite", name=measured.name, difference=difference),)
-    )
 
 
 def _records(frame: pd.DataFrame) -> list[dict[str, Any]]:

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.reading.units import ARCSECOND
-from tolalloc.reports.columns import Column, Table, of_positions
+from tolalloc.reports.columns import Table, of_positions
 from tolalloc.wings.assembly.adjustment import AdjustedParts, AssemblyResult
 from tolalloc.wings.assembly.steps import adjustable
 
@@ -202,25 +202,19 @@ def characteristics(result: AssemblyResult) -> tuple[AdjustedAngle, ...]:
 
 def characteristic_table(result: AssemblyResult) -> pd.DataFrame:
     """Return tilt and rotation of every characteristic before and after adjusting, and its limits if any are stated."""
-    measured = result.measured is not None
-    before, after, noise = (
-        ("before [arcsec]", "after [arcsec]", "turns miss, 3σ [arcsec]")
-        if measured
-        else ("before, 3σ [arcsec]", "after, 3σ [arcsec]", "noise, 3σ [arcsec]")
-    )
-    limited: tuple[Column[AdjustedAngle], ...] = (
-        Column("limit [arcsec]", lambda row: row.limit),
-        Column("OK", lambda row: row.kept(measured=measured)),
-    )
-    columns: tuple[Column[AdjustedAngle], ...] = (
-        Column("characteristic", lambda row: row.part),
-        Column("angle", lambda row: row.angle),
-        Column(before, lambda row: row.before),
-        Column(after, lambda row: row.after),
-        Column(noise, lambda row: row.noise),
-        *(limited if has_limits(result) else ()),
-    )
-    return Table(name="characteristics", columns=columns, rows=characteristics(result)).frame()
+    measured, rows = result.measured is not None, characteristics(result)
+    kind, noise = ("", "turns miss") if measured else (", 3σ", "noise")
+    columns: dict[str, list[Any]] = {
+        "characteristic": [row.part for row in rows],
+        "angle": [row.angle for row in rows],
+        f"before{kind} [arcsec]": [row.before for row in rows],
+        f"after{kind} [arcsec]": [row.after for row in rows],
+        f"{noise}, 3σ [arcsec]": [row.noise for row in rows],
+    }
+    if has_limits(result):
+        columns["limit [arcsec]"] = [row.limit for row in rows]
+        columns["OK"] = [row.kept(measured=measured) for row in rows]
+    return of_positions("characteristics", columns).frame()
 
 
 def _finals(result: AssemblyResult) -> Float[np.ndarray, "3 characteristic"]:

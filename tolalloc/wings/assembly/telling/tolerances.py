@@ -202,22 +202,17 @@ def tolerance_section(plan: AssemblyPlan, tolerances: AngularTolerances) -> Sect
 def _cost_figure(plan: AssemblyPlan, tolerances: AngularTolerances) -> Figure:
     """Return what tolerances and effort cost over the precision."""
     found = tolerances.by_state_weight
-    known = np.isfinite(found.total)
-    costs = {"tolerances": found.cost, "effort": found.effort_cost, "both": found.total}
-    priced, best = is_priced(plan), found.best
-    least = Series.points("least of both", [best.gains.state_weight], [best.total])
+    known, costs = np.isfinite(found.total), {"tolerances": found.cost}
+    if is_priced(plan):
+        costs |= {"effort": found.effort_cost, "both": found.total}
+    series = [Series.line(label, found.state_weights[known], values[known]) for label, values in costs.items()]
+    if is_priced(plan):
+        series.append(Series.points("least of both", [found.best.gains.state_weight], [found.best.total]))
     return Figure(
         name="cost",
         title=_say("cost_figure"),
         x_label=PRECISION,
         y_label="cost [cost units]",
-        series=(
-            *(
-                Series.line(label, found.state_weights[known], values[known])
-                for label, values in costs.items()
-                if priced or label == "tolerances"
-            ),
-            *((least,) if priced else ()),
-        ),
+        series=tuple(series),
         logarithmic_x=True,
     )

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
@@ -14,17 +13,19 @@ from tolalloc.reports.columns import of_positions
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, HeatMap, Series
 from tolalloc.reports.templates import Sentences
-from tolalloc.wings.assembly.orientations import TransmissionEffect
+from tolalloc.wings.assembly.orientations import (
+    DISC_FORCE,
+    LINE_LOAD,
+    PIN_FORCE,
+    PRESSURE,
+    RATED_PEAK_TO_PEAK,
+    TransmissionEffect,
+)
 from tolalloc.wings.assembly.telling.tables import PRECISION, rounded
 
 if TYPE_CHECKING:
     import pandas as pd
 
-RATED_PEAK_TO_PEAK = "peak-to-peak transmission error, rated torque [arcsec]"
-PIN_FORCE = "largest pin force, rated torque [N]"
-DISC_FORCE = "largest sum of pin forces of a disc, rated torque [N]"
-LINE_LOAD = "largest line load, rated torque [N/mm]"
-PRESSURE = "peak pressure, rated torque [MPa]"
 DRAWN = {"peak_to_peak": PEAK_TO_PEAK, "pin_force": PIN_FORCE, "disc_force": DISC_FORCE, "line_load": LINE_LOAD}
 """Figure name → output that is drawn over the precision."""
 _BETTER_SMALL = (PEAK_TO_PEAK, RATED_PEAK_TO_PEAK, PIN_FORCE, DISC_FORCE, LINE_LOAD, PRESSURE)
@@ -70,27 +71,18 @@ def risen(effect: TransmissionEffect, precision: float) -> tuple[str, ...]:
 
 def value_table(effect: TransmissionEffect) -> pd.DataFrame:
     """Return every output over the precision, the median of random assemblies."""
-    names = ["exact parts", *(f"{precision:g}" for precision in effect.state_weights)]
-    columns = {
-        PRECISION: names,
-        **{
-            output: [perfect(effect, output), *np.median(answers(effect, output), axis=1).tolist()]
-            for output in effect.outputs
-        },
-    }
+    columns: dict[str, Any] = {PRECISION: ["exact parts", *(f"{precision:g}" for precision in effect.state_weights)]}
+    for output in effect.outputs:
+        columns[output] = [perfect(effect, output), *np.median(answers(effect, output), axis=1).tolist()]
     return rounded(of_positions("transmission", columns))
 
 
 def difference_table(effect: TransmissionEffect) -> pd.DataFrame:
     """Return by how much the outputs of that table are above those of exact parts; a mean angle has no zero."""
-
-    def above(output: str) -> Float[np.ndarray, " state_weight"]:
-        return np.asarray(100 * (np.median(answers(effect, output), axis=1) / perfect(effect, output) - 1))
-
-    columns = {
-        PRECISION: effect.state_weights,
-        **{f"{output.split(' [')[0]}, above exact parts [%]": above(output) for output in _counted(effect)},
-    }
+    columns = {PRECISION: effect.state_weights}
+    for output in _counted(effect):
+        above = np.median(answers(effect, output), axis=1) / perfect(effect, output) - 1
+        columns[f"{output.split(' [')[0]}, above exact parts [%]"] = 100 * above
     return rounded(of_positions("above exact parts", columns))
 
 
@@ -98,15 +90,10 @@ def fallen_table(effect: TransmissionEffect) -> pd.DataFrame | None:
     """Return in how many random assemblies an output is smaller than unadjusted; nothing of a single one."""
     if effect.good.size == 1:
         return None
-
-    def smaller(output: str) -> Float[np.ndarray, " state_weight"]:
+    columns = {PRECISION: effect.state_weights[1:]}
+    for output in _counted(effect):
         values = answers(effect, output)
-        return np.asarray(100 * (values[1:] < values[0]).mean(axis=1))
-
-    columns = {
-        PRECISION: effect.state_weights[1:],
-        **{f"{output.split(' [')[0]}, smaller than unadjusted [%]": smaller(output) for output in _counted(effect)},
-    }
+        columns[f"{output.split(' [')[0]}, smaller than unadjusted [%]"] = 100 * (values[1:] < values[0]).mean(axis=1)
     return rounded(of_positions("smaller than unadjusted", columns))
 
 
@@ -132,23 +119,17 @@ def transmission_sentences(effect: TransmissionEffect, precision: float) -> tupl
         )
 
     key = "line_load" if single else "line_load_of_many"
+    each = {"test": said(PEAK_TO_PEAK), "rated": said(RATED_PEAK_TO_PEAK), "force": said(PIN_FORCE)}
     return (
         _say(key, many=int(effect.good.sum()), change=said(LINE_LOAD)),
-        _say(
-            "transmission",
-            torque=effect.test_torque,
-            test=said(PEAK_TO_PEAK),
-            rated=said(RATED_PEAK_TO_PEAK),
-            force=said(PIN_FORCE),
-        ),
+        _say("transmission", torque=effect.test_torque, **each),
     )
 
 
 def transmission_warnings(effect: TransmissionEffect, precision: float) -> tuple[str, ...]:
     """Return which outputs adjusting leaves larger, how that can be, and how many assemblies are left out."""
-    rose, failed = risen(effect, precision), int((~effect.good).sum())
+    rose, many, failed = risen(effect, precision), int(effect.good.sum()), int((~effect.good).sum())
     key = "warn_risen" if effect.good.size == 1 else "warn_risen_of_many"
-    many = int(effect.good.sum())
     return (
         *((_say(key, outputs=", ".join(rose), many=many, why=_say("why_larger")),) if rose else ()),
         *((_say("warn_failed", failed=failed),) if failed else ()),
@@ -181,39 +162,28 @@ def transmission_section(effect: TransmissionEffect, precision: float, *, measur
 
 def curve_figures(effect: TransmissionEffect) -> tuple[Figure, Figure]:
     """Return transmission error and pin force of a disc over the carrier angle."""
-    angle = effect.curves.carrier_angle
+    angle, both = effect.curves.carrier_angle, (effect.perfect_curves, effect.curves)
     shown = angle <= _CRANK_TURNS * 2 * np.pi / effect.reducer.cycloid_stage.disc_teeth
     labels = ("exact parts", *(f"Q = {precision:g}" for precision in effect.state_weights))
-    both = (effect.perfect_curves, effect.curves)
-    force = np.concatenate([each.disc_force for each in both])
     error = np.concatenate([each.transmission_error for each in both]) / ARCSECOND
 
-    def drawn(curves: Iterable[Float[np.ndarray, " angle"]]) -> tuple[Series, ...]:
-        x = list(angle[shown] / DEGREE)
-        return tuple(Series.line(label, x, curve[shown]) for label, curve in zip(labels, curves, strict=True))
+    def drawn(name: str, title: str, y_label: str, curves: Float[np.ndarray, "curve angle"]) -> Figure:
+        x, named = angle[shown] / DEGREE, zip(labels, curves, strict=True)
+        lines = tuple(Series.line(label, x, curve[shown]) for label, curve in named)
+        return Figure(name=name, title=title, x_label="carrier angle [°]", y_label=y_label, series=lines)
 
+    title, less = _say("transmission_error_figure", turns=_CRANK_TURNS), error - error.mean(axis=1, keepdims=True)
+    force = np.concatenate([each.disc_force for each in both])
     return (
-        Figure(
-            name="transmission_error",
-            title=_say("transmission_error_figure", turns=_CRANK_TURNS),
-            x_label="carrier angle [°]",
-            y_label="transmission error less its mean [arcsec]",
-            series=drawn(error - error.mean(axis=1, keepdims=True)),
-        ),
-        Figure(
-            name="mesh_force",
-            title=_say("mesh_force_figure"),
-            x_label="carrier angle [°]",
-            y_label="sum of pin forces of a disc [N]",
-            series=drawn(force),
-        ),
+        drawn("transmission_error", title, "transmission error less its mean [arcsec]", less),
+        drawn("mesh_force", _say("mesh_force_figure"), "sum of pin forces of a disc [N]", force),
     )
 
 
 def _over_state_weight(effect: TransmissionEffect, name: str, output: str) -> Figure:
     """Return the largest values of an output over the precision."""
     values, many = answers(effect, output), effect.good.size > 1
-    low, high = (list(edge) for edge in np.percentile(values, BAND, axis=1)) if many else ((), ())
+    low, high = np.percentile(values, BAND, axis=1) if many else ((), ())
     label = _say("band" if many else "single", low=BAND[0], high=BAND[1])
     short = _say("short_band" if many else "single", low=BAND[0], high=BAND[1])
     return Figure(
@@ -253,10 +223,8 @@ def deformation_figure(effect: TransmissionEffect) -> Figure:
         y_label="compression [µm]",
         series=tuple(
             Series.points(
-                f"Q = {precision:g}",
-                np.flatnonzero(pattern.force) + 1,
-                pattern.deformation[pattern.force > 0] / MICROMETRE,
+                f"Q = {precision:g}", np.flatnonzero(own.force) + 1, own.deformation[own.force > 0] / MICROMETRE
             )
-            for precision, pattern in zip(effect.state_weights, effect.patterns, strict=True)
+            for precision, own in zip(effect.state_weights, effect.patterns, strict=True)
         ),
     )

@@ -42,20 +42,12 @@ class CatalogueTeller(Teller[CatalogueResult]):
     @property
     def sentences(self) -> tuple[str, ...]:
         """The factor, what it does, and what it leaves open."""
-        own, (before, after), largest = self.result, self.result.loops, self.shares.iloc[0]
+        own, (first, last), largest = self.result, self.result.loops, self.shares.iloc[0]
+        wanted, before = own.catalogue.torsional_rigidity * ARCMINUTE, float(first.torsional_stiffness[0] * ARCMINUTE)
+        lost, allowed = float(last.lost_motion[0] / ARCMINUTE), own.catalogue.lost_motion / ARCMINUTE
         return (
-            _say(
-                "factor",
-                factor=own.factor,
-                uncertainty=own.uncertainty,
-                wanted=own.catalogue.torsional_rigidity * ARCMINUTE,
-                before=float(before.torsional_stiffness[0] * ARCMINUTE),
-            ),
-            _say(
-                "lost_motion",
-                after=float(after.lost_motion[0] / ARCMINUTE),
-                largest=own.catalogue.lost_motion / ARCMINUTE,
-            ),
+            _say("factor", factor=own.factor, uncertainty=own.uncertainty, wanted=wanted, before=before),
+            _say("lost_motion", after=lost, largest=allowed),
             _say("one_datum", slope=own.slope, share=largest.iloc[1], part=largest.iloc[0]),
         )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -27,28 +27,8 @@ _SHOWN = 10
 _say = Sentences("diagnosis", "tolalloc.wings.bench")
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Gauged:
-    """What the gauge of one source would show: mean and 95 % interval [µm]."""
-
-    name: str
-    mean: float
-    low: float
-    high: float
-    zone: float  # What the drawing allows [µm]
-    probability: float  # Of being the dominant source [-]
-    named: bool  # Whether it is among those that hold the dominant one
-
-
-_SOURCES: tuple[Column[_Gauged], ...] = (
-    Column("source", lambda row: row.name),
-    Column("P(dominant) [%]", lambda row: row.probability * 100),
-    Column("named", lambda row: "yes" if row.named else "no"),
-    Column("reading [µm]", lambda row: row.mean),
-    Column("low 2.5 % [µm]", lambda row: row.low),
-    Column("high 97.5 % [µm]", lambda row: row.high),
-    Column("zone [µm]", lambda row: row.zone),
-)
+_ENDS = ("reading [µm]", "low 2.5 % [µm]", "high 97.5 % [µm]")
+"""What the gauge of a source would show: mean and 95 % interval."""
 _GROUPS: tuple[Column[tuple[int, InseparableColumns, int]], ...] = (
     Column("group [-]", lambda row: row[0]),
     Column("column", lambda row: row[1].columns[row[2]]),
@@ -74,29 +54,20 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
     """What is said of a diagnosed unit."""
 
     @cached_property
-    def _gauged(self) -> tuple[_Gauged, ...]:
+    def _sources(self) -> Table[int]:
         """What the gauge of every source would show, the likeliest to dominate first."""
         found = self.result.diagnosis
         zones = np.array([source.zone for source in self.result.errors.active])
-        low, high = found.reading_interval / MICROMETRE
-        mean, allowed = found.reading_mean / MICROMETRE, zones / MICROMETRE
+        shown = np.stack([found.reading_mean, *found.reading_interval]) / MICROMETRE
+        columns = {
+            "source": found.sources,
+            "P(dominant) [%]": found.dominant_probability * 100,
+            "named": ["yes" if source in found.named else "no" for source in found.sources],
+            **dict(zip(_ENDS, shown, strict=True)),
+            "zone [µm]": zones / MICROMETRE,
+        }
         order = np.lexsort((-np.abs(found.reading_mean) / zones, -found.dominant_probability))
-        return tuple(
-            _Gauged(
-                name=found.sources[at],
-                mean=float(mean[at]),
-                low=float(low[at]),
-                high=float(high[at]),
-                zone=float(allowed[at]),
-                probability=float(found.dominant_probability[at]),
-                named=found.sources[at] in found.named,
-            )
-            for at in order
-        )
-
-    @property
-    def _sources(self) -> Table[_Gauged]:
-        return Table(name="sources", columns=_SOURCES, rows=self._gauged)
+        return of_positions("sources", columns, order)
 
     @property
     def _columns(self) -> Table[int]:
@@ -105,7 +76,7 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
         levers = [source.lever for source in self.result.errors.active for _ in source.columns]
         scale = np.array(levers) / MICROMETRE
         low, high = found.column_interval * scale
-        shown = {"mean [µm]": found.column_mean * scale, "low 2.5 % [µm]": low, "high 97.5 % [µm]": high}
+        shown = {"mean [µm]": found.deviations.mean(axis=0) * scale, "low 2.5 % [µm]": low, "high 97.5 % [µm]": high}
         return of_positions("columns", {"column": found.columns, **shown})
 
     @property
@@ -130,13 +101,9 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
         now = _say("decide", decision=found.best, cost=float(found.cost.min()), unit=unit)
         if own is None:
             return _say("stop", now=now)
-        costs = {
-            "before": own.before,
-            "after": own.after,
-            "rate": own.price / own.minutes,
-            "saved": own.gain_per_minute,
-        }
-        return _say("next", source=own.source, minutes=own.minutes, unit=unit, now=now, **costs)
+        costs = {"before": own.before, "after": own.after, "saved": own.gain_per_minute}
+        rate = own.price / own.minutes
+        return _say("next", source=own.source, minutes=own.minutes, unit=unit, now=now, rate=rate, **costs)
 
     @property
     def title(self) -> str:
@@ -157,14 +124,14 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
         measured = _say("measured", unit=self.header.name, peak_to_peak=peak_to_peak)
         if not fit.explained:
             return (_say("unexplained", measured=measured, chi_square=fit.chi_square, freedom=fit.freedom),)
-        named = [row for row in self._gauged if row.named]
-        likely = ", ".join(_say("one_likely", source=row.name, share=row.probability * 100) for row in named)
+        named = [row for row in self._sources.records() if row["named"] == "yes"]
+        likely = ", ".join(_say("one_likely", source=row["source"], share=row["P(dominant) [%]"]) for row in named)
         first = named[0]
-        reading, low, high = alike(first.mean, first.low, first.high, figures=2)
+        reading, low, high = alike(*(first[name] for name in _ENDS), figures=2)
         pairs = "; ".join(_say("pair", one=one, other=other) for one, other in found.twins)
         return (
             _say("likely", measured=measured, level=self.result.level, likely=likely),
-            _say("first", source=first.name, reading=reading, low=low, high=high, zone=first.zone),
+            _say("first", source=first["source"], reading=reading, low=low, high=high, zone=first["zone [µm]"]),
             *((_say("twins", pairs=pairs),) if pairs else ()),
             *(
                 _say("groups", sources=", ".join(sources))
@@ -190,9 +157,7 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
             *self.result.reducer.assumptions,
             _say("assume_noise", reading=noise.reading / ARCSECOND),
             _say(
-                "assume_discrepancy",
-                discrepancy=noise.discrepancy / ARCSECOND,
-                angle=noise.correlation_angle / DEGREE,
+                "assume_discrepancy", discrepancy=noise.discrepancy / ARCSECOND, angle=noise.correlation_angle / DEGREE
             ),
             _say("assume_prior"),
             _say("assume_angle"),
@@ -219,15 +184,11 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
             "not told apart": [list(group.sources) for group in found.groups],
             "curves solved [-]": found.evaluations,
             "curves failed [-]": found.failed,
-            **self._advice_summary,
+            **(self._advice_summary(self.result.advice) if self.result.advice else {}),
             "warnings": list(self.warnings),
         }
 
-    @property
-    def _advice_summary(self) -> dict[str, Any]:
-        advice = self.result.advice
-        if not advice:
-            return {}
+    def _advice_summary(self, advice: Advice) -> dict[str, Any]:
         measure = advice.next.source if advice.next else None
         tables = {"readings": self._next.records(), "decisions": self._decisions(advice).records()}
         return {"measure next": measure, "decision": advice.best, **tables}
@@ -245,9 +206,13 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
     @cached_property
     def sections(self) -> tuple[Section, ...]:
         """Sections in the order of the questions that a reader has."""
-        groups = self._groups
+        groups, unit = self._groups, self.header.cost_unit
+        advice: tuple[Section, ...] = ()
+        if found := self.result.advice:
+            tables = (("next", self._next.frame(unit)), ("decisions", self._decisions(found).frame(unit)))
+            advice = (Section(heading=_say("next_heading"), paragraphs=(_say("next_meaning"),), tables=tables),)
         return (
-            *self._advice_section,
+            *advice,
             Section(
                 heading=_say("dominant_heading"),
                 paragraphs=(_say("dominant"),),
@@ -264,65 +229,39 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
             Section(heading=_say("columns_heading"), tables=(("columns", self._columns.frame()),)),
         )
 
-    @property
-    def _advice_section(self) -> tuple[Section, ...]:
-        unit, advice = self.header.cost_unit, self.result.advice
-        if not advice:
-            return ()
-        tables = (("next", self._next.frame(unit)), ("decisions", self._decisions(advice).frame(unit)))
-        return (Section(heading=_say("next_heading"), paragraphs=(_say("next_meaning"),), tables=tables),)
-
     def _dominant_figure(self) -> Figure:
-        names, shares = [row.name for row in self._gauged], [row.probability * 100 for row in self._gauged]
+        rows = self._sources.frame()
         return Figure(
             name="dominant",
             title=_say("dominant_figure"),
             x_label="probability of being the dominant source [%]",
-            series=(Series.bars("probability", names, shares),),
+            series=(Series.bars("probability", rows["source"], rows["P(dominant) [%]"]),),
         )
 
     def _reading_figure(self) -> Figure:
-        rows = self._gauged
+        rows = self._sources.frame()
+        ends = (rows[name] / rows["zone [µm]"] for name in _ENDS)
         return Figure(
             name="readings",
             title=_say("readings_figure"),
             x_label="reading over zone [-]",
-            series=(
-                Series.bars(
-                    "mean and 95 % interval",
-                    [row.name for row in rows],
-                    [row.mean / row.zone for row in rows],
-                    [row.low / row.zone for row in rows],
-                    [row.high / row.zone for row in rows],
-                ),
-            ),
+            series=(Series.bars("mean and 95 % interval", rows["source"], *ends),),
             vertical=((1.0, "zone"),),
         )
 
     def _curve_figures(self) -> tuple[Figure, Figure]:
         fit = self.result.diagnosis.fit
-        angle = list(fit.carrier_angle / DEGREE)
-        measured, fitted = (list(values / ARCSECOND) for values in (fit.measured, fit.fitted))
-        low, high = (list(edge / ARCSECOND) for edge in fit.band)
-        left = list((fit.measured - fit.fitted) / ARCSECOND)
-        axis = "carrier angle [°]"
-        return (
-            Figure(
-                name="curve",
-                title=_say("curve_figure"),
-                x_label=axis,
-                y_label="transmission error [arcsec]",
-                series=(
-                    Series.points("measured", angle, measured),
-                    Series.line("model, mean and 95 % band", angle, fitted, low, high),
-                ),
-            ),
-            Figure(
-                name="left",
-                title=_say("left_figure"),
-                x_label=axis,
-                y_label="transmission error [arcsec]",
-                series=(Series.line("measured less model", angle, left),),
-                horizontal=((0.0, ""),),
+        angle, left = fit.carrier_angle / DEGREE, (fit.measured - fit.fitted) / ARCSECOND
+        measured, fitted, low, high = (values / ARCSECOND for values in (fit.measured, fit.fitted, *fit.band))
+        curve = Figure(
+            name="curve",
+            title=_say("curve_figure"),
+            x_label="carrier angle [°]",
+            y_label="transmission error [arcsec]",
+            series=(
+                Series.points("measured", angle, measured),
+                Series.line("model, mean and 95 % band", angle, fitted, low, high),
             ),
         )
+        apart = (Series.line("measured less model", angle, left),)
+        return curve, replace(curve, name="left", title=_say("left_figure"), series=apart, horizontal=((0.0, ""),))

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -113,14 +113,9 @@ class IdentificationTeller(Teller[IdentificationResult]):
     def sentences(self) -> tuple[str, ...]:
         """Parameters, what the data fix, residuals, and what simpler explanations leave."""
         own = self.result
+        at = {"before": own.at_start, "after": own.at_found, "written": own.at_written}
         reach = "; ".join(
-            _say(
-                "rms",
-                kind=kind,
-                before=own.rms(own.at_start, kind) / ARCSECOND,
-                after=own.rms(own.at_found, kind) / ARCSECOND,
-                written=own.rms(own.at_written, kind) / ARCSECOND,
-            )
+            _say("rms", kind=kind, **{name: own.rms(found, kind) / ARCSECOND for name, found in at.items()})
             for kind in own.data.kinds
         )
         return (
@@ -235,36 +230,23 @@ class IdentificationTeller(Teller[IdentificationResult]):
     def sections(self) -> tuple[Section, ...]:
         """Sections in the order of the questions that a reader has."""
         polynomial = self.result.polynomial
-        trained = _say(
-            "polynomials",
-            trained=polynomial.trained,
-            rms=polynomial.rms_error / ARCSECOND,
-            largest=polynomial.largest_error / ARCSECOND,
-            held_out=polynomial.held_out,
-        )
-        choices = Section(
-            heading=_say("choices_heading"),
-            paragraphs=(_say("choices"),),
-            tables=(("choices", self._choices.frame()),),
+        rms, largest = polynomial.rms_error / ARCSECOND, polynomial.largest_error / ARCSECOND
+        known = {"trained": polynomial.trained, "held_out": polynomial.held_out}
+        trained = _say("polynomials", rms=rms, largest=largest, **known)
+        parameters, directions, choices, readings = (
+            Section(heading=_say(heading), paragraphs=paragraphs, tables=((name, frame),))
+            for heading, paragraphs, name, frame in (
+                ("parameters_heading", (_say("parameters"),), "parameters", self._parameters.frame()),
+                ("fixed_heading", (_say("directions"), trained), "directions", self._directions.frame()),
+                ("choices_heading", (_say("choices"),), "choices", self._choices.frame()),
+                ("readings_heading", (), "units", self._units_frame()),
+            )
         )
         return (
-            Section(
-                heading=_say("parameters_heading"),
-                paragraphs=(_say("parameters"),),
-                tables=(("parameters", self._parameters.frame()),),
-            ),
-            Section(
-                heading=_say("fixed_heading"),
-                paragraphs=(_say("directions"), trained),
-                figures=(self._profile_figure,),
-                tables=(("directions", self._directions.frame()),),
-            ),
+            parameters,
+            replace(directions, figures=(self._profile_figure,)),
             *((choices,) if self.result.choices else ()),
-            Section(
-                heading=_say("readings_heading"),
-                figures=tuple(self._reading_figures()),
-                tables=(("units", self._units_frame()),),
-            ),
+            replace(readings, figures=tuple(self._reading_figures())),
         )
 
     @property
@@ -419,37 +401,28 @@ class IdentificationTeller(Teller[IdentificationResult]):
     def _shape_figures(self, kind: str) -> tuple[Figure, Figure]:
         """Return the first curve or loop, and what the model leaves of it before and after the fit."""
         block, measurements = self._first(kind), self.result.measurements
-        drawn: Literal["line", "points"] = "line" if kind == CURVE else "points"
         if kind == CURVE:
             curve = measurements.curves[block.number]
-            unit, place, x = curve.unit, f"{curve.torque:g} N·m", list(curve.carrier_angle / DEGREE)
+            unit, place, x = curve.unit, f"{curve.torque:g} N·m", curve.carrier_angle / DEGREE
             axis, y_label = "carrier angle [°]", "transmission error [arcsec]"
         else:
             loop = measurements.loops[block.number]
-            unit, place, x = loop.unit, f"{loop.carrier_angle / DEGREE:.0f}°", list(loop.torque)
+            unit, place, x = loop.unit, f"{loop.carrier_angle / DEGREE:.0f}°", loop.torque
             axis, y_label = "torque on the carrier [N·m]", "twist less its mean [arcsec]"
         name = _say("unit_at", unit=measurements.units[unit].name, place=place)
         both = (self.result.data.measured, self.result.at_found.values)
-        measured, model = (list(values[block.rows] / ARCSECOND) for values in both)
-        return (
-            Figure(
-                name=f"measured_{kind}",
-                title=_say("curve_figure" if kind == CURVE else "loop_figure", unit=name),
-                x_label=axis,
-                y_label=y_label,
-                series=(
-                    Series(label="measured", kind=drawn, x=x, y=measured),
-                    Series.line("model", x, model),
-                ),
-            ),
-            Figure(
-                name=f"{kind}_left",
-                title=_say("left_figure", unit=name),
-                x_label=axis,
-                y_label="model less measured [arcsec]",
-                series=tuple(Series.line(label, x, own) for label, own in self._left(block.rows)),
-            ),
+        measured, model = (values[block.rows] / ARCSECOND for values in both)
+        drawn = Series.line("measured", x, measured) if kind == CURVE else Series.points("measured", x, measured)
+        shape = Figure(
+            name=f"measured_{kind}",
+            title=_say("curve_figure" if kind == CURVE else "loop_figure", unit=name),
+            x_label=axis,
+            y_label=y_label,
+            series=(drawn, Series.line("model", x, model)),
         )
+        lines = tuple(Series.line(label, x, own) for label, own in self._left(block.rows))
+        title, y_label = _say("left_figure", unit=name), "model less measured [arcsec]"
+        return shape, replace(shape, name=f"{kind}_left", title=title, y_label=y_label, series=lines)
 
     def _residual_figure(self, kind: str) -> Figure:
         data, own = self.result.data, self.result.data.rows(kind)
@@ -486,8 +459,7 @@ def _with_unit(item: Parameter, value: str) -> str:
 
 
 def _as_row(item: ParameterEstimate) -> dict[str, Any]:
-    kind = "standard" if item.parameter.name == BIAS else "relative standard"
-    unit = "arcsec" if item.parameter.name == BIAS else "-"
+    kind, unit = ("standard", "arcsec") if item.parameter.name == BIAS else ("relative standard", "-")
     return {
         "name": item.parameter.name,
         "unit": item.parameter.unit,

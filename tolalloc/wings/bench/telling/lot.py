@@ -114,16 +114,13 @@ class LotTeller(Teller[LotResult]):
     @cached_property
     def sentences(self) -> tuple[str, ...]:
         """What moved, what could have been seen, and which zone is kept least."""
-        found, moved, level = self.result, self.result.moved, self.result.level * 100.0
-        if not moved:
-            unmoved = _say("unmoved", columns=len(found.processes), level=level)
-            return (unmoved, *self._curves, *self._seen, *self._gauges, self._least_capable)
-        named = "; ".join(map(_what, moved[:_NAMED]))
-        more = f"; and {len(moved) - _NAMED} more" if len(moved) > _NAMED else ""
-        left = len(found.processes) - len(moved)
-        rest = (_say("rest", count=left),) if left else ()
-        first = _say("moved", what=named + more, level=level)
-        return (first, *rest, *self._curves, *self._seen, *self._gauges, self._least_capable)
+        moved, count, level = self.result.moved, len(self.result.processes), self.result.level * 100.0
+        first = [_say("unmoved", columns=count, level=level)]
+        if moved:
+            more = f"; and {len(moved) - _NAMED} more" if len(moved) > _NAMED else ""
+            first = [_say("moved", what="; ".join(map(_what, moved[:_NAMED])) + more, level=level)]
+            first += [_say("rest", count=count - len(moved))] if count > len(moved) else []
+        return (*first, *self._curves, *self._seen, *self._gauges, self._least_capable)
 
     @property
     def _curves(self) -> tuple[str, ...]:
@@ -165,25 +162,19 @@ class LotTeller(Teller[LotResult]):
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """What a reader must know before acting on it."""
-        rows = self.result.capabilities
+        rows, curves = self.result.capabilities, self.result.curves
         return (
             *(_say("warn_far", source=own.source.name, count=own.far, parts=own.parts) for own in rows if own.far),
             *(
-                _say("warn_clipped", source=own.source.name, cp=own.row.cp, shift=own.row.shift)
+                _say("warn_clipped", source=own.row.name, cp=own.row.cp, shift=own.row.shift)
                 for own in rows
                 if own.clipped
             ),
-            *self._doubts_of_curves,
+            *((_say("warn_failed", failed=self.header.failed),) if curves and self.header.failed else ()),
+            *(curves.model.mismatches if curves else ()),
+            *(_say("warn_repaired", repair=own) for own in (curves.repairs if curves else ())),
             *self.result.stated.notes,
         )
-
-    @property
-    def _doubts_of_curves(self) -> tuple[str, ...]:
-        curves = self.result.curves
-        if not curves:
-            return ()
-        failed = (_say("warn_failed", failed=self.header.failed),) if self.header.failed else ()
-        return (*failed, *curves.model.mismatches, *(_say("warn_repaired", repair=own) for own in curves.repairs))
 
     @property
     def _assumed_of_curves(self) -> tuple[str, ...]:
@@ -197,21 +188,15 @@ class LotTeller(Teller[LotResult]):
     def assumptions(self) -> tuple[str, ...]:
         """What the tests take for granted."""
         normal = [own.stated.is_normal for own in self.result.processes]
+        erring = [own.name for own in self.result.processes if own.column.error.deviation]
         return (
             *((_say("assume_fit"),) if any(normal) else ()),
             *(() if all(normal) else (_say("assume_simulated", lots=self.result.lots),)),
             _say("assume_holm", level=self.result.level * 100.0),
-            *self._assumed_of_gauges,
+            _say("assume_gauge_errs", names=", ".join(erring)) if erring else _say("assume_gauge"),
             *self._assumed_of_curves,
             *self.header.assumptions,
         )
-
-    @property
-    def _assumed_of_gauges(self) -> tuple[str, ...]:
-        erring = [own.name for own in self.result.processes if own.column.error.deviation]
-        if not erring:
-            return (_say("assume_gauge"),)
-        return (_say("assume_gauge_errs", names=", ".join(erring)),)
 
     @cached_property
     def _processes(self) -> Table[MeasuredProcess]:
@@ -232,37 +217,19 @@ class LotTeller(Teller[LotResult]):
     @property
     def sections(self) -> tuple[Section, ...]:
         """What moved, how the zones are kept, what the next sample is held against, and the drawing of the lot."""
-        return (
-            Section(
-                heading=_say("process_heading"),
-                paragraphs=(_say("process"),),
-                figures=(self._shift_figure, self._spread_figure),
-                tables=(("processes", self._processes.frame()),),
-            ),
-            *self._section_of_curves,
-            Section(
-                heading=_say("capability_heading"),
-                paragraphs=(_say("capability"),),
-                tables=(("capability", self._capabilities.frame()),),
-            ),
-            Section(
-                heading=_say("limits_heading"),
-                paragraphs=(_say("limits"),),
-                tables=(("control limits", self._limits.frame()),),
-            ),
-            Section(
-                heading=_say("table_heading"),
-                paragraphs=(_say("table"),),
-                tables=(("lot", self.result.drawing.to_frame()),),
-            ),
+        shown = [
+            ("process_heading", "process", self._processes.name, self._processes.frame()),
+            ("orders_heading", "orders", self._orders.name, self._orders.frame()),
+            ("capability_heading", "capability", self._capabilities.name, self._capabilities.frame()),
+            ("limits_heading", "limits", self._limits.name, self._limits.frame()),
+            ("table_heading", "table", "lot", self.result.drawing.to_frame()),
+        ]
+        process, orders, *others = (
+            Section(heading=_say(heading), paragraphs=(_say(said),), tables=((name, frame),))
+            for heading, said, name, frame in shown
         )
-
-    @property
-    def _section_of_curves(self) -> tuple[Section, ...]:
-        if not self.result.curves:
-            return ()
-        tables = (("orders of the curves", self._orders.frame()),)
-        return (Section(heading=_say("orders_heading"), paragraphs=(_say("orders"),), tables=tables),)
+        process = replace(process, figures=(self._shift_figure, self._spread_figure))
+        return (process, *((orders,) if self.result.curves else ()), *others)
 
     @property
     def terminal(self) -> tuple[tuple[pd.DataFrame, str], ...]:
@@ -304,14 +271,12 @@ class LotTeller(Teller[LotResult]):
     def _shift_figure(self) -> Figure:
         """Means in standard errors, between the control limits."""
         rows = self.result.processes
-        one, low, high = zip(
-            *(tuple(shift * sqrt(own.stated.law.parts) for shift in own.shift) for own in rows), strict=True
-        )
+        ends = zip(*([shift * sqrt(own.stated.law.parts) for shift in own.shift] for own in rows), strict=True)
         return Figure(
             name="shift",
             title=_say("shift_figure"),
             x_label="mean less the drawing's, over its standard error [-]",
-            series=(Series.bars("mean and 95 % interval", [own.name for own in rows], one, low, high),),
+            series=(Series.bars("mean and 95 % interval", [own.name for own in rows], *ends),),
             vertical=((-_LIMIT, ""), (_LIMIT, "control limits")),
         )
 
@@ -319,12 +284,12 @@ class LotTeller(Teller[LotResult]):
     def _spread_figure(self) -> Figure:
         """Standard deviations over the drawing's."""
         rows = self.result.processes
-        one, low, high = zip(*(own.spread for own in rows), strict=True)
+        ends = zip(*(own.spread for own in rows), strict=True)
         return Figure(
             name="spread",
             title=_say("spread_figure"),
             x_label="standard deviation over the drawing's [-]",
-            series=(Series.bars("standard deviation and 95 % interval", [own.name for own in rows], one, low, high),),
+            series=(Series.bars("standard deviation and 95 % interval", [own.name for own in rows], *ends),),
             vertical=((1.0, "drawing"),),
         )
 
@@ -336,14 +301,13 @@ def _makers(own: LotOrder, most: int) -> str:
 
 def _what(own: MeasuredProcess) -> str:
     """Return what of a process moved, and by how much."""
-    mean, low, high, stated = alike(
-        *(length / MICROMETRE for length in (own.mean, *own.mean_interval, own.stated.mean))
-    )
+    lengths = (own.mean, *own.mean_interval, own.stated.mean)
+    mean, low, high, stated = alike(*(length / MICROMETRE for length in lengths))
     ratio, least, most = alike(*own.spread)
     of_mean = {"name": own.name, "mean": mean, "stated": stated, "shift": own.shift[0]}
     of_spread = {"name": own.name, "ratio": ratio, "low": least, "high": most}
     if not own.named_shift:
         return _say("spread_up", **of_spread)
-    return (
-        _say("both", **{**of_mean, **of_spread}) if own.spread_moved else _say("mean_up", low=low, high=high, **of_mean)
-    )
+    if own.spread_moved:
+        return _say("both", **of_mean | of_spread)
+    return _say("mean_up", low=low, high=high, **of_mean)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from tolalloc.reading.units import RPM
@@ -51,21 +51,9 @@ class Simulate(Inquiry["PreparedSimulation"]):
         """Return the simulation, its files read and checked."""
         from tolalloc.wings.motion.simulation import SimulationRequest, prepare_simulation
 
-        asked = SimulationRequest(
-            reducer=str(self.reducer),
-            unit=self.unit,
-            speed_rpm=self.speed,
-            torque_nm=self.torque,
-            engine=self.engine,
-            duration=self.duration,
-            ramp=self.ramp,
-            step=self.step,
-            output_inertia=self.output_inertia,
-            damping=self.damping,
-            mass_damping=self.mass_damping,
-            pin_stiffness=self.pin_stiffness,
-        )
-        return prepare_simulation(asked)
+        own = vars(self) | {"reducer": str(self.reducer), "speed_rpm": self.speed, "torque_nm": self.torque}
+        known = (field.name for field in fields(SimulationRequest))
+        return prepare_simulation(SimulationRequest(**{name: own[name] for name in known}))
 
     def solve(self, prepared: PreparedSimulation, progress: Progress) -> Answer[SimulationResult]:
         """Return what the reducer does over time."""

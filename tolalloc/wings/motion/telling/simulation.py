@@ -190,15 +190,9 @@ class SimulationTeller(Teller[SimulationResult]):
         """The steady part in motion and at rest, one quantity per row."""
         import pandas as pd
 
-        moving, resting = steady_row(self.result), rest_row(self.result)
-        names = [name for name in moving if name != "engine"]
-        return pd.DataFrame(
-            {
-                "quantity": names,
-                "in motion": [moving[name] for name in names],
-                "at rest": [resting.get(name, "") for name in names],
-            }
-        )
+        resting = rest_row(self.result)
+        rows = [(name, own, resting.get(name, "")) for name, own in steady_row(self.result).items() if name != "engine"]
+        return pd.DataFrame(rows, columns=["quantity", "in motion", "at rest"])
 
 
 def range_text(least: int, most: int) -> str:
@@ -282,13 +276,14 @@ def run_figures(found: SimulationResult) -> tuple[Figure, ...]:
     """Return the whole run over time: input and output speed, their accelerations, contacts of each disc."""
     series, contacts, engine = found.series, found.series.pins_in_contact, found.engine
     figures = []
-    for kind, label, factor, values in (
-        ("speed", "speed [rpm]", RPM, (series.input_speed, series.output_speed)),
-        ("acceleration", "angular acceleration [rad/s²]", 1.0, (series.input_acceleration, series.output_acceleration)),
+    for kind, said, label, factor in (
+        ("speed", "speed_figure", "speed [rpm]", RPM),
+        ("acceleration", "acceleration_figure", "angular acceleration [rad/s²]", 1.0),
     ):
-        for part, own in zip(("input", "output"), values, strict=True):
-            title = _say("speed_figure", part=part) if kind == "speed" else _say("acceleration_figure", part=part)
-            figures.append(_over_time(f"{part}_{kind}", title, label, line(engine, series.time, own / factor)))
+        for part in ("input", "output"):
+            values = getattr(series, f"{part}_{kind}") / factor
+            title = _say(said, part=part)
+            figures.append(_over_time(f"{part}_{kind}", title, label, line(engine, series.time, values)))
     discs = (line(f"disc {disc + 1}", series.time, contacts[:, disc]) for disc in range(contacts.shape[1]))
     return (*figures, _over_time("contacts", _say("contact_figure"), "pins in contact [-]", *discs))
 
