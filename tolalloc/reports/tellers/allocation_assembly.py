@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise, product
 from math import nan
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pandas as pd
 
 from tolalloc.allocation.result import AllocationResult, AssemblyChoice
 from tolalloc.drawings.compensators import Compensator, Indexing, Shim
@@ -19,9 +21,6 @@ from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.tellers.check import interval_gaps
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import number
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _say = Sentences("allocation")
 
@@ -122,8 +121,6 @@ def choices_table(result: AllocationResult) -> Table[AssemblyChoice]:
 
 def bins_table(result: AllocationResult) -> pd.DataFrame | None:
     """Return where classes begin and end, and the sizes; nothing where parts are taken as they come."""
-    import pandas as pd
-
     frame = pd.DataFrame([own for acting in _acting(result) for own in _bins(result, acting)])
     return None if frame.empty else frame[[name for name in _BINS if name in frame]]
 

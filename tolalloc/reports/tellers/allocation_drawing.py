@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from jaxtyping import Float
 
 from tolalloc.allocation.result import AllocationResult
@@ -30,9 +30,6 @@ from tolalloc.reports.tellers.allocation_workbook import add_calculator
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import quantity, short, with_unit
 from tolalloc.reports.writer import write_csv
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _say = Sentences("allocation")
 
@@ -310,8 +307,6 @@ def _settings_sheet(result: AllocationResult) -> dict[str, pd.DataFrame]:
     """Return a sheet of the settings that belong to the drawing and of what is made for them; none without any."""
     if not result.amounts:
         return {}
-    import pandas as pd
-
     rows: list[dict[str, object]] = [
         {
             "what": quantity(own.name),

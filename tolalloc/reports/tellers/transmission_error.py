@@ -5,9 +5,10 @@ from __future__ import annotations
 from functools import cached_property
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from jaxtyping import Float
 
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE
@@ -25,9 +26,6 @@ from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.portraits.reducer import against_catalogue, linear_model_warnings, twist_table
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.templates import Sentences
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _say = Sentences("transmission_error")
 _MAIN = 8
@@ -188,8 +186,6 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
 
     def add_files(self, folder: Path) -> None:
         """Add the curve at the equally spaced angles, which `diagnose` and `lot` read."""
-        import pandas as pd
-
         from tolalloc.reports.writer import write_csv, write_json
 
         found = self.result.equilibria
@@ -202,8 +198,6 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
     @cached_property
     def turn_table(self) -> pd.DataFrame:
         """The whole turn, one quantity per row."""
-        import pandas as pd
-
         found = self.summary
         own, reversal = found["every_bearing_under_its_own_load"] or {}, found["reversal_arcsec"]
         rows = [
@@ -236,8 +230,6 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
     @cached_property
     def attribution_table(self) -> pd.DataFrame:
         """What each source adds to the curve and to the main orders, and what they make together."""
-        import pandas as pd
-
         found = self.summary["attribution"]
         names = [f"order {order:.6g} [arcsec]" for order in found["orders"]]
         rows = [
@@ -328,8 +320,6 @@ def _friction(loop: FrictionLoop, idle: IdleTorque) -> dict[str, Any]:
 
 def _friction_table(reducer: Reducer, rated: float, found: dict[str, Any]) -> pd.DataFrame:
     """Return the friction torque of every kind of contact, at rated torque [N·m] and without torque."""
-    import pandas as pd
-
     coefficients = {CONTACTS[name]: f"{value:g}" for name, value in reducer.friction.coefficients.items()}
     rows = [(own["contact"], own["rated_nm"], own["no_load_nm"]) for own in found["by_contact"]]
     rows.append(("contacts together", sum(row[1] for row in rows), found["no_load_torque_of_contacts_nm"]))
