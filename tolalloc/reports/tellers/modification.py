@@ -119,9 +119,8 @@ class ModificationTeller(Teller[ModificationResult]):
         objective = _say("objective_wanted")
         if not self._wanted:
             objective = _say("objective", description=found.problem.description, evaluations=found.best.evaluations)
-        delivered = Section(
-            heading=_say("delivered_heading"), paragraphs=(objective,), tables=(("delivered", self.delivered),)
-        )
+        tables = (("delivered", self.delivered),)
+        delivered = Section(heading=_say("delivered_heading"), paragraphs=(objective,), tables=tables)
         return (delivered, *self._contact.sections)
 
     @cached_property
