@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import singledispatch
 from math import isfinite
 from typing import Any, Literal
@@ -60,7 +60,7 @@ class Series:
         return cls(label=label, kind="bars", x=list(x), y=list(y), low=list(low), high=list(high))
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Figure:
     """A figure.
 
@@ -86,6 +86,7 @@ class Figure:
     title: str
     x_label: str
     y_label: str = ""
+    _: KW_ONLY
     series: tuple[Series, ...]
     vertical: tuple[tuple[float, str], ...] = ()
     horizontal: tuple[tuple[float, str], ...] = ()
@@ -107,12 +108,13 @@ class Figure:
         return low, (high - low) / BINS or 1.0
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class HeatMap:
     """A figure of coloured cells."""
 
     name: str  # File name without ending
     title: str  # What it shows, as a sentence
+    _: KW_ONLY
     # Names of the columns and the rows
     columns: Sequence[str]
     rows: Sequence[str]

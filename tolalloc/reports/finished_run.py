@@ -160,9 +160,7 @@ def read_run(folder: Path) -> FinishedRun:
         raise InputError(f"{folder}: no such run folder.")
     said, manifest = _read_json(folder / "summary.json"), _read_json(folder / "manifest.json")
     answers = [said[kind] for kind in ("ranking", "allocation") if isinstance(said.get(kind), dict)]
-    if (
-        len(answers) > 1
-    ):  # what a ranking says of limits is of the one that most units miss, an allocation's of the first
+    if len(answers) > 1:  # a ranking speaks of the limit that most units miss, an allocation of the first
         answers[0] = {name: value for name, value in answers[0].items() if not name.startswith((*_LIMITS, "yield of "))}
     if not answers:
         raise InputError(f"{folder / 'summary.json'}: it holds neither a ranking nor an allocation.")

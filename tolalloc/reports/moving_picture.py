@@ -26,6 +26,8 @@ _LONGEST = 0.3
 """Length of the arrow of the largest force over the radius of the pin circle [-]."""
 
 _FRAMES_PER_SECOND = 12
+_ANIMATION = {"save_all": True, "loop": 0, "transparency": 0, "blend": 1, "disposal": 0, "optimize": True}
+"""How an animated PNG is saved: without end, each frame over the ones before."""
 
 _EDGES = (("#1c2733", 3), ("#5b6876", 3), ("#b00020", 2))
 """Colours of lines, and into how many steps each goes over into a face."""
@@ -38,7 +40,7 @@ def mixed(colour: str, other: str, share: float) -> tuple[float, ...]:
     return tuple((1 - share) * own + share * more for own, more in zip(to_rgb(colour), to_rgb(other), strict=True))
 
 
-def _points(values: Complex[np.ndarray, " point"]) -> Float[np.ndarray, "point 2"]:
+def _points(values: Complex[np.ndarray, "*point"]) -> Float[np.ndarray, "*point 2"]:
     return np.stack([values.real, values.imag], axis=-1)
 
 
@@ -66,10 +68,8 @@ class _View:
         self.axes.add_patch(Polygon(_points(points), closed=True, transform=self.transform, **style))
 
     def lines(self, ends: Complex[np.ndarray, "line 2"], colour: str, width: float) -> None:
-        drawn = LineCollection(
-            list(np.stack([ends.real, ends.imag], axis=-1)), colors=colour, linewidths=width, transform=self.transform
-        )
-        self.axes.add_collection(drawn)
+        style: dict[str, Any] = {"colors": colour, "linewidths": width, "transform": self.transform}
+        self.axes.add_collection(LineCollection(list(_points(ends)), **style))
 
     def output(self, pose: Pose) -> None:
         """Draw where the output stands, turned further by the magnified transmission error."""
@@ -161,8 +161,9 @@ def _draw_forces(pen: _View, pose: Pose, disc: int, largest: float) -> None:
     tip, head = point + length * normal, np.minimum(0.35 * length, 0.028 * pose.outline["pin_circle_radius"])
     pen.lines(np.stack([point, tip], axis=-1), _FORCE, 1.2)
     barbs = np.stack([tip, tip - head * normal * (1 - 0.5j), tip - head * normal * (1 + 0.5j)], axis=-1)
-    corners = list(np.stack([barbs.real, barbs.imag], axis=-1))
-    pen.axes.add_collection(PolyCollection(corners, facecolor=_FORCE, edgecolor="none", transform=pen.transform))
+    pen.axes.add_collection(
+        PolyCollection(list(_points(barbs)), facecolor=_FORCE, edgecolor="none", transform=pen.transform)
+    )
 
 
 def _draw_first_stage(pen: _View, pose: Pose) -> None:
@@ -279,20 +280,8 @@ def animate(record: Mapping[str, Any], shares: Mapping[str, float], path: Path, 
 
     angles = 2 * np.pi / record["outline"]["pin_count"] * np.arange(frames) / frames
     largest = max(float(Pose(record, angle).state("force")[0].max()) for angle in angles)
-    pictures = [
-        _pixels(
-            draw_still(
-                record,
-                shares,
-                angle,
-                title=f"{title}, seen from its output",
-                turned=-angle,
-                discs=(0,),
-                largest=largest or None,
-            )
-        )
-        for angle in angles.tolist()
-    ]
+    seen: dict[str, Any] = {"title": f"{title}, seen from its output", "discs": (0,), "largest": largest or None}
+    pictures = [_pixels(draw_still(record, shares, angle, turned=-angle, **seen)) for angle in angles.tolist()]
     palette = Image.new("P", (1, 1))
     palette.putpalette(_palette())
     images = [Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
@@ -303,18 +292,7 @@ def animate(record: Mapping[str, Any], shares: Mapping[str, float], path: Path, 
         image = Image.fromarray(changed.astype(np.uint8), "P")
         image.putpalette([0, 0, 0, *_palette()])
         written.append(image)
-    written[0].save(
-        path,
-        format="PNG",
-        save_all=True,
-        append_images=written[1:],
-        duration=1000 / _FRAMES_PER_SECOND,
-        loop=0,
-        transparency=0,
-        blend=1,
-        disposal=0,
-        optimize=True,
-    )
+    written[0].save(path, format="PNG", append_images=written[1:], duration=1000 / _FRAMES_PER_SECOND, **_ANIMATION)
 
 
 def _pixels(drawing: Canvas) -> UInt8[np.ndarray, "row column 3"]:

@@ -69,6 +69,7 @@ USUAL_TWIST = 3.6
 """Rated torque over torsional rigidity of RV reducers in catalogues, 2.9 to 4.0 over all sizes [arcmin]."""
 
 _WITHOUT = "without radial clearance"
+_ERROR = "transmission error, output side [arcsec]"
 
 _MEANS = "A preloaded reducer turns, but it runs warm, wears early and has no lost motion until it has worn."
 """What pins that press without torque do to a reducer."""
@@ -186,10 +187,8 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
 
     def pictured(self, units: Units) -> tuple[Figure, ...]:
         """Return the curves and the orders of units."""
-        curves = _curves(self.model, units)
-        return _curve_figure(curves, self.model.kernel.torque), _order_figure(
-            self.model, _order_table(self.model, curves)
-        )
+        model, curves = self.model, _curves(self.model, units)
+        return _curve_figure(curves, model.kernel.torque), _order_figure(model, _order_table(model, curves))
 
     def scene(
         self,
@@ -429,27 +428,19 @@ def _curves(model: ReducerModel, units: Units) -> dict[str, Equilibria]:
 
 
 def _curve_figure(curves: Mapping[str, Equilibria], torque: float) -> Figure:
-    return Figure(
-        name="transmission_error",
-        title=f"Transmission error over one output turn at {number(torque, 'g')} N·m",
-        x_label="carrier angle [°]",
-        y_label="transmission error, output side [arcsec]",
-        series=tuple(
-            Series.line(label, curve.carrier_angle / DEGREE, curve.transmission_error[0] / ARCSECOND)
-            for label, curve in curves.items()
-        ),
+    title = f"Transmission error over one output turn at {number(torque, 'g')} N·m"
+    series = (
+        Series.line(label, curve.carrier_angle / DEGREE, curve.transmission_error[0] / ARCSECOND)
+        for label, curve in curves.items()
     )
+    return Figure("transmission_error", title, "carrier angle [°]", _ERROR, series=tuple(series))
 
 
 def _crank_turn_figure(curves: Mapping[str, Equilibria], reducer: Reducer) -> Figure:
     """Return the same over one turn of the crankshafts: the mean of all their turns, and between which they lie."""
-    return Figure(
-        name="crank_turn",
-        title="The same over one turn of the crankshafts: mean of all turns, the band holds every one",
-        x_label="crank angle [°]",
-        y_label="transmission error, output side [arcsec]",
-        series=tuple(_crank_turn(label, curve, reducer.cycloid_stage.disc_teeth) for label, curve in curves.items()),
-    )
+    title = "The same over one turn of the crankshafts: mean of all turns, the band holds every one"
+    series = (_crank_turn(label, curve, reducer.cycloid_stage.disc_teeth) for label, curve in curves.items())
+    return Figure("crank_turn", title, "crank angle [°]", _ERROR, series=tuple(series))
 
 
 def _crank_turn(label: str, curve: Equilibria, disc_teeth: int) -> Series:
@@ -480,17 +471,13 @@ def _order_table(model: ReducerModel, curves: Mapping[str, Equilibria]) -> pd.Da
 
 def _order_figure(model: ReducerModel, orders: pd.DataFrame) -> Figure:
     stage, (order, *units) = model.reducer.cycloid_stage, map(str, orders)
-    return Figure(
-        name="orders_of_units",
-        title=f"Orders: multiples of {stage.disc_teeth} stand still with the housing, of {stage.pin_count} turn with "
-        "disc or carrier",
-        x_label=order,
-        y_label="amplitude, output side [arcsec]",
-        series=tuple(
-            Series(label=own.removesuffix(" [arcsec]"), kind="stems", x=list(orders[order]), y=list(orders[own]))
-            for own in units
-        ),
+    turning = f"of {stage.pin_count} turn with disc or carrier"
+    title = f"Orders: multiples of {stage.disc_teeth} stand still with the housing, {turning}"
+    series = (
+        Series(label=own.removesuffix(" [arcsec]"), kind="stems", x=list(orders[order]), y=list(orders[own]))
+        for own in units
     )
+    return Figure("orders_of_units", title, order, "amplitude, output side [arcsec]", series=tuple(series))
 
 
 def _contact_table(model: ReducerModel, units: Units) -> pd.DataFrame:
@@ -550,22 +537,12 @@ def _moving(
     named = tuple(source.name for source in errors.sources)
     elsewhere = ", ".join(name for name in named if not is_placed(name))
     scene = _scene(model, x, unit, named, per_crank_turn=_COARSE)
-    return (
-        Section(
-            heading="The reducer",
-            paragraphs=(
-                f"The {unit} in true proportion, errors and gaps drawn larger. The stronger a place is coloured, the "
-                "more the sources that sit there drive together, over the place that drives most. Point at a place to "
-                "see its sources, and at a source in a table to see its place.",
-                *((f"The picture has no place for {elsewhere}.",) if elsewhere else ()),
-            ),
-            figures=(
-                MovingPicture(
-                    name="reducer",
-                    title=f"{model.name}, {unit}",
-                    record=scene_record(scene, coarse=True),
-                    shares=strongest(shares, scene.place_by_source),
-                ),
-            ),
-        ),
+    said = (
+        f"The {unit} in true proportion, errors and gaps drawn larger. The stronger a place is coloured, the "
+        "more the sources that sit there drive together, over the place that drives most. Point at a place to "
+        "see its sources, and at a source in a table to see its place.",
+        *((f"The picture has no place for {elsewhere}.",) if elsewhere else ()),
     )
+    record, strength = scene_record(scene, coarse=True), strongest(shares, scene.place_by_source)
+    picture = MovingPicture("reducer", f"{model.name}, {unit}", record=record, shares=strength)
+    return (Section(heading="The reducer", paragraphs=said, figures=(picture,)),)

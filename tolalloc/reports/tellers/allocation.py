@@ -87,11 +87,8 @@ class AllocationTeller(Teller[AllocationResult]):
         """The sections of the report."""
         result, unit = self.result, self.header.cost_unit
         sources, leading = sources_table(result), short(result.leading)
-        counts = (
-            f"{count} unit{'' if count == 1 else 's'}: {outcome}"
-            for outcome, count in self.header.statuses.items()
-            if count
-        )
+        known = ((outcome, count) for outcome, count in self.header.statuses.items() if count)
+        counts = (f"{count} unit{'' if count == 1 else 's'}: {outcome}" for outcome, count in known)
         return (
             self._today,
             Section(heading=_say("heading_risks"), paragraphs=risks(result), first=True),
@@ -206,35 +203,23 @@ class AllocationTeller(Teller[AllocationResult]):
         """What would be otherwise: settings, yields, assumptions."""
         result, unit, found = self.result, self.header.cost_unit, list[Section]()
         if result.trade:
-            found.append(
-                Section(
-                    heading=_say("heading_trade", word=portrait_of(result.model).settings_word.capitalize()),
-                    paragraphs=texts.cheapest_settings(result, unit),
-                    figures=figures.trade_figures(result, result.trade, unit),
-                    tables=(("modification", tables.trade_frame(result.trade, unit)),),
-                )
+            trade = Section(
+                heading=_say("heading_trade", word=portrait_of(result.model).settings_word.capitalize()),
+                paragraphs=texts.cheapest_settings(result, unit),
+                figures=figures.trade_figures(result, result.trade, unit),
+                tables=(("modification", tables.trade_frame(result.trade, unit)),),
             )
+            found.append(trade)
         if result.prices and result.prices.priced.size:
             priced = (("unit price", tables.prices_frame(result.prices, unit)),)
             found.append(Section(heading=_say("heading_good_unit"), tables=priced))
         if result.robustness:
-            moved, variants = tables.robustness_frame(result, result.robustness), result.robustness
-            region = variants.uncertain
-            found.append(
-                Section(
-                    heading=_say("heading_robustness"),
-                    figures=(figures.robustness_figure(moved),),
-                    tables=(
-                        ("robustness", moved),
-                        ("variants", tables.variants_frame(variants, unit)),
-                        *(
-                            ((f"{region.name} region", tables.region_frame(region, result.free.chosen.met)),)
-                            if region
-                            else ()
-                        ),
-                    ),
-                )
-            )
+            moved = tables.robustness_frame(result, result.robustness)
+            shown = [("robustness", moved), ("variants", tables.variants_frame(result.robustness, unit))]
+            if region := result.robustness.uncertain:
+                shown.append((f"{region.name} region", tables.region_frame(region, result.free.chosen.met)))
+            zones = figures.robustness_figure(moved)
+            found.append(Section(heading=_say("heading_robustness"), figures=(zones,), tables=tuple(shown)))
         return tuple(found)
 
     @cached_property
@@ -243,7 +228,9 @@ class AllocationTeller(Teller[AllocationResult]):
         result, header = self.result, self.header
         chosen, free, robustness = result.chosen, result.free, result.robustness
         portrait, examined = portrait_of(result.model), texts.examined(result)
-        limits = result.requirements[0].limits
+        limits, blocking, steady = result.requirements[0].limits, chosen.blocking, None
+        if robustness:
+            steady = [group for group, same in zip(robustness.groups, robustness.same, strict=True) if same]
         limit = "limit [arcsec]" if unit_of(result.leading) == "arcsec" else f"limit of {result.leading}"
         answered = {
             "study": header.name,
@@ -264,20 +251,14 @@ class AllocationTeller(Teller[AllocationResult]):
             f"{short(result.leading)} kept [{unit_of(result.leading)}]": chosen.quantile_bound,
             **self._costs,
             **assembly_summary(result),
-            "blocking requirement": None if result.met else chosen.blocking.requirement.output,
-            f"beyond its limit by [{unit_of(chosen.blocking.requirement.output)}]": None
-            if result.met
-            else -chosen.blocking.slack,
+            "blocking requirement": None if result.met else blocking.requirement.output,
+            f"beyond its limit by [{unit_of(blocking.requirement.output)}]": None if result.met else -blocking.slack,
             "cannot be built because": examined.fault or None,
             **examined.figures,
             **portrait.amounts(chosen.settings),
             "requirements": tables.requirements_table(result).records(),
             "drawing": sources_table(result).records(),
-            "zones that stay the same": [
-                group for group, same in zip(robustness.groups, robustness.same, strict=True) if same
-            ]
-            if robustness
-            else None,
+            "zones that stay the same": steady,
             **portrait.facts,
             "statuses": dict(header.statuses),
             "warnings": list(self.warnings),

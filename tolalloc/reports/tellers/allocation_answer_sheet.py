@@ -68,10 +68,6 @@ class AnswerSheet:
         rule = {"type": "formula", "criteria": f"={condition}", "format": self.book.style(**style)}
         self.sheet.inner.conditional_format(place, {**rule, "stop_if_true": last})
 
-    def space(self) -> None:
-        """Leave a row free."""
-        self.row += 1
-
 
 def add_answer(
     book: Book, result: AllocationResult, header: Header, predicted: dict[str, Formula | float | None]
@@ -99,7 +95,7 @@ def add_answer(
     _amounts(rows, result)
     for at, text in enumerate(texts.warnings(result, header)):
         if at == 0:
-            rows.space()
+            rows.row += 1
         rows.across(text, name=_say("sheet_warnings") if at == 0 else " ")
     rows.sheet.set_up_print()
     rows.sheet.inner.print_area(f"A1:F{rows.row}")
@@ -129,7 +125,7 @@ def _limits(
     held = result.model_range
     key = "sheet_range" if held.designs else "sheet_range_alone"
     rows.across(_say(key, low=1 / held.factor, high=held.factor, count=held.designs), name=_say("sheet_range_name"))
-    rows.space()
+    rows.row += 1
     rows.line(*_say("sheet_limits").split("|"), bold=True)
     first = rows.row + 1
     for at, (side, off) in enumerate(zip(result.chosen.alone, held.off, strict=True), start=2):
@@ -165,7 +161,7 @@ def _amounts(rows: AnswerSheet, result: AllocationResult) -> None:
     """Write the amounts that must be made with the zones, each with its tolerance where the table states one."""
     if not result.amounts:
         return
-    rows.space()
+    rows.row += 1
     rows.line(*_say("sheet_amounts").split("|"), bold=True)
     for own in result.amounts:
         tolerance = own.tolerance and own.tolerance / MICROMETRE

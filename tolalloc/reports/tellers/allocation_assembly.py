@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise, product
 from math import nan
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pandas as pd
 
 from tolalloc.allocation.result import AllocationResult, AssemblyChoice
 from tolalloc.drawings.compensators import Compensator, Indexing, Shim
@@ -19,9 +21,6 @@ from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.tellers.check import interval_gaps
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import number
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _say = Sentences("allocation")
 
@@ -57,15 +56,8 @@ def assembly_sentences(result: AllocationResult) -> tuple[str, ...]:
     assembled = result.assembled
     if assembled is None or not assembled.best.compensators:
         return ()
-    before, after = assembled.as_they_come.joint, result.chosen.joint
-    said = [
-        _say(
-            "assembly_random",
-            simulated=portrait_of(result.model).simulated,
-            **interval_gaps(before),
-            after=after.estimate,
-        )
-    ]
+    gaps = {"simulated": portrait_of(result.model).simulated, "after": result.chosen.joint.estimate}
+    said = [_say("assembly_random", **interval_gaps(assembled.as_they_come.joint), **gaps)]
     for own in assembled.best.compensators:
         if isinstance(own, Sorting):
             left = own.leftover_of({name: _source(result, name) for name in own.named})
@@ -82,16 +74,14 @@ def assembly_section(result: AllocationResult, cost_unit: str) -> tuple[Section,
     """Return the section on parts chosen at assembly; nothing where nothing was to be chosen."""
     if result.assembled is None:
         return ()
-    compared = choices_table(result)
-    tables, bins = [(compared.name, compared.frame(cost_unit))], bins_table(result)
-    if bins is not None:
-        tables.append(("classes and sizes", bins))
+    compared, bins = choices_table(result), bins_table(result)
+    further = () if bins is None else (("classes and sizes", bins),)
     return (
         Section(
             heading=_say("heading_assembly"),
             paragraphs=(*assembly_sentences(result), *assembly_notes(result), *_methods(result)),
             figures=choices_figure(result, cost_unit),
-            tables=tuple(tables),
+            tables=((compared.name, compared.frame(cost_unit)), *further),
             unfolded=True,
         ),
     )
@@ -122,8 +112,6 @@ def choices_table(result: AllocationResult) -> Table[AssemblyChoice]:
 
 def bins_table(result: AllocationResult) -> pd.DataFrame | None:
     """Return where classes begin and end, and the sizes; nothing where parts are taken as they come."""
-    import pandas as pd
-
     frame = pd.DataFrame([own for acting in _acting(result) for own in _bins(result, acting)])
     return None if frame.empty else frame[[name for name in _BINS if name in frame]]
 
@@ -134,17 +122,11 @@ def choices_figure(result: AllocationResult, cost_unit: str) -> tuple[Figure, ..
     if len(choices) < 2:
         return ()
     names = [own.label for own in choices]
-    return (
-        Figure(
-            name="assembly",
-            title=_say("figure_assembly"),
-            x_label=f"cost [{cost_unit}]",
-            series=(
-                Series.bars("zones and assembly", names, [own.cost for own in choices]),
-                Series.bars("zones alone", names, [own.zones_cost for own in choices]),
-            ),
-        ),
+    bars = (
+        Series.bars("zones and assembly", names, [own.cost for own in choices]),
+        Series.bars("zones alone", names, [own.zones_cost for own in choices]),
     )
+    return (Figure("assembly", _say("figure_assembly"), f"cost [{cost_unit}]", series=bars),)
 
 
 def assembly_summary(result: AllocationResult) -> dict[str, Any]:
@@ -214,10 +196,8 @@ def _sorting_note(result: AllocationResult, acting: Sorting) -> str:
         said.append(_say(key, width=360.0 / acting.count, **gaps))
     if acting.by == "direction":
         return said[0]
-    ends = [
-        "/".join(number(end, ".2f") for end in acting.limits(_source(result, name)) / MICROMETRE)
-        for name in acting.named
-    ]
+    limits = (acting.limits(_source(result, name)) / MICROMETRE for name in acting.named)
+    ends = ["/".join(number(end, ".2f") for end in own) for own in limits]
     key = "note_opposite" if acting.opposite else "note_sorting"
     what = _say("of_vector" if 0 in acting.measured else "of_deviation")
     return " ".join([*said, _say(key, parts_ends=ends[0], mates_ends=ends[1], what=what, **gaps)])

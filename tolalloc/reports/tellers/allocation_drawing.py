@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 from jaxtyping import Float
 
 from tolalloc.allocation.result import AllocationResult
@@ -30,9 +30,6 @@ from tolalloc.reports.tellers.allocation_workbook import add_calculator
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import quantity, short, with_unit
 from tolalloc.reports.writer import write_csv
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _say = Sentences("allocation")
 
@@ -79,16 +76,13 @@ def sources_table(result: AllocationResult) -> Table[_Row]:
         Column("share of variance [%]", lambda row: sum(each(shares, row))),
     ]
     if by_deviation:
-        header = f"Sens [{unit}/{length}]"
-        columns.append(Column(header, lambda row: _span(each(by_deviation, row))))
+        columns.append(Column(f"Sens [{unit}/{length}]", lambda row: _span(each(by_deviation, row))))
     if by_zone:
-        header = f"kept value per zone [{unit}/{length}]"
-        columns.append(Column(header, lambda row: sum(each(by_zone, row))))
+        columns.append(Column(f"kept value per zone [{unit}/{length}]", lambda row: sum(each(by_zone, row))))
     columns.append(Column("cost before [{cost}]", lambda row: sum(old.cost for old, _ in row[1])))
     columns.append(Column("cost [{cost}]", lambda row: sum(new.cost for _, new in row[1])))
     if any(changes.values()):
-        header = "of it for a new process [{cost}]"
-        columns.append(Column(header, lambda row: sum(each(changes, row, 0.0))))
+        columns.append(Column("of it for a new process [{cost}]", lambda row: sum(each(changes, row, 0.0))))
     columns.append(Column("locked", lambda row: "yes" if row[0].locked else "no"))
     before, drawn = {own.name: own for own in result.space.errors.sources}, by_row(result.drawn_sources)
     rows = [(row, [(before[own.name], own) for own in members]) for row, members in drawn if row.zone != 0.0]
@@ -222,17 +216,12 @@ def effects_figure(result: AllocationResult) -> tuple[Figure, ...]:
         return ()
     guarantee, names = result.requirements[0].guarantee, list(largest)
     share = f"{100 * guarantee.target:.4g} % " if isinstance(guarantee, AtYield) else ""
-    figure = Figure(
-        name="effects",
-        title=_say("figure_effects"),
-        x_label=f"change of {share}{short(result.leading)} [{unit_of(result.leading)}]",
-        series=(
-            Series.bars(f"by {_STEP * 100:.0f} %", names, largest.values()),
-            Series.bars("by 1 µm", names, [each[name] for name in names]),
-        ),
-        vertical=((0.0, ""),),
+    bars = (
+        Series.bars(f"by {_STEP * 100:.0f} %", names, largest.values()),
+        Series.bars("by 1 µm", names, [each[name] for name in names]),
     )
-    return (figure,)
+    axis = f"change of {share}{short(result.leading)} [{unit_of(result.leading)}]"
+    return (Figure("effects", _say("figure_effects"), axis, series=bars, vertical=((0.0, ""),)),)
 
 
 def risks(result: AllocationResult) -> tuple[str, ...]:
@@ -259,15 +248,8 @@ def zones_figure(rows: Sequence[_Row]) -> Figure:
     names = [row.name for row, _ in rows]
     unit = zone_unit(row for row, _ in rows)
     before, after = ([zone_in(own, unit) for own in side] for side in zip(*(own[0] for _, own in rows), strict=True))
-    return Figure(
-        name="zones",
-        title=_say("figure_zones"),
-        x_label=f"zone [{unit}]",
-        series=(
-            Series.bars("before", names, before),
-            Series.bars("after", names, after),
-        ),
-    )
+    bars = Series.bars("before", names, before), Series.bars("after", names, after)
+    return Figure("zones", _say("figure_zones"), f"zone [{unit}]", series=bars)
 
 
 def write_drawing(result: AllocationResult, header: Header, folder: Path) -> None:
@@ -310,8 +292,6 @@ def _settings_sheet(result: AllocationResult) -> dict[str, pd.DataFrame]:
     """Return a sheet of the settings that belong to the drawing and of what is made for them; none without any."""
     if not result.amounts:
         return {}
-    import pandas as pd
-
     rows: list[dict[str, object]] = [
         {
             "what": quantity(own.name),

@@ -20,20 +20,17 @@ def units_figure(result: AllocationResult) -> Figure:
     """Return the leading output of random units before and after, with the yield after."""
     limits, leading = result.requirements[0].limits, result.leading
     before, after = result.free.baseline.sample.values, result.chosen.sample.values
+    sides = (limit for limit in (limits.upper, limits.lower) if limit is not None)
     return Figure(
-        name=short(leading).replace("-", "_").replace(" ", "_"),
-        title=_say("figure_units", share=result.chosen.achieved.estimate),
-        x_label=leading,
-        y_label="share of the units [%]",
+        short(leading).replace("-", "_").replace(" ", "_"),
+        _say("figure_units", share=result.chosen.achieved.estimate),
+        leading,
+        "share of the units [%]",
         series=(
             Series(label="as it is", kind="histogram", x=list(before)),
             Series(label="as drawn", kind="histogram", x=list(after)),
         ),
-        vertical=tuple(
-            (limit, f"limit {with_unit(f'{limit:g}', leading)}")
-            for limit in (limits.upper, limits.lower)
-            if limit is not None
-        ),
+        vertical=tuple((limit, f"limit {with_unit(f'{limit:g}', leading)}") for limit in sides),
     )
 
 
@@ -41,10 +38,10 @@ def front_figure(result: AllocationResult, front: CostFront, cost_unit: str) -> 
     """Return cost against the limit of the leading output."""
     leading, points, drawn = result.leading, front.points, front.drawn
     return Figure(
-        name="front",
-        title=_say("figure_front"),
-        x_label=f"{short(leading)} limit [{unit_of(leading)}]",
-        y_label=f"cost [{cost_unit}]",
+        "front",
+        _say("figure_front"),
+        f"{short(leading)} limit [{unit_of(leading)}]",
+        f"cost [{cost_unit}]",
         series=(
             Series.line(
                 _say("figure_front_verified"), [own.limit for own in points], [own.design.cost for own in points]
@@ -67,8 +64,8 @@ def _trade_map(trade: SettingTrade, cost_unit: str) -> HeatMap:
     """Return the cost of the cheapest zones over the last two settings, those before them with one value each."""
     (first, second), name = trade.values[-2:], trade.names[-2]
     return HeatMap(
-        name="modification_cost",
-        title=_say("figure_trade_map"),
+        "modification_cost",
+        _say("figure_trade_map"),
         columns=[f"{value:.3g}" for value in second],
         rows=[f"{quantity(name)} {value:.3g} {unit_of(name)}" for value in first],
         x_label=trade.names[-1],
@@ -89,25 +86,15 @@ def _trade_figure(result: AllocationResult, trade: SettingTrade, cost_unit: str)
         if known.any():
             drawn = Series.line if known.sum() > 1 else Series.points
             lines.append(drawn(", ".join(chosen) or "cheapest zones", along[known], trade.cost[at][known]))
-    now = result.space.settings[-1].value
-    return Figure(
-        name="modification_trade",
-        title=_say("figure_trade"),
-        x_label=trade.names[-1],
-        y_label=f"cost of the cheapest zones [{cost_unit}]",
-        series=tuple(lines),
-        vertical=((now, "as it is"), (float(result.chosen.settings[-1]), "chosen")),
-    )
+    marks = (result.space.settings[-1].value, "as it is"), (float(result.chosen.settings[-1]), "chosen")
+    heads = _say("figure_trade"), trade.names[-1], f"cost of the cheapest zones [{cost_unit}]"
+    return Figure("modification_trade", *heads, series=tuple(lines), vertical=marks)
 
 
 def robustness_figure(frame: pd.DataFrame) -> Figure:
     """Return how far every free zone moves when an assumption is wrong, from the table that says so."""
     _, best, low, high, *_ = frame.columns
-    bars = Series.bars(
-        "free zone; between its smallest and largest under all changed assumptions",
-        frame["group"],
-        frame[best],
-        np.minimum(frame[low], frame[best]),
-        np.maximum(frame[high], frame[best]),
-    )
-    return Figure(name="robustness", title=_say("figure_robustness"), x_label=f"zone [{unit_of(best)}]", series=(bars,))
+    label = "free zone; between its smallest and largest under all changed assumptions"
+    ends = np.minimum(frame[low], frame[best]), np.maximum(frame[high], frame[best])
+    bars = Series.bars(label, frame["group"], frame[best], *ends)
+    return Figure("robustness", _say("figure_robustness"), f"zone [{unit_of(best)}]", series=(bars,))

@@ -333,20 +333,14 @@ def _proven(result: AllocationResult) -> tuple[str, ...]:
     if found is None:
         return ()
     gaps = {
-        "bound": found.cost,
-        "confidence": found.confidence,
-        "units": found.units,
+        "found": found,
         "allowed": " or ".join(dict.fromkeys(str(own) for own in found.allowed)),
-        "boxes": found.boxes,
         "counted": ", ".join(short(own) for own in found.counted),
         "rests": f", as far as {found.rests_on} hold" if found.rests_on else "",
     }
-    if not found.says_more:
-        return (_say("proven_nothing", bound=found.cost, boxes=found.boxes, counted=gaps["counted"]),)
-    if not free.met:
-        return (_say("proven_alone", **gaps),)
     answer = _say("answer_free" if result.graded else "answer_drawing", cost=free.cost)
-    return (_say("proven", answer=answer, below=1 - found.cost / free.cost, **gaps),)
+    key = ("proven" if free.met else "proven_alone") if found.says_more else "proven_nothing"
+    return (_say(key, answer=answer, below=1 - found.cost / free.cost, **gaps),)
 
 
 def _free(result: AllocationResult) -> tuple[str, ...]:
@@ -356,15 +350,9 @@ def _free(result: AllocationResult) -> tuple[str, ...]:
         return ()
     bound, cost, graded = found.lower_bound, found.chosen.cost, result.graded
     answer = _say("answer_free" if graded else "answer_drawing", cost=cost)
-    gaps = {
-        "bound": bound.cost,
-        "answer": answer,
-        "below": max(1 - bound.cost / cost, 0.0),
-        "confidence": bound.confidence,
-    }
-    if bound.certified:
-        return (_say("bound_certified", zones="free zones" if graded else "zones", **gaps), *_rounding(found.chosen))
-    return (_say("bound_local", **gaps), *_rounding(found.chosen))
+    gaps = {"answer": answer, "below": max(1 - bound.cost / cost, 0.0), "zones": "free zones" if graded else "zones"}
+    said = _say("bound_certified" if bound.certified else "bound_local", bound=bound, **gaps)
+    return (said, *_rounding(found.chosen))
 
 
 def _rounding(design: VerifiedDesign) -> tuple[str, ...]:
@@ -417,11 +405,8 @@ def _prices(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     for check, side in result.chosen.limited_sides if result.free.chosen.met else ():
         if price := result.price_of(check, side):
             cost, _ = limit_price(side, price)
-            gaps = {
-                "output": quantity(side.stack.name),
-                "limit": with_unit(f"{side.limit:g}", side.stack.name),
-                "step": with_unit(f"{limit_step(side):g}", side.stack.name),
-            }
+            limit, step = (with_unit(f"{own:g}", side.stack.name) for own in (side.limit, limit_step(side)))
+            gaps = {"output": quantity(side.stack.name), "limit": limit, "step": step}
             said.append(_say("price", price=cost, cost_unit=cost_unit, **gaps))
     return tuple(said)
 
@@ -541,14 +526,10 @@ def quantiles(result: AllocationResult) -> tuple[str, ...]:
         kept = unit_quantile(chosen, check, side) if asked.limits.width is None else np.nan
         if isinstance(asked.guarantee, AtYield) and np.isfinite(kept) and np.isfinite(side.value):
             key = "quantile_upper" if side.sign > 0 else "quantile_lower"
-            gaps = {
-                "output": quantity(asked.output),
-                "simulated": portrait_of(result.model).simulated,
-                "target": asked.guarantee.target,
-                "kept": with_unit(f"{kept:.4g}", asked.output),
-                "value": with_unit(f"{side.value:.4g}", asked.output),
-            }
-            said.append(_say(key, confidence=chosen.confidence, **gaps))
+            safer, value = (with_unit(f"{own:.4g}", asked.output) for own in (kept, side.value))
+            gaps = {"target": asked.guarantee.target, "kept": safer, "value": value, "confidence": chosen.confidence}
+            simulated = portrait_of(result.model).simulated
+            said.append(_say(key, output=quantity(asked.output), simulated=simulated, **gaps))
     return tuple(said)
 
 

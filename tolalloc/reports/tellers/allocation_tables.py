@@ -285,16 +285,9 @@ def robustness_frame(result: AllocationResult, found: Robustness) -> pd.DataFram
 
 def variants_frame(found: Robustness, cost_unit: str) -> pd.DataFrame:
     """Return the answers under changed assumptions."""
-    rows = [
-        {
-            "assumption": variant.name,
-            f"cheapest then [{cost_unit}]": variant.cost,
-            "free zones cost more by [%]": variant.regret * 100,
-            "free zones keep all": "yes" if variant.kept else "no",
-        }
-        for variant in found.variants
-    ]
-    return pd.DataFrame(rows)
+    rows = [(own.name, own.cost, own.regret * 100, "yes" if own.kept else "no") for own in found.variants]
+    more = "free zones cost more by [%]", "free zones keep all"
+    return pd.DataFrame(rows, columns=["assumption", f"cheapest then [{cost_unit}]", *more])
 
 
 def region_frame(found: UncertainRegion, met: bool) -> pd.DataFrame:

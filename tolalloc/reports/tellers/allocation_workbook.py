@@ -7,20 +7,14 @@ more: small changes of zones are judged well, large ones by ``tolalloc`` on unit
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields
 from functools import singledispatch
 
 import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from tolalloc.allocation.cost.model import (
-    Exponential,
-    PowerExponential,
-    Reciprocal,
-    ReciprocalPower,
-    SumOfCosts,
-    Weighted,
-)
+from tolalloc.allocation.cost.model import ClosedForm, SumOfCosts, Weighted
 from tolalloc.allocation.cost.points import Spline, Tabulated
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.drawings.sources import LENGTHS, STEPS, Source, length_unit, rounded_down
@@ -122,7 +116,7 @@ def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     for side in chosen.alone:
         table[f"{side.stack.name}: added per scale [{unit_of(side.stack.name)}]"] = side.stack.worst_case + side.relief
         table[f"{side.stack.name}: spread per scale [{unit_of(side.stack.name)}]"] = side.stack.root_sum_square
-    return pd.concat([table, *_further_lines(result), *_other_lines(result)], ignore_index=True)
+    return pd.concat([table, *_lines_below(result)], ignore_index=True)
 
 
 def _write_head(result: AllocationResult) -> str:
@@ -189,21 +183,10 @@ def _line_row(
     }
 
 
-def _other_lines(result: AllocationResult) -> list[pd.DataFrame]:
-    """Return one row for every line whose zones are locked, for the drawing to be whole; nothing without any."""
-    rows, (_, length) = [], length_unit(result.space.errors.sources)
-    for line in _others(result):
-        own = line[1][0]
-        half = own.zone / 2 if _frame(result, own).is_deviation else own.zone
-        stated = rounded_down(half, FINEST[own.length_name][0]) / LENGTHS[own.length_name]
-        rows.append({**_line_row(result, line, own.zone / length, stated), "inside": _say("workbook_locked")})
-    return [pd.DataFrame(rows)] if rows else []
-
-
-def _further_lines(result: AllocationResult) -> list[pd.DataFrame]:
+def _lines_below(result: AllocationResult) -> list[pd.DataFrame]:
     """Return one row for every line whose zone follows that of its group, which adds nothing to cost and limits.
 
-    Nothing without any.
+    And one for every line whose zones are locked, for the drawing to be whole. Nothing without any.
     """
     first = {name: _FIRST + at for at, name in enumerate(result.drawn.groups)}
     rows, (_, length) = [], length_unit(result.space.errors.sources)
@@ -212,6 +195,11 @@ def _further_lines(result: AllocationResult) -> list[pd.DataFrame]:
         ratio = number(own.zone / _first_member(result, name).zone)
         followed, stated = Formula(f"=B{first[name]}*{ratio}", zone), _written(result, own, row, zone, length)
         rows.append(_line_row(result, (name, members), followed, stated))
+    for line in _others(result):
+        own = line[1][0]
+        half = own.zone / 2 if _frame(result, own).is_deviation else own.zone
+        written = rounded_down(half, FINEST[own.length_name][0]) / LENGTHS[own.length_name]
+        rows.append({**_line_row(result, line, own.zone / length, written), "inside": _say("workbook_locked")})
     return [pd.DataFrame(rows)] if rows else []
 
 
@@ -379,24 +367,11 @@ def cost_formula(model: object, zone: str) -> str:
 
 
 @cost_formula.register
-def _(model: Reciprocal, zone: str) -> str:
-    return f"({number(model.fixed)}+{number(model.factor)}/{zone})"
-
-
-@cost_formula.register
-def _(model: ReciprocalPower, zone: str) -> str:
-    return f"({number(model.fixed)}+{number(model.factor)}/{zone}^{number(model.exponent)})"
-
-
-@cost_formula.register
-def _(model: Exponential, zone: str) -> str:
-    return f"({number(model.fixed)}+{number(model.factor)}*EXP(-{zone}/{number(model.scale)}))"
-
-
-@cost_formula.register
-def _(model: PowerExponential, zone: str) -> str:
-    falling = f"EXP(-{zone}/{number(model.scale)})/{zone}^{number(model.exponent)}"
-    return f"({number(model.fixed)}+{number(model.factor)}*{falling})"
+def _(model: ClosedForm, zone: str) -> str:
+    given = {field.name: number(getattr(model, field.name)) for field in fields(model)}
+    falling = f"*EXP(-{zone}/{given['scale']})" if "scale" in given else ""
+    power = f"/{zone}^{given['exponent']}" if "exponent" in given else "" if falling else f"/{zone}"
+    return f"({given['fixed']}+{given['factor']}{falling}{power})"
 
 
 @cost_formula.register

@@ -187,7 +187,7 @@ class ComparisonTeller(Teller[Comparison]):
             own = run.ranking.set_index("dimension")[[TOTAL, LOW, HIGH]].astype(float).reindex(names).fillna(0.0)
             total, low, high = (list(own[column]) for column in (TOTAL, LOW, HIGH))
             series.append(Series.bars(label, names, total, low, high))
-        return Figure(name="rankings", title=_say("figure"), x_label="total index ST [-]", series=tuple(series))
+        return Figure("rankings", _say("figure"), "total index ST [-]", series=tuple(series))
 
 
 def _named(name: str, cost_unit: str) -> str:

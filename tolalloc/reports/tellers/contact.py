@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from tolalloc.reading.units import ARCMINUTE, DEGREE, MEGAPASCAL, MICROMETRE, MICRORADIAN, MILLIMETRE
 from tolalloc.reducers.contact import ContactResult, YieldingContact
@@ -16,9 +18,6 @@ from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.templates import Sentences
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _say = Sentences("contact")
 _METHODS = ("linear method", "law at every pin")
@@ -42,13 +41,8 @@ class ContactTeller(Teller[ContactResult]):
     def subtitle(self) -> str:
         """Torques, face width and phases."""
         found = self.result.assessment
-        return _say(
-            "subtitle",
-            torque=self.result.torque,
-            on_disc=found.share * found.torque,
-            width=found.reducer.cycloid_stage.face_width / MILLIMETRE,
-            phases=found.single.phase.size,
-        )
+        gaps = {"on_disc": found.share * found.torque, "width": found.reducer.cycloid_stage.face_width / MILLIMETRE}
+        return _say("subtitle", torque=self.result.torque, phases=found.single.phase.size, **gaps)
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -56,30 +50,15 @@ class ContactTeller(Teller[ContactResult]):
         found, single, yielding = self.result.assessment, self.result.assessment.single, self.result.yielding
         clearance, pins = found.clearance, found.single.pins_in_contact
         law = _say(_LAWS[found.reducer.stiffness.pin_contact_law])
-        said = [
-            _say(
-                "clearance",
-                **self.play,
-                free=clearance.free_rotation / ARCMINUTE,
-                radial=clearance.radial / MICROMETRE,
-                first_contact=clearance.first_contact / DEGREE,
-            ),
-            _say(
-                "rigid",
-                share=found.share,
-                law=law,
-                pins=span(pins.min(), pins.max()),
-                force=single.force.max(),
-                most_loaded=single.most_loaded / DEGREE,
-                pressure=single.pressure.max() / MEGAPASCAL,
-                most_pressed=single.most_pressed / DEGREE,
-            ),
-        ]
+        play = {**self.play, "free": clearance.free_rotation / ARCMINUTE, "radial": clearance.radial / MICROMETRE}
+        said = [_say("clearance", **play, first_contact=clearance.first_contact / DEGREE)]
         if yielding:
-            pressure, carry = yielding.pressure / MEGAPASCAL, span(*yielding.pins_in_contact)
-            torque, force = self.result.torque, yielding.largest_force
-            said.insert(1, _say("yielding", torque=torque, law=law, pins=carry, force=force, pressure=pressure))
-        return tuple(said)
+            gaps = {"pins": span(*yielding.pins_in_contact), "pressure": yielding.pressure / MEGAPASCAL}
+            said.append(_say("yielding", law=law, contact=self.result, **gaps))
+        most = {"force": single.force.max(), "pressure": single.pressure.max() / MEGAPASCAL}
+        places = {"most_loaded": single.most_loaded / DEGREE, "most_pressed": single.most_pressed / DEGREE}
+        rigid = _say("rigid", share=found.share, law=law, pins=span(pins.min(), pins.max()), **most, **places)
+        return (*said, rigid)
 
     @property
     def play(self) -> dict[str, float]:
@@ -139,27 +118,19 @@ class ContactTeller(Teller[ContactResult]):
     def terminal(self) -> tuple[tuple[pd.DataFrame, str], ...]:
         """Profile and clearance, and the loaded contact by two methods."""
         model, table = self.header.model, self._contact_table
-        return (
-            (self._profile_table, _say("profile_on_terminal", model=model)),
-            (
-                table[[name for name in _ON_TERMINAL if name in table]],
-                _say("contact_on_terminal", model=model, torque=self.result.torque),
-            ),
-        )
+        shown = table[[name for name in _ON_TERMINAL if name in table]]
+        title = _say("contact_on_terminal", model=model, torque=self.result.torque)
+        return (self._profile_table, _say("profile_on_terminal", model=model)), (shown, title)
 
     @property
     def _profile_table(self) -> pd.DataFrame:
         """Profile and clearance."""
-        import pandas as pd
-
         profile = self.summary["profile"]
         return pd.DataFrame({"quantity": profile.keys(), "value": profile.values()})
 
     @cached_property
     def _contact_table(self) -> pd.DataFrame:
         """The loaded contact by every method side by side."""
-        import pandas as pd
-
         columns, found = {}, self.result.assessment
         for title, name, contact in (
             ("one disc, linear method", "linear", found.linear),
@@ -188,8 +159,6 @@ class ContactTeller(Teller[ContactResult]):
     @property
     def _pin_table(self) -> pd.DataFrame:
         """Gap, force and pressure of every pin that could carry, with a pin in the crank direction."""
-        import pandas as pd
-
         linear, single = self.result.assessment.linear, self.result.assessment.single
         order = _carrying(single)
         return pd.DataFrame(
@@ -298,15 +267,10 @@ def _profile_figure(profile: ToothProfile) -> Figure:
         return x + [-value for value in x[::-1]], y + y[::-1]
 
     drawn = (("exact tooth", places), (f"modified, {factor:g} times magnified", places + factor * apart))
+    lines = tuple(Series.line(label, *upright(points)) for label, points in drawn)
     # What is removed along the normal is drawn, not the slip of points along the flank, which changes nothing.
-    return Figure(
-        name="profile",
-        title=_say("profile_figure", factor=factor),
-        x_label="across the tooth [mm]",
-        y_label="from the disc's centre [mm]",
-        series=tuple(Series.line(label, upright(points)[0], upright(points)[1]) for label, points in drawn),
-        equal=True,
-    )
+    heads = _say("profile_figure", factor=factor), "across the tooth [mm]", "from the disc's centre [mm]"
+    return Figure("profile", *heads, series=lines, equal=True)
 
 
 def clearance_figure(found: Assessment) -> Figure:
@@ -314,54 +278,38 @@ def clearance_figure(found: Assessment) -> Figure:
     lever = normals(found.reducer.cycloid_stage.shortening, FLANK).lever
     angle = list(FLANK / DEGREE)
     low, high = found.single.zone.mean(axis=0) / DEGREE
-    formula = [Series.line("Li Lixing's formula", angle, found.clearance.formula / MICROMETRE)]
-    if found.clearance.formula_error < 0.01 * MICROMETRE:  # the same line as the clearance
-        formula = []
+    lines = {"clearance": found.clearance.after}
+    if found.clearance.formula_error >= 0.01 * MICROMETRE:  # else the same line as the clearance
+        lines["Li Lixing's formula"] = found.clearance.formula
+    lines |= {f"deflection, {name}": lever * contact.deflection.mean() for name, contact in _by_method(found)}
     return Figure(
-        name="clearance",
-        title=_say("clearance_figure"),
-        x_label=_FROM_CRANK,
-        y_label="clearance, deflection [µm]",
-        series=(
-            Series.line("clearance", angle, found.clearance.after / MICROMETRE),
-            *formula,
-            *(
-                Series.line(f"deflection, {name}", angle, lever * contact.deflection.mean() / MICROMETRE)
-                for name, contact in zip(_METHODS, (found.linear, found.single), strict=True)
-            ),
-        ),
+        "clearance",
+        _say("clearance_figure"),
+        _FROM_CRANK,
+        "clearance, deflection [µm]",
+        series=tuple(Series.line(name, angle, own / MICROMETRE) for name, own in lines.items()),
         vertical=((low, f"carrying from {low:.1f}°"), (high, f"to {high:.1f}°")),
     )
+
+
+def _by_method(found: Assessment) -> Iterator[tuple[str, LoadedContact]]:
+    """Yield both contacts of one disc as legends call them."""
+    return zip(_METHODS, (found.linear, found.single), strict=True)
 
 
 def _force_figure(found: Assessment) -> Figure:
     """Draw the force of each pin."""
     angle, order = found.single.pin_angle[0, 0], _carrying(found.single)
-    return Figure(
-        name="forces",
-        title=_say("force_figure"),
-        x_label=_FROM_CRANK,
-        y_label="force [N]",
-        series=tuple(
-            Series.points(name, angle[order] / DEGREE, contact.force[0, 0, order])
-            for name, contact in zip(_METHODS, (found.linear, found.single), strict=True)
-        ),
-    )
+    points = (Series.points(name, angle[order] / DEGREE, own.force[0, 0, order]) for name, own in _by_method(found))
+    return Figure("forces", _say("force_figure"), _FROM_CRANK, "force [N]", series=tuple(points))
 
 
 def _phase_figure(found: Assessment) -> Figure:
     """Draw how the number of pins in contact changes while one pin takes over from the next."""
     phase = list(found.single.phase / DEGREE)
-    return Figure(
-        name="pins_in_contact",
-        title=_say("phase_figure"),
-        x_label="angle from the crank direction to the next pin [°]",
-        y_label="pins in contact [-]",
-        series=tuple(
-            Series.points(name, phase, [int(count) for count in contact.pins_in_contact[:, 0]])
-            for name, contact in zip(_METHODS, (found.linear, found.single), strict=True)
-        ),
-    )
+    points = (Series.points(name, phase, own.pins_in_contact[:, 0].tolist()) for name, own in _by_method(found))
+    heads = _say("phase_figure"), "angle from the crank direction to the next pin [°]", "pins in contact [-]"
+    return Figure("pins_in_contact", *heads, series=tuple(points))
 
 
 TELLER = ContactTeller

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import fields
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from tolalloc.allocation.cost.model import ClosedForm
 from tolalloc.allocation.cost.points import CostFit, ShopFit
@@ -16,9 +17,6 @@ from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.templates import Sentences
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _DRAWN = 80
 """Points of a drawn curve [-]."""
@@ -61,17 +59,7 @@ class CostsTeller(Teller[tuple[ShopFit, ...]]):
     @property
     def sentences(self) -> tuple[str, ...]:
         """The taken form of every process."""
-        return tuple(
-            _say(
-                "taken",
-                process=own.process,
-                form=formula(own.best.model),
-                smallest=own.best.smallest,
-                largest=own.best.largest,
-                left_out=own.best.leave_one_out,
-            )
-            for own in self.result
-        )
+        return tuple(_say("taken", own=own, form=formula(own.best.model)) for own in self.result)
 
     @property
     def assumptions(self) -> tuple[str, ...]:
@@ -102,13 +90,8 @@ class CostsTeller(Teller[tuple[ShopFit, ...]]):
     @property
     def _figure(self) -> Figure:
         """Points and taken curves."""
-        return Figure(
-            name="costs",
-            title=_say("figure"),
-            x_label="zone [µm]",
-            y_label=f"cost [{self.header.cost_unit}]",
-            series=tuple(series for own in self.result for series in _curves(own)),
-        )
+        series = tuple(series for own in self.result for series in _curves(own))
+        return Figure("costs", _say("figure"), "zone [µm]", f"cost [{self.header.cost_unit}]", series=series)
 
 
 def _curves(own: ShopFit) -> Iterable[Series]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pandas as pd
 
 from tolalloc.reading.units import ARCMINUTE
 from tolalloc.reducers.duty import MAIN, BearingLife, CaseLoads, DutyResult
@@ -12,9 +14,6 @@ from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.templates import Sentences
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _say = Sentences("duty")
 
@@ -59,14 +58,7 @@ class DutyTeller(Teller[DutyResult]):
     @property
     def subtitle(self) -> str:
         """Mean torque and speed."""
-        result = self.result
-        return _say(
-            "subtitle",
-            count=len(result.loads),
-            torque=result.mean_torque,
-            speed=result.mean_speed,
-            rated=result.reducer.load.rated_torque,
-        )
+        return _say("subtitle", count=len(self.result.loads), duty=self.result)
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -75,13 +67,8 @@ class DutyTeller(Teller[DutyResult]):
         pressed = max(result.loads, key=lambda own: own.pressure)
         said = [
             *self._life,
-            _say("pressure", pressure=pressed.pressure, force=pressed.pin_force, case=pressed.case.name),
-            _say(
-                "heat",
-                loss=result.mean_loss,
-                temperature=result.temperatures[-1],
-                steps=len(result.temperatures) - 1,
-            ),
+            _say("pressure", loads=pressed),
+            _say("heat", duty=result, temperature=result.temperatures[-1], steps=len(result.temperatures) - 1),
         ]
         if result.tilt is not None:
             moment = max(abs(own.case.moment) for own in result.loads)
@@ -95,17 +82,9 @@ class DutyTeller(Teller[DutyResult]):
             return (_say("no_life", life=result.catalogue_life),)
         least = min(result.bearings, key=lambda own: own.life)
         share, at = max((share, at) for at, share in enumerate(least.shares))
-        return (
-            _say(
-                "life",
-                life=result.life,
-                kind=_called(least.kind),
-                least=least.life,
-                share=share,
-                worst=result.loads[at].case.name,
-            ),
-            _say("catalogue", life=result.catalogue_life),
-        )
+        worst = {"share": share, "worst": result.loads[at].case.name}
+        said = _say("life", life=result.life, kind=_called(least.kind), least=least.life, **worst)
+        return said, _say("catalogue", life=result.catalogue_life)
 
     @property
     def assumptions(self) -> tuple[str, ...]:
@@ -118,14 +97,11 @@ class DutyTeller(Teller[DutyResult]):
     @cached_property
     def sections(self) -> tuple[Section, ...]:
         """Bearings, load cases and where the heat comes from."""
-        life = Section(
-            heading=_say("life_heading"),
-            figures=(self._damage,),
-            tables=((self._bearings.name, self._bearings.frame()),),
-        )
+        bearings, cases = ((own.name, own.frame()) for own in (self._bearings, self._cases))
+        life = Section(heading=_say("life_heading"), figures=(self._damage,), tables=(bearings,))
         return (
             *((life,) if self.result.bearings else ()),
-            Section(heading=_say("case_heading"), tables=((self._cases.name, self._cases.frame()),)),
+            Section(heading=_say("case_heading"), tables=(cases,)),
             Section(heading=_say("heat_heading"), figures=(self._heat,)),
         )
 
@@ -168,22 +144,18 @@ class DutyTeller(Teller[DutyResult]):
     def _damage(self) -> Figure:
         """Share of each bearing's life that every load case uses up."""
         cases = [own.case.name for own in self.result.loads]
-        return Figure(
-            name="damage",
-            title=_say("damage_figure"),
-            x_label="share of the life [%]",
-            series=tuple(
-                Series.bars(_called(own.kind), cases, [100.0 * share for share in own.shares])
-                for own in self.result.bearings
-            ),
+        bars = (
+            Series.bars(_called(own.kind), cases, [100.0 * share for share in own.shares])
+            for own in self.result.bearings
         )
+        return Figure("damage", _say("damage_figure"), "share of the life [%]", series=tuple(bars))
 
     @property
     def _heat(self) -> Figure:
         """Part of the mean lost power that comes from each load case."""
         cases = [own.case.name for own in self.result.loads]
         heat = Series.bars("lost power", cases, [own.share * own.loss for own in self.result.loads])
-        return Figure(name="heat", title=_say("heat_figure"), x_label="part of the mean lost power [W]", series=(heat,))
+        return Figure("heat", _say("heat_figure"), "part of the mean lost power [W]", series=(heat,))
 
 
 TELLER = DutyTeller

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pandas as pd
 
 from tolalloc.reading.units import ARCMINUTE, MICROMETRE
 from tolalloc.reducers.modification import ModificationResult
@@ -11,9 +13,6 @@ from tolalloc.reports.document import Section
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.tellers.contact import ContactTeller
 from tolalloc.reports.templates import Sentences
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _say = Sentences("modification")
 _NONE = 1e-11  # clearance that counts as none [m]
@@ -100,8 +99,6 @@ class ModificationTeller(Teller[ModificationResult]):
     @property
     def delivered(self) -> pd.DataFrame:
         """What was asked for beside what the exact distances show."""
-        import pandas as pd
-
         found, request = self.result.contact.assessment.exact_clearance, self.result.request
         lowest, asked = float(found.after.min()), self.result.problem.radial_clearance / MICROMETRE
         lowest = lowest if abs(lowest) > _NONE else 0.0
@@ -122,9 +119,8 @@ class ModificationTeller(Teller[ModificationResult]):
         objective = _say("objective_wanted")
         if not self._wanted:
             objective = _say("objective", description=found.problem.description, evaluations=found.best.evaluations)
-        delivered = Section(
-            heading=_say("delivered_heading"), paragraphs=(objective,), tables=(("delivered", self.delivered),)
-        )
+        tables = (("delivered", self.delivered),)
+        delivered = Section(heading=_say("delivered_heading"), paragraphs=(objective,), tables=tables)
         return (delivered, *self._contact.sections)
 
     @cached_property

@@ -118,6 +118,11 @@ class RankingTeller(Teller[RankingResult]):
         """What follows a number of the leading output."""
         return sign_of(self._unit)
 
+    def _told(self, key: str, **gaps: Any) -> str:
+        """Return a sentence with gaps that many have: result, leading output, its sign, what units are called."""
+        common = {"result": self.result, "output": self._output, "sign": self._sign}
+        return _say(key, **{**common, "simulated": self._portrait.simulated, **gaps})
+
     def _written(self, name: str) -> str:
         """Return what a user's table calls a source, or its name."""
         return next((own.own_id for own in self.result.errors.active if own.name == name and own.own_id), name)
@@ -126,19 +131,15 @@ class RankingTeller(Teller[RankingResult]):
     def _limits(self) -> str:
         """What a sentence calls the limits of the leading output."""
         limits = self.result.limits[self.result.leading]
-        if limits.lower is None:
-            return _say("limit_upper", limit=limits.upper, sign=self._sign)
-        if limits.upper is None:
-            return _say("limit_lower", limit=limits.lower, sign=self._sign)
-        return _say("limit_both", lower=limits.lower, upper=limits.upper, sign=self._sign)
+        side = "upper" if limits.lower is None else "lower" if limits.upper is None else "both"
+        limit = limits.upper if limits.lower is None else limits.lower
+        return self._told(f"limit_{side}", limit=limit, upper=limits.upper)
 
     @property
     def _the_limits(self) -> str:
         """What a sentence calls the limits as a thing."""
-        limits = self.result.limits[self.result.leading]
-        if limits.lower is None:
-            return _say("the_limit", limit=self._limits)
-        return self._limits if limits.upper is None else _say("the_limits", limit=self._limits)
+        upper_alone = self.result.limits[self.result.leading].lower is None
+        return _say("the_limit", limit=self._limits) if upper_alone else self._limits
 
     def _turned(self, value: float) -> str:
         """Return a value of the one-sided output in words, a tenth where a hundredth of the spread is not said."""
@@ -146,15 +147,15 @@ class RankingTeller(Teller[RankingResult]):
         read = self.result.one_sided.read(value)
         if self.result.limits[self.result.leading].width is None:
             return f"{number(read, digits)}{self._sign}"
-        return _say("value_beyond" if read > 0 else "value_inside", value=number(abs(read), digits), sign=self._sign)
+        return self._told("value_beyond" if read > 0 else "value_inside", value=number(abs(read), digits))
 
     def _led(self) -> Iterator[str]:
         """Yield why another limit leads than the first one, if one does."""
         first, leading = self.result.first_limited, self.result.leading
         if first != leading:
             miss, miss_first = (1 - self.result.yields[name].estimate for name in (leading, first))
-            gaps = {"simulated": self._portrait.simulated, "first": self._portrait.display_name(first)}
-            yield _say("led", output=self._output.capitalize(), miss=miss, miss_first=miss_first, **gaps)
+            gaps = {"output": self._output.capitalize(), "first": self._portrait.display_name(first)}
+            yield self._told("led", miss=miss, miss_first=miss_first, **gaps)
 
     def _centre(self) -> Iterator[str]:
         """Yield what moving one nominal brings; nothing where the mean is in the middle."""
@@ -163,18 +164,14 @@ class RankingTeller(Teller[RankingResult]):
             return
         moved = next(own for own in self.result.errors.active if own.name == found.source)
         capability = next(own.capability for own in self.result.capabilities if own.output == self.result.leading)
-        yield _say(
+        yield self._told(
             "centre",
-            output=self._output,
             off=f"{number(abs(found.off), '.3g')}{self._sign}",
             side=_say("above" if found.off > 0 else "below"),
             pp=capability.pp if capability else np.nan,
             ppk=capability.ppk if capability else np.nan,
             source=self._written(found.source),
             shift=with_unit(f"{found.shift / moved.unit_length:+.2g}", f"[{moved.unit}]"),
-            now=found.now,
-            moved=found.moved,
-            simulated=self._portrait.simulated,
         )
 
     def _of_other_limits(self) -> Iterator[str]:
@@ -192,7 +189,7 @@ class RankingTeller(Teller[RankingResult]):
         at = sobol.together.sources.index(OTHERS)
         low, high = sobol.together.total_interval[:, at]
         total, count = min(sobol.together.total[at], 1.0), len(sobol.small)
-        yield _say("others", count=count, by=self.result.by, total=total, low=100 * low, high=high)
+        yield self._told("others", count=count, total=total, low=100 * low, high=high)
 
     def _per_micrometre(self) -> Iterator[str]:
         """Yield the order per micrometre, and why it is not that of the ranking, if a zone weighs in it."""
@@ -202,18 +199,15 @@ class RankingTeller(Teller[RankingResult]):
             return
         first = sorted(changes.items(), key=lambda own: -own[1])
         zones = {name: own[0].said(own[0].zone) for name, own in self.result.members.items() if own}
-        names = ", ".join(
-            _say("per_micrometre_name", source=name, change=change, sign=self._sign) for name, change in first[:_NAMED]
-        )
-        same = dict(first)[ranked[0]] >= _AS_STRONG * first[0][1]
-        yield _say(
-            "per_micrometre_same" if same else "per_micrometre_other",
-            names=names,
-            driver=ranked[0],
-            zone=zones[ranked[0]],
-            first=first[0][0],
-            zone_of_first=zones[first[0][0]],
-        )
+        names = ", ".join(self._told("per_micrometre_name", source=own, change=at) for own, at in first[:_NAMED])
+        key = "same" if changes[ranked[0]] >= _AS_STRONG * first[0][1] else "other"
+        gaps = {
+            "driver": ranked[0],
+            "zone": zones[ranked[0]],
+            "first": first[0][0],
+            "zone_of_first": zones[first[0][0]],
+        }
+        yield _say(f"per_micrometre_{key}", names=names, **gaps)
 
     def _orders(self) -> Iterator[str]:
         """Yield who makes the strongest orders."""
@@ -229,53 +223,25 @@ class RankingTeller(Teller[RankingResult]):
             due = "order_together"
             if alone:
                 due = "order_alone" if share[leading].sum() > _MOSTLY else "order_several"
-            yield _say(
-                "order",
-                order=found.orders[at],
-                deviation=found.deviation[at],
-                sign=sign_of(tables.wave_unit(self.result)),
-                due=_say(due),
-                names=" and ".join(
-                    _say("order_name", source=found.sources[source], share=min(share[source], 1.0))
-                    for source in leading
-                ),
+            names = " and ".join(
+                _say("order_name", source=found.sources[source], share=min(share[source], 1.0)) for source in leading
             )
+            wave = {"deviation": found.deviation[at], "sign": sign_of(tables.wave_unit(self.result))}
+            yield _say("order", order=found.orders[at], due=_say(due), names=names, **wave)
 
     def _uncertain(self) -> Iterator[str]:
         """Yield what not knowing the model itself does, if anything is not known."""
-        effect = self.result.effect
-        if effect is None:
-            return
-        yield _say(
-            "uncertain",
-            names=" + ".join(source.name for source in effect.sources),
-            simulated=self._portrait.simulated,
-            output=self._output,
-            sigma=effect.sigma,
-            sigma_of_mean=effect.sigma_of_mean,
-            sign=self._sign,
-            units=effect.first_order.units,
-            changes=effect.first_order.changes,
-            error=effect.first_order.root_mean_square,
-            largest=effect.first_order.largest,
-            effect=effect.first_order.effect,
-        )
+        if effect := self.result.effect:
+            names = " + ".join(source.name for source in effect.sources)
+            yield self._told("uncertain", names=names, effect=effect, error=effect.first_order)
 
     def _rejects(self) -> str:
         """Return what drives the units out."""
         found, at = self.result.reject, int(np.argmax(self.result.reject.excess))
         low, high = found.lift_interval[:, at]
-        return _say(
-            "rejects" if low > 1.0 else "rejects_alike",
-            where=self._the_limits if found.is_limit else _say("worst_share", value=self._turned(found.threshold)),
-            outside=found.outside,
-            units=found.units,
-            simulated=self._portrait.simulated,
-            source=self._written(found.sources[at]),
-            lift=found.lift[at],
-            low=low,
-            high=high,
-        )
+        where = self._the_limits if found.is_limit else _say("worst_share", value=self._turned(found.threshold))
+        gaps = {"source": self._written(found.sources[at]), "lift": found.lift[at], "low": low, "high": high}
+        return self._told("rejects" if low > 1.0 else "rejects_alike", where=where, **gaps)
 
     def _beyond(self) -> str:
         """Return the share of units beyond the limit, and how it is known."""
@@ -289,22 +255,12 @@ class RankingTeller(Teller[RankingResult]):
             key, scale = "beyond_rare", 1.0
             least = share.low if share.low > _NEGLIGIBLE * share.estimate else 0.0
             shown, low, high = number(share.estimate, ",.3g"), number(least, ",.3g"), number(share.high, ",.0f")
-        return _say(
-            key,
-            limit=self._limits,
-            simulated=self._portrait.simulated,
-            share=shown,
-            low=low,
-            high=high,
-            allowed=allowed / scale,
-            verdict=found.verdict,
-        )
+        return self._told(key, limit=self._limits, share=shown, low=low, high=high, allowed=allowed / scale)
 
     def _all_limits(self) -> Iterator[str]:
         """Yield the share of units that keep all limits at once, where there are several."""
-        if len(self.result.limits) == 1:
-            return
-        yield _say("all_limits", simulated=self._portrait.simulated, **interval_gaps(self.result.joint))
+        if len(self.result.limits) > 1:
+            yield self._told("all_limits", **interval_gaps(self.result.joint))
 
     def _opening(self) -> str:
         """Return which zone has the least and the most room."""
@@ -322,8 +278,7 @@ class RankingTeller(Teller[RankingResult]):
         key = "kept_upper" if limits.lower is None else "kept_lower"
         if limits.width is not None:
             key = "kept_beyond" if self.result.one_sided.read(quantile) > 0 else "kept_inside"
-        gaps = {"target": target, "value": self._turned(quantile), "opening": opening}
-        return _say(key, simulated=self._portrait.simulated, **gaps)
+        return self._told(key, value=self._turned(quantile), opening=opening)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
@@ -347,8 +302,8 @@ class RankingTeller(Teller[RankingResult]):
         if result.sobol.dropped:
             yield _say("dropped", blocks=result.sobol.dropped)
         if result.effect and result.effect.first_order.fails:
-            error, names = result.effect.first_order, " + ".join(source.name for source in result.effect.sources)
-            yield _say("rough", names=names, error=error.root_mean_square, effect=error.effect, sign=self._sign)
+            names = " + ".join(source.name for source in result.effect.sources)
+            yield self._told("rough", names=names, error=result.effect.first_order)
         yield from self._portrait.cautions(np.array([setting.value for setting in result.model.settings]))
         if self.header.failed:
             yield _say("failed", units=self.header.failed)
@@ -407,10 +362,9 @@ class RankingTeller(Teller[RankingResult]):
                 tables=(("Shapley effects", tables.shapley_table(result.shapley)),),
             )
         names = ", ".join(quantity(name) for name in result.sobol.ranked)
-        blocks, others = result.sobol.blocks, result.sobol.first_blocks
         yield Section(
             heading=_say("overall_heading"),
-            paragraphs=(_say("overall", outputs=names, blocks=blocks, others=others, leading=self._output),),
+            paragraphs=(self._told("overall", outputs=names),),
             figures=(figures.requirements_figure(result),),
             tables=(("all requirements", tables.overall_table(result)),),
             folded=True,
@@ -419,7 +373,7 @@ class RankingTeller(Teller[RankingResult]):
             note = f"{self._portrait.spectra_note}. " if self._portrait.spectra_note else ""
             yield Section(
                 heading=_say("orders_heading"),
-                paragraphs=(f"{note}{_say('orders', blocks=others)}",),
+                paragraphs=(f"{note}{self._told('orders')}",),
                 figures=(figures.orders_figure(result),),
                 tables=(("orders", tables.orders_table(result)),),
                 folded=True,
@@ -538,15 +492,9 @@ def _drivers(sobol: SourceIndices) -> Iterator[str]:
     low, high = sobol.total_interval
     following = {pair.before: pair for pair in sobol.neighbours}
     for place, at in enumerate(sobol.order[:_NAMED], start=1):
-        yield _say(
-            "driver",
-            place=place,
-            source=sobol.sources[at],
-            total=min(sobol.total[at], 1.0),
-            low=low[at],
-            high=high[at],
-            before=f" {_before(following[at], sobol.sources)}" if at in following else "",
-        )
+        share = {"total": min(sobol.total[at], 1.0), "low": low[at], "high": high[at]}
+        before = f" {_before(following[at], sobol.sources)}" if at in following else ""
+        yield _say("driver", place=place, source=sobol.sources[at], before=before, **share)
 
 
 def _unseen(sobol: SobolAnalysis, output: str) -> Iterator[str]:
@@ -561,12 +509,10 @@ def _unseen(sobol: SobolAnalysis, output: str) -> Iterator[str]:
 def _named_drivers(sobol: SourceIndices, output: str) -> str:
     """Return the same of all of them in one sentence, without the places."""
     low, high = sobol.total_interval
-    named = (
-        _say(
-            "driver_short", source=sobol.sources[at], total=min(sobol.total[at], 1.0), low=100 * low[at], high=high[at]
-        )
-        for at in sobol.order[:_NAMED]
-    )
+    named = []
+    for at in sobol.order[:_NAMED]:
+        share = {"total": min(sobol.total[at], 1.0), "low": 100 * low[at], "high": high[at]}
+        named.append(_say("driver_short", source=sobol.sources[at], **share))
     return _say("drivers_short", output=output, names=", ".join(named))
 
 
@@ -579,14 +525,9 @@ def _before(pair: Neighbours, sources: Sequence[str]) -> str:
 def converged(found: Convergence, output: str) -> str:
     """Return whether the order of the first places is stable."""
     last = found.history[-1]
+    verdict = _say("converged" if found.stable else "not_converged")
     return _say(
-        "convergence",
-        output=output,
-        count=len(last.first),
-        verdict=_say("converged" if found.stable else "not_converged"),
-        share=last.probability,
-        blocks=last.blocks,
-        asked=found.probability,
+        "convergence", output=output, count=len(last.first), verdict=verdict, last=last, asked=found.probability
     )
 
 
@@ -595,15 +536,9 @@ def chosen_surrogate(choice: Choice) -> str:
     score = choice.scores[choice.best]
     if choice.chosen is None:
         return _say("surrogate_none", name=score.name, shortfalls="; ".join(tables.shortfalls(score)))
-    return _say(
-        "surrogate",
-        name=score.name,
-        q2=score.q2,
-        held_out=score.held_out,
-        quantile=tables.quantile_name(score),
-        error=abs(score.quantile_share),
-        untried=f" {_say('surrogate_untried', names=', '.join(choice.untried))}" if choice.untried else "",
-    )
+    untried = f" {_say('surrogate_untried', names=', '.join(choice.untried))}" if choice.untried else ""
+    off = {"quantile": tables.quantile_name(score), "error": abs(score.quantile_share)}
+    return _say("surrogate", score=score, untried=untried, **off)
 
 
 TELLER = RankingTeller

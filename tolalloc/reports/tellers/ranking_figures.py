@@ -38,23 +38,13 @@ def ranking_figure(result: RankingResult) -> Figure:
         ("total-effect index", indices.total, indices.total_interval),
         ("first-order index", indices.first, indices.first_interval),
     )
-    return Figure(
-        name="ranking",
-        title=_say("ranking_figure", output=_output(result)),
-        x_label=_say("ranking_axis"),
-        series=(
-            *(
-                Series.bars(
-                    _say("with_interval", name=name),
-                    names,
-                    np.clip(values[rows], 0.0, 1.0),
-                    *interval[:, rows],
-                )
-                for name, values, interval in bars
-            ),
-            Series.bars(_say("per_micrometre_bars"), names, [changes.get(own, 0.0) / largest for own in names]),
-        ),
-    )
+    series = [
+        Series.bars(_say("with_interval", name=name), names, np.clip(values[rows], 0.0, 1.0), *interval[:, rows])
+        for name, values, interval in bars
+    ]
+    series.append(Series.bars(_say("per_micrometre_bars"), names, [changes.get(own, 0.0) / largest for own in names]))
+    title = _say("ranking_figure", output=_output(result))
+    return Figure("ranking", title, _say("ranking_axis"), series=tuple(series))
 
 
 def requirements_figure(result: RankingResult) -> HeatMap:
@@ -63,8 +53,8 @@ def requirements_figure(result: RankingResult) -> HeatMap:
     outputs = [name for name in result.outputs if name not in sobol.constant]
     rows = sobol.overall.order[:_SHOWN]
     return HeatMap(
-        name="requirements",
-        title=_say("requirements_figure"),
+        "requirements",
+        _say("requirements_figure"),
         columns=[_broken(quantity(name)) for name in outputs],
         rows=[sobol.sources[at] for at in rows],
         label="total-effect index [-]",
@@ -79,8 +69,8 @@ def orders_figure(result: RankingResult) -> HeatMap:
     first = np.nan_to_num(found.first)
     rows = tables.largest_first(first.max(axis=0))[:_SHOWN]
     return HeatMap(
-        name="orders",
-        title=_say("orders_figure"),
+        "orders",
+        _say("orders_figure"),
         columns=[
             f"{order}\n{number(own, '.2g')}{sign}" for order, own in zip(found.orders, found.deviation, strict=True)
         ],
@@ -93,19 +83,15 @@ def orders_figure(result: RankingResult) -> HeatMap:
 
 def sample_figure(result: RankingResult) -> Figure:
     """Return the leading output of the random units."""
-    limits, name = result.limits[result.leading], _output(result)
-    sign = sign_of(unit_of(result.leading))
+    limits, name, sign = result.limits[result.leading], _output(result), sign_of(unit_of(result.leading))
+    sides = (limit for limit in (limits.lower, limits.upper) if limit is not None)
     return Figure(
-        name=name.replace("-", "_").replace(" ", "_"),
-        title=_say("sample_figure", output=f"{name[0].upper()}{name[1:]}"),
-        x_label=result.leading,
-        y_label="share of the units [%]",
+        name.replace("-", "_").replace(" ", "_"),
+        _say("sample_figure", output=f"{name[0].upper()}{name[1:]}"),
+        result.leading,
+        "share of the units [%]",
         series=(Series(label="random units", kind="histogram", x=list(result.sample.values)),),
-        vertical=tuple(
-            (limit, _say("limit_line", limit=limit, sign=sign))
-            for limit in (limits.lower, limits.upper)
-            if limit is not None
-        ),
+        vertical=tuple((limit, _say("limit_line", limit=limit, sign=sign)) for limit in sides),
     )
 
 
@@ -113,20 +99,10 @@ def reject_figure(result: RankingResult) -> Figure:
     """Return how much larger the deviations of the units outside are, summed over the columns of each source."""
     found = result.reject
     rows = tables.largest_first(found.excess)[: _SHOWN // 2]
-    return Figure(
-        name="rejects",
-        title=_say("rejects_figure"),
-        x_label=_say("rejects_axis"),
-        series=(
-            Series.bars(
-                _say("with_interval", name="excess"),
-                [found.sources[at] for at in rows],
-                found.excess[rows],
-                *found.excess_interval[:, rows],
-            ),
-        ),
-        vertical=((0.0, "no part"),),
-    )
+    names, label = [found.sources[at] for at in rows], _say("with_interval", name="excess")
+    bars = Series.bars(label, names, found.excess[rows], *found.excess_interval[:, rows])
+    heads = _say("rejects_figure"), _say("rejects_axis")
+    return Figure("rejects", *heads, series=(bars,), vertical=((0.0, "no part"),))
 
 
 def inverse_figures(result: RankingResult) -> Iterator[Figure]:
@@ -138,22 +114,11 @@ def inverse_figures(result: RankingResult) -> Iterator[Figure]:
     active = result.errors.active
     unit = zone_unit(active)
     now = np.array([zone_in(source, unit) for source in active])[rows]
-    names = [found.sources[at] for at in rows]
-    yield Figure(
-        name="alone",
-        title=_say("alone_may_open" if found.meets else "alone_may_stay"),
-        x_label=f"zone [{unit}]",
-        series=(
-            Series.bars("now", names, now),
-            Series.bars(
-                "alone, with its 90 % interval",
-                names,
-                [zone_in(active[at], unit, found.zone[at]) for at in rows],
-                now * found.low[rows],
-                now * found.high[rows],
-            ),
-        ),
-    )
+    names, alone = [found.sources[at] for at in rows], [zone_in(active[at], unit, found.zone[at]) for at in rows]
+    interval = now * found.low[rows], now * found.high[rows]
+    bars = Series.bars("now", names, now), Series.bars("alone, with its 90 % interval", names, alone, *interval)
+    title = _say("alone_may_open" if found.meets else "alone_may_stay")
+    yield Figure("alone", title, f"zone [{unit}]", series=bars)
 
 
 def _broken(name: str) -> str:

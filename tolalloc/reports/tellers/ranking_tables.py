@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from jaxtyping import Float
 
 from tolalloc.drawings.sources import Source, zone_in, zone_unit
@@ -25,9 +26,6 @@ from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
 from tolalloc.sensitivity.surrogate.validation import LARGEST_FAILED_SHARE, LARGEST_QUANTILE_ERROR, Choice, Score
 from tolalloc.sensitivity.target import TargetSensitivity
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 _say = Sentences("ranking")
 _ALIKE = 9
 """Decimals of a value over the largest one to which equal ones are alike, so that no last digit orders them [-]."""
@@ -45,34 +43,32 @@ def _told(index: Float[np.ndarray, "*source"]) -> Float[np.ndarray, "*source"]:
     return np.asarray(np.clip(index, 0.0, 1.0))
 
 
+def _ends(name: str, interval: Float[np.ndarray, "end source"]) -> dict[str, Any]:
+    """Return the columns of the ends of an interval of 90 %, under the name of what they are about."""
+    return {f"{name}low 5 % [-]": interval[0], f"{name}high 95 % [-]": interval[1]}
+
+
 def sobol_table(sobol: SourceIndices, named: str = "source") -> pd.DataFrame:
     """Return what is ranked, largest total Sobol index first, with intervals and the confidence of every place."""
     share = sobol.total / sobol.total.sum() * 100
-    first, total, rank = sobol.first_interval, sobol.total_interval, sobol.rank_interval
     among, following = sobol.among_first(min(3, len(sobol.sources))), {pair.before: pair for pair in sobol.neighbours}
     place = {at: number for number, at in enumerate(sobol.order, start=1)}
-    return of_positions(
-        "ranking",
-        {
-            "rank [-]": place,
-            named: sobol.sources,
-            "contribution [%]": share,
-            "cumulative [%]": lambda at: share[sobol.order[: place[at]]].sum(),
-            "total index ST [-]": _told(sobol.total),
-            "ST low 5 % [-]": total[0],
-            "ST high 95 % [-]": total[1],
-            "first index S1 [-]": _told(sobol.first),
-            "S1 low 5 % [-]": first[0],
-            "S1 high 95 % [-]": first[1],
-            "S1 reading": [_say("zero" if is_zero else "above_zero") for is_zero in sobol.first_is_zero],
-            "rank low 5 % [-]": rank[0],
-            "rank high 95 % [-]": rank[1],
-            "P(among first 3) [%]": among * 100,
-            "P(before the next) [%]": lambda at: following[at].probability * 100 if at in following else np.nan,
-            "more blocks needed to separate it from the next [-]": lambda at: _blocks(following.get(at)),
-        },
-        sobol.order,
-    ).frame()
+    columns: dict[str, Any] = {
+        "rank [-]": place,
+        named: sobol.sources,
+        "contribution [%]": share,
+        "cumulative [%]": lambda at: share[sobol.order[: place[at]]].sum(),
+        "total index ST [-]": _told(sobol.total),
+        **_ends("ST ", sobol.total_interval),
+        "first index S1 [-]": _told(sobol.first),
+        **_ends("S1 ", sobol.first_interval),
+        "S1 reading": [_say("zero" if is_zero else "above_zero") for is_zero in sobol.first_is_zero],
+        **_ends("rank ", sobol.rank_interval),
+        "P(among first 3) [%]": among * 100,
+        "P(before the next) [%]": lambda at: following[at].probability * 100 if at in following else np.nan,
+        "more blocks needed to separate it from the next [-]": lambda at: _blocks(following.get(at)),
+    }
+    return of_positions("ranking", columns, sobol.order).frame()
 
 
 def _blocks(pair: Neighbours | None) -> str:
@@ -124,17 +120,14 @@ def _with_own_words(frame: pd.DataFrame, members: Mapping[str, Sequence[Source]]
 def ranked(sobol: SourceIndices, named: str) -> list[dict[str, Any]]:
     """Return the ranking for a program."""
     interval, among = sobol.total_interval, sobol.among_first(min(3, len(sobol.sources)))
-    return of_positions(
-        "ranking",
-        {
-            named: sobol.sources,
-            "total index [-]": _told(sobol.total),
-            "interval 90 % [-]": lambda at: interval[:, at].tolist(),
-            "first index [-]": _told(sobol.first),
-            "P(among first 3) [-]": among,
-        },
-        sobol.order,
-    ).records()
+    columns: dict[str, Any] = {
+        named: sobol.sources,
+        "total index [-]": _told(sobol.total),
+        "interval 90 % [-]": lambda at: interval[:, at].tolist(),
+        "first index [-]": _told(sobol.first),
+        "P(among first 3) [-]": among,
+    }
+    return of_positions("ranking", columns, sobol.order).records()
 
 
 def dimensions_table(result: RankingResult) -> pd.DataFrame:
@@ -143,20 +136,17 @@ def dimensions_table(result: RankingResult) -> pd.DataFrame:
     low, high = found.total_interval * 100
     members = [result.members[name] for name in found.sources]
     derivatives = _derivatives(result, f"rms change per µm in every place [{unit}/µm]")
-    frame = of_positions(
-        "dimensions",
-        {
-            "dimension": found.sources,
-            "places [-]": lambda at: len(members[at]),
-            "as written [mm]": lambda at: portrait_of(result.model).frames(members[at]),
-            "total-effect index [%]": _told(found.total) * 100,
-            "low 5 % [%]": low,
-            "high 95 % [%]": high,
-            "alone (first-order index) [%]": _told(found.first) * 100,
-            **{header: [own.get(name, np.nan) for name in found.sources] for header, own in derivatives.items()},
-        },
-        found.order,
-    ).frame()
+    columns: dict[str, Any] = {
+        "dimension": found.sources,
+        "places [-]": lambda at: len(members[at]),
+        "as written [mm]": lambda at: portrait_of(result.model).frames(members[at]),
+        "total-effect index [%]": _told(found.total) * 100,
+        "low 5 % [%]": low,
+        "high 95 % [%]": high,
+        "alone (first-order index) [%]": _told(found.first) * 100,
+        **{header: [own.get(name, np.nan) for name in found.sources] for header, own in derivatives.items()},
+    }
+    frame = of_positions("dimensions", columns, found.order).frame()
     return _with_own_words(frame, result.members)
 
 
@@ -177,53 +167,40 @@ def _line(result: RankingResult, members: Sequence[Source]) -> LineDerivatives |
 
 def pairs_table(sobol: SourceIndices, named: str) -> Table[int]:
     """Return what pairs add only together, the largest first; empty unless second order was asked for."""
-    low, high = sobol.second_interval
-    return of_positions(
-        "pairs",
-        {
-            named: [sobol.sources[one] for one, _ in sobol.pairs],
-            "with": [sobol.sources[other] for _, other in sobol.pairs],
-            "second index S2 [-]": _told(sobol.second),
-            "S2 low 5 % [-]": low,
-            "S2 high 95 % [-]": high,
-        },
-        largest_first(sobol.second),
-    )
+    columns: dict[str, Any] = {
+        named: [sobol.sources[one] for one, _ in sobol.pairs],
+        "with": [sobol.sources[other] for _, other in sobol.pairs],
+        "second index S2 [-]": _told(sobol.second),
+        **_ends("S2 ", sobol.second_interval),
+    }
+    return of_positions("pairs", columns, largest_first(sobol.second))
 
 
 def overall_table(result: RankingResult) -> pd.DataFrame:
     """Return one ranking over all outputs with a limit: the largest total index of each and where it has it."""
     overall, sobol = result.sobol.overall, result.sobol
-    interval, rank = overall.total_interval, overall.rank_interval
     varying = [output for output in result.outputs if output not in sobol.constant]
-    return of_positions(
-        "all requirements",
-        {
-            "rank [-]": {at: number for number, at in enumerate(overall.order, start=1)},
-            result.by: overall.sources,
-            "largest ST where limited [-]": overall.total,
-            "low 5 % [-]": interval[0],
-            "high 95 % [-]": interval[1],
-            "rank low 5 % [-]": rank[0],
-            "rank high 95 % [-]": rank[1],
-            "drives most": [quantity(name) for name in overall.drives],
-            **{f"ST {quantity(output)} [-]": sobol.indices.total[sobol.position(output)] for output in varying},
-        },
-        overall.order,
-    ).frame()
+    columns: dict[str, Any] = {
+        "rank [-]": {at: number for number, at in enumerate(overall.order, start=1)},
+        result.by: overall.sources,
+        "largest ST where limited [-]": overall.total,
+        **_ends("", overall.total_interval),
+        **_ends("rank ", overall.rank_interval),
+        "drives most": [quantity(name) for name in overall.drives],
+        **{f"ST {quantity(output)} [-]": sobol.indices.total[sobol.position(output)] for output in varying},
+    }
+    return of_positions("all requirements", columns, overall.order).frame()
 
 
 def convergence_table(result: RankingResult) -> pd.DataFrame:
     """Return how the first places settled as the blocks grew."""
     names, history = result.sobol.sources, result.sobol.convergence.history
-    return of_positions(
-        "convergence",
-        {
-            "blocks [-]": [step.blocks for step in history],
-            "first places": [", ".join(names[at] for at in step.first) for step in history],
-            "share of the resamples with this order [%]": [step.probability * 100 for step in history],
-        },
-    ).frame()
+    columns: dict[str, Any] = {
+        "blocks [-]": [step.blocks for step in history],
+        "first places": [", ".join(names[at] for at in step.first) for step in history],
+        "share of the resamples with this order [%]": [step.probability * 100 for step in history],
+    }
+    return of_positions("convergence", columns).frame()
 
 
 def wave_unit(result: RankingResult) -> str:
@@ -254,19 +231,13 @@ def orders_table(result: RankingResult) -> pd.DataFrame:
 
 def shapley_table(found: ShapleyEffects) -> pd.DataFrame:
     """Return the Shapley effects on the leading output, the largest first."""
-    interval, rank = found.interval(0), found.rank_interval(0)
-    return of_positions(
-        "Shapley effects",
-        {
-            "source": found.sources,
-            "Shapley effect [-]": found.effects[0],
-            "low 5 % [-]": interval[0],
-            "high 95 % [-]": interval[1],
-            "rank low 5 % [-]": rank[0],
-            "rank high 95 % [-]": rank[1],
-        },
-        largest_first(found.effects[0]),
-    ).frame()
+    columns: dict[str, Any] = {
+        "source": found.sources,
+        "Shapley effect [-]": found.effects[0],
+        **_ends("", found.interval(0)),
+        **_ends("rank ", found.rank_interval(0)),
+    }
+    return of_positions("Shapley effects", columns, largest_first(found.effects[0])).frame()
 
 
 def capability_table(result: RankingResult) -> pd.DataFrame:
@@ -315,24 +286,20 @@ def beyond_table(result: RankingResult) -> pd.DataFrame:
     """Return the share beyond the limit by every method that was asked."""
     found = result.beyond
     rows = list(dict.fromkeys((*found.estimates, found.estimate)))
-    return of_positions(
-        "beyond the limit",
-        {
-            "method": [item.method for item in rows],
-            "probability beyond the limit [-]": [item.probability for item in rows],
-            "standard error [-]": [item.standard_error for item in rows],
-            "coefficient of variation [-]": [item.coefficient_of_variation for item in rows],
-            "units solved [-]": [item.calls for item in rows],
-            "relied on": ["yes" if item is found.estimate else "no" for item in rows],
-            "cautions": ["; ".join(item.cautions) for item in rows],
-        },
-    ).frame()
+    columns: dict[str, Any] = {
+        "method": [item.method for item in rows],
+        "probability beyond the limit [-]": [item.probability for item in rows],
+        "standard error [-]": [item.standard_error for item in rows],
+        "coefficient of variation [-]": [item.coefficient_of_variation for item in rows],
+        "units solved [-]": [item.calls for item in rows],
+        "relied on": ["yes" if item is found.estimate else "no" for item in rows],
+        "cautions": ["; ".join(item.cautions) for item in rows],
+    }
+    return of_positions("beyond the limit", columns).frame()
 
 
 def stack_up_table(result: RankingResult, output: str) -> pd.DataFrame:
     """Return worst case, root-sum-square and Monte Carlo side by side, of an output with its unit."""
-    import pandas as pd
-
     sample, classical = result.sample, result.classical
     rows = (
         ("worst case", classical.worst_case, _say("worst_case")),
@@ -345,27 +312,20 @@ def stack_up_table(result: RankingResult, output: str) -> pd.DataFrame:
 
 def reject_table(found: TargetSensitivity) -> pd.DataFrame:
     """Return what the units outside have in common, the strongest source first."""
-    first, lift, excess = found.first_interval, found.lift_interval, found.excess_interval
-    return of_positions(
-        "rejects",
-        {
-            "source": found.sources,
-            "excess [-]": found.excess,
-            "excess low 5 % [-]": excess[0],
-            "excess high 95 % [-]": excess[1],
-            "columns [-]": found.columns,
-            "lift [-]": found.lift,
-            "lift low 5 % [-]": lift[0],
-            "lift high 95 % [-]": lift[1],
-            "target index S1 [-]": _told(found.first),
-            "target S1 low 5 % [-]": first[0],
-            "target S1 high 95 % [-]": first[1],
-            "p-value of no effect [-]": found.p_value,
-            "median of all [µm]": found.median / MICROMETRE,
-            "median outside [µm]": found.median_outside / MICROMETRE,
-        },
-        largest_first(found.excess),
-    ).frame()
+    columns: dict[str, Any] = {
+        "source": found.sources,
+        "excess [-]": found.excess,
+        **_ends("excess ", found.excess_interval),
+        "columns [-]": found.columns,
+        "lift [-]": found.lift,
+        **_ends("lift ", found.lift_interval),
+        "target index S1 [-]": _told(found.first),
+        **_ends("target S1 ", found.first_interval),
+        "p-value of no effect [-]": found.p_value,
+        "median of all [µm]": found.median / MICROMETRE,
+        "median outside [µm]": found.median_outside / MICROMETRE,
+    }
+    return of_positions("rejects", columns, largest_first(found.excess)).frame()
 
 
 def tightest_first(found: InverseSensitivity) -> list[int]:
@@ -377,21 +337,16 @@ def inverse_table(result: RankingResult) -> pd.DataFrame:
     """Return how far each zone may open alone, or must close."""
     found, active = result.inverse, result.errors.active
     unit = zone_unit(active)
-    return of_positions(
-        "alone",
-        {
-            "source": found.sources,
-            f"zone now [{unit}]": [zone_in(source, unit) for source in active],
-            "factor alone [-]": found.factor,
-            "factor low 5 % [-]": found.low,
-            "factor high 95 % [-]": found.high,
-            f"zone alone [{unit}]": [
-                zone_in(source, unit, zone) for source, zone in zip(active, found.zone, strict=True)
-            ],
-            "reading": [_reading(value) if found.decided else _say("undecided") for value in found.factor],
-        },
-        tightest_first(found),
-    ).frame()
+    columns: dict[str, Any] = {
+        "source": found.sources,
+        f"zone now [{unit}]": [zone_in(source, unit) for source in active],
+        "factor alone [-]": found.factor,
+        "factor low 5 % [-]": found.low,
+        "factor high 95 % [-]": found.high,
+        f"zone alone [{unit}]": [zone_in(source, unit, zone) for source, zone in zip(active, found.zone, strict=True)],
+        "reading": [_reading(value) if found.decided else _say("undecided") for value in found.factor],
+    }
+    return of_positions("alone", columns, tightest_first(found)).frame()
 
 
 def _reading(factor: float) -> str:
@@ -443,28 +398,24 @@ def surrogate_table(choice: Choice) -> pd.DataFrame:
     """Return the surrogates with their errors on units that they had not seen."""
     unit, scores = choice.output[choice.output.rindex("[") :], choice.scores
     quantile = quantile_name(scores[choice.best])
-    return of_positions(
-        "surrogates",
-        {
-            "candidate": [score.name for score in scores],
-            "Q² [-]": [score.q2 for score in scores],
-            f"rms error {unit}": [score.rms_error for score in scores],
-            f"error of the {quantile} {unit}": [score.quantile_error for score in scores],
-            f"error of the {quantile} [%]": [score.quantile_share * 100 for score in scores],
-            "predictions per second [1/s]": [score.per_second for score in scores],
-            "speed over the response [-]": [score.speed for score in scores],
-            "trained on [-]": [score.trained for score in scores],
-            "held out [-]": [score.held_out for score in scores],
-            "failed [-]": [score.failed for score in scores],
-            "falls short": ["; ".join(shortfalls(score)) or "nowhere" for score in scores],
-        },
-    ).frame()
+    columns: dict[str, Any] = {
+        "candidate": [score.name for score in scores],
+        "Q² [-]": [score.q2 for score in scores],
+        f"rms error {unit}": [score.rms_error for score in scores],
+        f"error of the {quantile} {unit}": [score.quantile_error for score in scores],
+        f"error of the {quantile} [%]": [score.quantile_share * 100 for score in scores],
+        "predictions per second [1/s]": [score.per_second for score in scores],
+        "speed over the response [-]": [score.speed for score in scores],
+        "trained on [-]": [score.trained for score in scores],
+        "held out [-]": [score.held_out for score in scores],
+        "failed [-]": [score.failed for score in scores],
+        "falls short": ["; ".join(shortfalls(score)) or "nowhere" for score in scores],
+    }
+    return of_positions("surrogates", columns).frame()
 
 
 def mapping_table(result: RankingResult) -> pd.DataFrame:
     """Return how every zone became a distribution, and where the zone comes from."""
-    import pandas as pd
-
     rows = [(source.name, source.mapping, source.note) for source in result.errors.active]
     rows += [(source.name, source.mapping, _say("not_on_drawing")) for source in result.model.uncertain]
     return pd.DataFrame(rows, columns=["source", "zone → distribution", "note of the table"])

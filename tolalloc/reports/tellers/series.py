@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pandas as pd
 
 from tolalloc.reading.units import COST_UNITS
 from tolalloc.reports.document import Section
 from tolalloc.reports.finished_run import Member
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.templates import Sentences
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _NUMBERS = {
     "cost [cost units]": "cost [{cost}]",
@@ -66,8 +65,6 @@ class SeriesTeller(Teller[tuple[Member, ...]]):
     @property
     def _table(self) -> pd.DataFrame:
         """A row per study."""
-        import pandas as pd
-
         return pd.DataFrame([_row(member, self.header.cost_unit) for member in self.result])
 
 

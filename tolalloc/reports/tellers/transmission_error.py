@@ -5,9 +5,10 @@ from __future__ import annotations
 from functools import cached_property
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from jaxtyping import Float
 
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE
@@ -25,9 +26,6 @@ from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.portraits.reducer import against_catalogue, linear_model_warnings, twist_table
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.templates import Sentences
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 _say = Sentences("transmission_error")
 _MAIN = 8
@@ -188,8 +186,6 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
 
     def add_files(self, folder: Path) -> None:
         """Add the curve at the equally spaced angles, which `diagnose` and `lot` read."""
-        import pandas as pd
-
         from tolalloc.reports.writer import write_csv, write_json
 
         found = self.result.equilibria
@@ -202,8 +198,6 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
     @cached_property
     def turn_table(self) -> pd.DataFrame:
         """The whole turn, one quantity per row."""
-        import pandas as pd
-
         found = self.summary
         own, reversal = found["every_bearing_under_its_own_load"] or {}, found["reversal_arcsec"]
         rows = [
@@ -236,56 +230,32 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
     @cached_property
     def attribution_table(self) -> pd.DataFrame:
         """What each source adds to the curve and to the main orders, and what they make together."""
-        import pandas as pd
-
         found = self.summary["attribution"]
         names = [f"order {order:.6g} [arcsec]" for order in found["orders"]]
-        rows = [
-            {
-                "source": item["source"],
-                "curve [arcsec]": item["peak_to_peak_arcsec"],
-                **dict(zip(names, item["share_arcsec"], strict=True)),
-            }
-            for item in found["sources"]
-        ]
-        together = {"source": "together", **dict(zip(names, found["amplitude_arcsec"], strict=True))}
-        return pd.DataFrame([*rows, together])
+        rows = [(own["source"], own["peak_to_peak_arcsec"], *own["share_arcsec"]) for own in found["sources"]]
+        rows.append(("together", float("nan"), *found["amplitude_arcsec"]))
+        return pd.DataFrame(rows, columns=["source", "curve [arcsec]", *names])
 
     @property
     def curve_figure(self) -> Figure:
         """The curve and its refined extremes."""
         found, extremes = self.result.equilibria, self.result.extremes
-        return Figure(
-            name="transmission_error",
-            title=_say("curve_figure", peak_to_peak=extremes.peak_to_peak[0] / ARCSECOND),
-            x_label=_ANGLE,
-            y_label=_ERROR,
-            series=(
-                Series.line(
-                    f"{found.carrier_angle.size} equally spaced angles",
-                    found.carrier_angle / DEGREE,
-                    found.transmission_error[0] / ARCSECOND,
-                ),
-                Series.points(
-                    "extremes, refined",
-                    [float(angle) for angle in extremes.carrier_angle[0] / DEGREE],
-                    [float(extremes.largest[0] / ARCSECOND), float(extremes.smallest[0] / ARCSECOND)],
-                ),
-            ),
+        angle, error = found.carrier_angle / DEGREE, found.transmission_error[0] / ARCSECOND
+        ends = [float(extremes.largest[0] / ARCSECOND), float(extremes.smallest[0] / ARCSECOND)]
+        series = (
+            Series.line(f"{angle.size} equally spaced angles", angle, error),
+            Series.points("extremes, refined", (extremes.carrier_angle[0] / DEGREE).tolist(), ends),
         )
+        title = _say("curve_figure", peak_to_peak=extremes.peak_to_peak[0] / ARCSECOND)
+        return Figure("transmission_error", title, _ANGLE, _ERROR, series=series)
 
     @property
     def _order_figure(self) -> Figure:
         """The amplitudes of the strongest orders."""
         shown = sorted(self.result.orders.main(_DRAWN))
         x, y = [order for order, *_ in shown], [amplitude / ARCSECOND for _, amplitude, _ in shown]
-        return Figure(
-            name="orders",
-            title=_say("order_figure"),
-            x_label="order of the output turn [-]",
-            y_label="amplitude [arcsec]",
-            series=(Series(label="amplitude", kind="stems", x=x, y=y),),
-        )
+        heads = _say("order_figure"), "order of the output turn [-]", "amplitude [arcsec]"
+        return Figure("orders", *heads, series=(Series(label="amplitude", kind="stems", x=x, y=y),))
 
 
 def force_figure(equilibria: Equilibria) -> Figure:
@@ -293,13 +263,9 @@ def force_figure(equilibria: Equilibria) -> Figure:
     found = forces(equilibria)
     lines = {"pin": found.pins[0].max(axis=(1, 2))}
     lines |= {name: found.of(interface)[0].max(axis=1) for name, interface in bearings_of(equilibria.reducer).items()}
-    return Figure(
-        name="forces",
-        title=_say("force_figure"),
-        x_label=_ANGLE,
-        y_label="force [N]",
-        series=tuple(Series.line(name, equilibria.carrier_angle / DEGREE, values) for name, values in lines.items()),
-    )
+    angle = equilibria.carrier_angle / DEGREE
+    series = tuple(Series.line(name, angle, values) for name, values in lines.items())
+    return Figure("forces", _say("force_figure"), _ANGLE, "force [N]", series=series)
 
 
 def _friction(loop: FrictionLoop, idle: IdleTorque) -> dict[str, Any]:
@@ -328,8 +294,6 @@ def _friction(loop: FrictionLoop, idle: IdleTorque) -> dict[str, Any]:
 
 def _friction_table(reducer: Reducer, rated: float, found: dict[str, Any]) -> pd.DataFrame:
     """Return the friction torque of every kind of contact, at rated torque [N·m] and without torque."""
-    import pandas as pd
-
     coefficients = {CONTACTS[name]: f"{value:g}" for name, value in reducer.friction.coefficients.items()}
     rows = [(own["contact"], own["rated_nm"], own["no_load_nm"]) for own in found["by_contact"]]
     rows.append(("contacts together", sum(row[1] for row in rows), found["no_load_torque_of_contacts_nm"]))
@@ -346,13 +310,9 @@ def _loop_figure(loop: FrictionLoop) -> Figure:
     """Return twist over torque with both branches."""
     lost_motion, loss = loop.lost_motion[_UNIT] / ARCMINUTE, loop.hysteresis_loss[_UNIT] / ARCMINUTE
     branches = {"torque rising": loop.rising, "torque falling": loop.falling}
-    return Figure(
-        name="hysteresis",
-        title=_say("loop_figure", lost_motion=lost_motion, loss=loss),
-        x_label="torque on the carrier [N·m]",
-        y_label="twist [arcmin]",
-        series=tuple(Series.line(label, loop.torque, branch[_UNIT] / ARCMINUTE) for label, branch in branches.items()),
-    )
+    series = (Series.line(label, loop.torque, branch[_UNIT] / ARCMINUTE) for label, branch in branches.items())
+    heads = _say("loop_figure", lost_motion=lost_motion, loss=loss), "torque on the carrier [N·m]", "twist [arcmin]"
+    return Figure("hysteresis", *heads, series=tuple(series))
 
 
 def _pair(values: Float[np.ndarray, " sample"], unit_of_measurement: float) -> dict[str, float | None]:
