@@ -29,7 +29,8 @@ _ROUNDS, _AGAIN = 8, 0.01
 _FIRST_STEP = 0.2
 """First step of a ratio of zones, its ln, and of a setting, over its range [-]."""
 _FAR_STEPS, _DEAREST = 10.0, 1e300
-"""Steps to either side that the search may go in all [-], and the cost of what keeps no limits [cost units]."""
+"""Steps to either side that the search may go in all [-], and the cost of what keeps no limits: pymoo
+compares finite ones [cost units]."""
 _FAR, _REACH, _PRECISION = 2.0, 0.5, 5e-4
 """Change of all zones alike within which a design comes to its limits, at first and around that, and its error: ln of a
 factor [-]."""
@@ -140,12 +141,12 @@ def by_pattern(verifier: Verifier, start: VerifiedDesign) -> VerifiedDesign | No
 
     Notes
     -----
-    Steps along the ratios of the zones and the settings, each design scaled alike until the common units just keep the
-    limits.
+    Nelder and Mead's simplex over the ratios of the zones and the settings, each design scaled alike until the common
+    units just keep the limits.
 
     References
     ----------
-    R. Hooke, T. A. Jeeves, J. ACM 8 (1961) 212–229.
+    F. Gao, L. Han, Comput. Optim. Appl. 51 (2012) 259–277, for the steps in several dimensions.
     """
     space = verifier.space
     yields = all(isinstance(own.guarantee, AtYield) for own in verifier.requirements)
@@ -197,19 +198,19 @@ class _Around:
 
     @property
     def best(self) -> Design:
-        """The cheapest that a pattern finds, each design scaled alike."""
-        from pymoo.algorithms.soo.nonconvex.pattern import PatternSearch
+        """The cheapest that a simplex finds, each design scaled alike."""
+        from pymoo.algorithms.soo.nonconvex.nelder import NelderMead
         from pymoo.optimize import minimize
         from pymoo.problems.functional import FunctionalProblem
 
         steps = _first_steps(self.units.verifier.space)
         if not steps.size:
             return self.design
+
+        def cost(changes: Float[np.ndarray, " change"]) -> float:
+            return min(self.units.cost(self.at(changes)), _DEAREST)
+
         reach = _FAR_STEPS * steps
-        # pymoo compares costs that are finite.
-        problem = FunctionalProblem(
-            steps.size, lambda own: min(self.units.cost(self.at(own)), _DEAREST), xl=-reach, xu=reach
-        )
-        search = PatternSearch(x0=np.zeros(steps.size), init_delta=0.5 / _FAR_STEPS)
-        found = minimize(problem, search, ("n_evals", _EVALUATIONS * steps.size), seed=0)
-        return self.at(found.X)
+        problem = FunctionalProblem(steps.size, cost, xl=-reach, xu=reach)
+        simplex = NelderMead(x0=np.zeros(steps.size), init_simplex_scale=0.5 / _FAR_STEPS)
+        return self.at(minimize(problem, simplex, ("n_evals", _EVALUATIONS * steps.size), seed=0).X)
