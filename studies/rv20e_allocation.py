@@ -25,7 +25,7 @@ study = ta.Study(
         ta.FRICTION_TORQUE: ta.Limit(upper=8.0, show=SHIPPED),
         ta.RADIAL_CLEARANCE: ta.Limit(lower=0.0, show=SHIPPED),
     },
-    questions=[ta.Ranking(), ta.Allocation(fixed_first=False, what_if=False, front=False)],
+    questions=[ta.Ranking(), ta.Allocation(fixed_first=False, what_if=False)],
     name="rv20e_allocation",
     seed=1,
 )

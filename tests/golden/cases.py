@@ -16,6 +16,7 @@ SMALL_EFFORT = """ta.Effort(
             permutations=2),
         allocation=ta.AllocationEffort(
             verification_units=256, confirmation_units=512, shared_units=16, graded_steps=2, front_limits=(0.95, 1.1),
+            front_units=256,
             setting_steps=(2, 2), price_nodes=4, stiffness_units=128, share_blocks=8,
             yields=(0.9, 0.95), error=0.5, front_steps=1, search=ta.SearchEffort(steps=2)),
         is_quick=True)"""

@@ -31,7 +31,7 @@ housing.pitch,broached,reciprocal,0.8,5,{change},another machine
 SMALL = """AllocationEffort(
         verification_units=128, confirmation_units=512, shared_units=16, graded_steps=2,
         setting_steps=(2, 2), price_nodes=4, stiffness_units=128, share_blocks=8,
-        yields=(0.9, 0.95), front_limits=(0.95, 1.1), front_steps=1, search=SearchEffort(steps=2))"""
+        yields=(0.9, 0.95), front_limits=(0.95, 1.1), front_units=128, front_steps=1, search=SearchEffort(steps=2))"""
 STUDY = """import tolalloc as ta
 from tolalloc.allocation.space.effort import AllocationEffort
 from tolalloc.allocation.space.effort import SearchEffort

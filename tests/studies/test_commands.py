@@ -41,7 +41,7 @@ EFFORT = """effort=ta.Effort(
         inverse_units=926, surrogate_units=96, level_units=100, level_runs=2, widened_units=200, permutations=10),
     allocation=AllocationEffort(
         verification_units=1152, confirmation_units=2304, shared_units=48, share_blocks=8,
-        front_limits=(0.95, 1.1), front_steps=1, search=SearchEffort(steps=2)),
+        front_limits=(0.95, 1.1), front_units=1152, front_steps=1, search=SearchEffort(steps=2)),
     is_quick=True), questions=[ta.Ranking(), ta.Allocation(fixed_first=False, what_if=False)]"""
 EFFORTS = """from tolalloc.allocation.space.effort import AllocationEffort
 from tolalloc.allocation.space.effort import SearchEffort

@@ -44,6 +44,7 @@ SEARCH = QUICK_ALLOCATION.search
 SMALL = replace(
     QUICK_ALLOCATION,
     front_limits=(0.95, 1.1),
+    front_units=512,
     front_steps=1,
     search=replace(SEARCH, steps=2),
     graded_steps=2,

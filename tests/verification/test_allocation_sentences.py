@@ -30,6 +30,7 @@ SMALL = replace(
     verification_units=512,
     shared_units=16,
     front_limits=(0.95, 1.1),
+    front_units=512,
     front_steps=1,
     graded_steps=4,
     setting_steps=(1, 2),
@@ -320,7 +321,7 @@ def test_the_front_is_verified_never_rises_and_has_the_drawing_on_it(results):
     assert front.drawn.limit == results.requirements[0].limits.upper
     assert all(own.design.met for own in front.points)
     told = section(results, "front", output="peak-to-peak")
-    assert says(told.paragraphs, "allocation.front", units=SMALL.verification_units)
+    assert says(told.paragraphs, "allocation.front", units=SMALL.front_units)
     assert list(told.figures[0].series[0].y) == cost.tolist()
     table = dict(told.tables)["front"]
     assert table[""].tolist() == ["this drawing" if own == front.drawn.limit else "" for own in limits]

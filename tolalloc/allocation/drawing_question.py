@@ -120,6 +120,8 @@ class DrawingQuestion:
             "confirmation_units": (self.effort.confirmation_units, 1 - FIRST.error(self.effort.error)),
             "verification_units": (self.effort.verification_units, self.search_confidence),
         }
+        if self.front and self.limits_one_side_above:
+            asked["front_units"] = (self.effort.front_units, self.search_confidence)
         if self.what_if and doubted(self.model).uncertain:
             asked["stiffness_units"] = (self.effort.stiffness_units, self.search_confidence)
         for requirement in self.requirements:
@@ -354,7 +356,9 @@ class DrawingQuestion:
         space, limit = self._at_ratios_of(drawn), float(self.requirements[0].limits.upper or 0.0)
         search = FrontSearch(
             verifier_of=lambda upper: replace(
-                self.verifier(f"front {upper:.9g}", space), requirements=self._limited_to(upper)
+                self.verifier(f"front {upper:.9g}", space),
+                requirements=self._limited_to(upper),
+                units=self.effort.front_units,
             ),
             steps=self.effort.front_steps,
             reach=self.effort.search.reach,

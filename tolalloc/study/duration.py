@@ -90,7 +90,8 @@ def _of_allocation(question: Allocation, prepared: Prepared) -> tuple[_Workload,
     # Where settings are free, a search looks at others and begins at two.
     steps = searches * (effort.search.steps + 2) + 3 * question.grades * effort.graded_steps + 2 * bool(settings)
     scan = units_of_scan(effort.verification_units) * bool(settings)
-    fronts = question.front * len(effort.front_limits) * (effort.front_steps + 2) * around
+    of_front = len(effort.front_limits) * (effort.front_steps + 1) * effort.front_units
+    fronts = round(question.front * of_front * around / effort.verification_units)
     what_if = question.what_if * (
         sum(2 * len(own.columns) + 2 for own in doubted(model).uncertain) * effort.stiffness_units
         + prod(effort.setting_steps[:settings]) * 4 * effort.shared_units

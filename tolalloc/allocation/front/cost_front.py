@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from tolalloc.allocation.search.discrete import allocate_grades
 from tolalloc.allocation.search.zone_allocation import step_to_optimum
+from tolalloc.allocation.space.output_sample import DesignSample
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, cheapest_met
 from tolalloc.exceptions import FailedUnitsError, SolveError
 
@@ -51,34 +52,32 @@ class FrontSearch:
 
         Notes
         -----
-        Away from the drawing each search begins at the design of the limit before, and ends after a step or two. What
-        keeps a limit keeps every wider one, so cost never rises with the limit. A design for a tighter limit that
+        Every search begins at the drawing, judged against each limit on the same units, and ends after a step or two.
+        What keeps a limit keeps every wider one, so cost never rises with the limit. A design for a tighter limit that
         seems cheaper than the drawing does so by what the units of a search err, and does not count.
         """
         own, found, missed = PricedLimit(limit=limit, design=drawn), list[PricedLimit](), list[float]()
-        tighter = sorted((by for by in shares if by < 1), reverse=True)
-        for side, floor in ((tighter, drawn.cost), (sorted(by for by in shares if by > 1), 0.0)):
-            start = drawn
-            for share in side:
-                # Of a wider limit it is known that the design of the limit before keeps it.
-                best = self._cheapest(share * limit, start, floor * (1 - _SAME)) or (start if share > 1 else None)
-                if best is None:
-                    missed.append(share * limit)
-                    continue
-                start = best
-                found.append(PricedLimit(limit=share * limit, design=best))
+        at_hand = self.verifier_of(limit)
+        units = at_hand.sampled(drawn.design_in(at_hand.space), "drawn")
+        for asked in (share * limit for share in shares):
+            best = self._cheapest(asked, units, drawn.cost * (1 - _SAME) if asked < limit else 0.0)
+            if best:
+                found.append(PricedLimit(limit=asked, design=best))
+            elif asked < limit:
+                missed.append(asked)
+            else:  # which the drawing keeps
+                found.append(PricedLimit(limit=asked, design=drawn))
         points = list[PricedLimit]()
         for point in sorted((own, *found), key=lambda one: one.limit):
             known = [one.design for one in (*points[-1:], point)]
             points.append(replace(point, design=min(known, key=lambda one: one.cost)))
         return CostFront(points=tuple(points), drawn=own, missed=tuple(sorted(missed)))
 
-    def _cheapest(self, limit: float, start: VerifiedDesign, floor: float) -> VerifiedDesign | None:
+    def _cheapest(self, limit: float, units: DesignSample, floor: float) -> VerifiedDesign | None:
         """Return the cheapest design of a cost or more that units show to keep a limit, none where none was found."""
         verifier = self.verifier_of(limit)
-        space = verifier.space
         try:
-            first = verifier.verify(start.design_in(space), "as for the limit before").evenly_divided()
+            first = verifier.judged(units, "drawn").evenly_divided()
             tried = (first, *step_to_optimum(verifier, first, self.steps, self.reach))
             if self.graded_steps:
                 best = cheapest_met(tried)

@@ -56,6 +56,8 @@ class AllocationEffort(NamedFields):
         Largest number of verified choices of grades [-].
     front_limits
         Limits of the leading output for which the cheapest drawing is looked for too, over the limit asked for [-].
+    front_units
+        Independent units per design there [-].
     front_steps
         Largest number of verified steps, and of choices of grades, at each of them [-].
     setting_steps
@@ -91,6 +93,7 @@ class AllocationEffort(NamedFields):
     front_limits: Annotated[
         tuple[float, ...], each("one number or more between 0.5 and 2", number("", least=0.5, most=2), fewest=1)
     ] = (0.85, 0.9, 0.95, 1.05, 1.1, 1.2)
+    front_units: Annotated[int, _least(1)] = 3072
     front_steps: Annotated[int, _least(1)] = 2
     setting_steps: Annotated[tuple[int, ...], each("whole numbers, 1 or more", whole("", 1))] = (5, 6)
     price_nodes: Annotated[int, _least(1)] = 100
@@ -127,6 +130,7 @@ class AllocationEffort(NamedFields):
             verification_units=scaled(self.verification_units, FEWEST_FOR_YIELD),
             confirmation_units=scaled(self.confirmation_units, 2 * FEWEST_FOR_YIELD, _MOST_CONFIRMED),
             shared_units=scaled(self.shared_units, 48),
+            front_units=scaled(self.front_units, FEWEST_FOR_YIELD),
             stiffness_units=scaled(self.stiffness_units, FEWEST_FOR_YIELD),
             share_blocks=min(max(1 << max(int(share * self.share_blocks).bit_length() - 1, 0), 16), 2**12),
         )
@@ -143,6 +147,7 @@ class AllocationEffort(NamedFields):
             self,
             verification_units=2**16,
             confirmation_units=2**20 if self == QUICK_ALLOCATION else 2**22,
+            front_units=2**16,
             search=replace(self.search, steps=AllocationEffort().search.steps),
             share_blocks=2**12,
             gain=0.002,
@@ -157,6 +162,7 @@ QUICK_ALLOCATION = AllocationEffort(
     search=SearchEffort(steps=4),
     graded_steps=3,
     front_limits=(0.9, 0.95, 1.1, 1.2),
+    front_units=2304,
     front_steps=1,
     setting_steps=(2, 3),
     price_nodes=12,

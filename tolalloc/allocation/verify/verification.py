@@ -258,11 +258,15 @@ class Verifier:
 
     def verify(self, design: Float[np.ndarray, " variable"], name: str) -> VerifiedDesign:
         """Return the design with what random units of its own say of it."""
+        return self.judged(self.sampled(design, name), name)
+
+    def sampled(self, design: Float[np.ndarray, " variable"], name: str) -> DesignSample:
+        """Return random units of a design, others for every name."""
         seeds, errors = self.seeds.child(name), self.space.errors
         model = self.model.at(self.space.settings_of(design))
         requirements = tuple(own.in_force(model) for own in self.requirements)
         outputs = tuple(dict.fromkeys(name for requirement in requirements for name in requirement.outputs))
-        sample = DesignSample(
+        return DesignSample(
             space=self.space,
             model=self.model,
             design=design,
@@ -273,6 +277,12 @@ class Verifier:
             seeds=seeds,
             tails={own.output: (own.limits, failing_share(own)) for own in requirements},
         )
+
+    def judged(self, sample: DesignSample, name: str) -> VerifiedDesign:
+        """Return a design with what random units say of it, also of those of a verifier that asks for other limits."""
+        design, outputs = sample.design, sample.outputs
+        model = self.model.at(self.space.settings_of(design))
+        requirements = tuple(own.in_force(model) for own in self.requirements)
         for own in sample.samples:
             require_few_failures(own, "of a drawing that was tried", self.largest_failed_share)
         read = tuple(requirement.sample(sample, self.confidence) for requirement in requirements)
@@ -295,7 +305,8 @@ class Verifier:
             processes=self.space.process_names(design),
             cost=float(self.space.cost(design)),
             sample=RedrawnUnits(
-                evaluation=sample.samples[0].evaluation, redraw=partial(self.space.units, design, seeds, self.units)
+                evaluation=sample.samples[0].evaluation,
+                redraw=partial(self.space.units, design, sample.seeds, self.units),
             ),
             achieved=proportion(self.units, int(np.count_nonzero(~kept[0]))).widened_by(
                 uncertainties.get(leading.output), leading.limits

@@ -243,6 +243,7 @@ def front_frame(result: AllocationResult, front: CostFront, cost_unit: str) -> p
     return pd.DataFrame(
         {
             f"{short(result.leading)} limit [{unit}]": [own.limit for own in points],
+            f"kept by its units [{unit}]": [own.design.quantile_bound for own in points],
             f"cost [{cost_unit}]": [own.design.cost for own in points],
             **dict(settings),
             "": [_say("front_here") if own.limit == front.drawn.limit else "" for own in points],
