@@ -271,7 +271,6 @@ def test_bad_fields_are_refused_in_one_sentence(tmp_path, texts, words):
     ("effort", "words"),
     [
         ("graded_steps=0", ["allocation.graded_steps is 0", "1 or more"]),
-        ("exact_points=1", ["allocation.exact_points is 1", "2 or more"]),
         ("share_blocks=100", ["allocation.share_blocks is 100", "power of two"]),
         ("yields=()", ["allocation.yields is ()", "between 0 and 1"]),
         ("yields=(0.9, 1.0)", ["allocation.yields is (0.9, 1.0)"]),
@@ -295,8 +294,8 @@ def test_an_effort_that_makes_no_sense_is_refused(tmp_path, effort, words):
 @pytest.mark.slow
 def test_an_effort_that_is_no_whole_number_is_refused(tmp_path):
     """In a process of its own: here the check of annotations would refuse it first."""
-    script = script_with(tmp_path, effort="ta.Effort(allocation=AllocationEffort(exact_points=2.5))")
-    refused(process("check", script), "allocation.exact_points is 2.5", "whole number")
+    script = script_with(tmp_path, effort="ta.Effort(allocation=AllocationEffort(front_steps=2.5))")
+    refused(process("check", script), "allocation.front_steps is 2.5", "whole number")
 
 
 @pytest.mark.parametrize(

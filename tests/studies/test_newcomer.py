@@ -18,7 +18,8 @@ from tolalloc.drawings.drawing import load_drawing
 SMALL = """seed=1,
     effort=ta.Effort(
         allocation=AllocationEffort(
-            verification_units=300, confirmation_units=600, shared_units=16, exact_points=4, share_blocks=4, error=0.5,
+            verification_units=300, confirmation_units=600, shared_units=16, front_limits=(0.9,), front_units=300,
+            share_blocks=4, error=0.5,
             search=SearchEffort(steps=2)),
         is_quick=True),
 """

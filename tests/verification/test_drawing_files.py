@@ -69,7 +69,7 @@ def answer(told):
 @pytest.fixture(scope="module")
 def folder(told, tmp_path_factory):
     found = tmp_path_factory.mktemp("drawn")
-    told.add_files(found)
+    told.teller.add_files(found)
     return found
 
 

@@ -270,6 +270,11 @@ def reducer(
     ------
     InputError, UnknownNameError
         The file, field and value that are not allowed.
+
+    Examples
+    --------
+    >>> reducer("rv20e_liu2020", stiffness="rv20e_table6").reducer.crank_count
+    2
     """
     ranges = {"flank": flank_clearance, "radial": radial_clearance, "rotation": rotation_clearance}
     for field, own in ranges.items():
