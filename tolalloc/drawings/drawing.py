@@ -104,6 +104,15 @@ class Drawing:
         ------
         InputError, UnknownNameError
             The row, field and value that are not allowed.
+
+        Examples
+        --------
+        A hub of 55.29 ± 0.1 mm is one source with one column, in metres:
+
+        >>> zone = {"plus": 0.1, "minus": -0.1, "unit": "mm", "min": 0.02, "max": 0.5, "cost": 3.0}
+        >>> hub = Drawing.of_rows([{"id": "hub", "nominal": 55.29, **zone}])
+        >>> hub.errors.columns, hub.sources[0].zone
+        (('hub',), 0.0002)
         """
         listed = list(rows) if isinstance(rows, Iterable) and not isinstance(rows, str | Mapping) else [rows]
         for row in listed:
@@ -216,6 +225,12 @@ def load_drawing(
     ------
     InputError, UnknownNameError
         The file, row, field and value that are not allowed.
+
+    Examples
+    --------
+    >>> drawing = load_drawing("rv20e_drawing")
+    >>> len(drawing.sources), f"{1e6 * drawing.sources[0].zone:.1f} µm", drawing.settings["flank clearance [µm]"]
+    (50, '4.0 µm', 3.5)
     """
     sources = load_tolerance_table(beside(folder, table), beside(folder, processes), sheet, columns)
     correlation = load_correlations(beside(folder, correlations), sources) if correlations else Correlation()

@@ -393,6 +393,13 @@ def model(
     """Return a model of your own: any function of the dimensions on a drawing.
 
     The parameters are those of `FunctionModel`; the name is the function's unless given.
+
+    Examples
+    --------
+    >>> import tolalloc as ta
+    >>> gap = ta.model(lambda housing, shaft: housing - shaft, inputs=("housing", "shaft"), outputs=("gap [mm]",))
+    >>> gap.outputs
+    ('gap [mm]',)
     """
     for field_name, names in (("inputs", inputs), ("outputs", outputs)):
         if isinstance(names, str):
