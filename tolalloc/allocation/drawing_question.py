@@ -362,7 +362,7 @@ class DrawingQuestion:
             ),
             steps=self.effort.front_steps,
             reach=self.effort.search.reach,
-            graded_steps=self.effort.front_steps * graded,
+            graded_steps=self.effort.graded_steps * graded,
         )
         # Where the limit is out of reach, the front lies around what is kept instead.
         kept = limit if drawn.met else max(limit, min(drawn.quantile_bound, float(drawn.sample.values.max())))

@@ -59,7 +59,7 @@ class AllocationEffort(NamedFields):
     front_units
         Independent units per design there [-].
     front_steps
-        Largest number of verified steps, and of choices of grades, at each of them [-].
+        Largest number of verified steps at each of them [-].
     setting_steps
         Values of each of the last settings for which the cheapest zones are looked for, one number for each [-].
     price_nodes
