@@ -70,23 +70,25 @@ def numbers_of(line: str) -> list[float]:
     return [float(text.replace(",", "")) for text in re.findall(r"\d[\d,]*(?:\.\d+)?", line)]
 
 
-def test_a_log_has_a_line_every_few_seconds_and_one_for_each_stage(capsys, monkeypatch):
-    """Of 4,000 units at 100 a second, 500 are done after 5 s and 35 s are left."""
+def test_a_log_has_lines_further_and_further_apart_and_one_for_each_stage(capsys, monkeypatch):
+    """Of 8,000 units at 100 a second, 500 are done after 5 s and 75 s are left."""
     now = [0.0]
     monkeypatch.setattr(lines.time, "perf_counter", lambda: now[0])
     with lines.shown_progress() as progress:  # what is captured is no terminal
-        for stage, units in (("random units", 4000), ("front", 0), ("nothing", 0), ("searches", 1)):
+        for stage, units in (("random units", 8000), ("front", 0), ("nothing", 0), ("searches", 1)):
             progress.begin(stage, units)
-            for _ in range(0 if stage == "nothing" else 12):
+            for _ in range(0 if stage == "nothing" else 40):
                 now[0] += 1.0
                 progress.advance(100)
     said = [line.partition(":") for line in capsys.readouterr().err.splitlines()]
-    assert [line[0] for line in said] == [name for name in ("random units", "front", "searches") for _ in range(3)]
+    assert [line[0] for line in said] == [name for name in ("random units", "front", "searches") for _ in range(4)]
+    open_end = [[5, 500, 100], [15, 1500, 100], [35, 3500, 100], [40, 4000, 100]]
     assert [numbers_of(line[2]) for line in said] == [
-        [5, 500, 4000, 100, 35],
-        [10, 1000, 4000, 100, 30],
-        [12, 1200, 100],
-        *[[5, 500, 100], [10, 1000, 100], [12, 1200, 100]] * 2,  # where all that were expected are done, none are left
+        [5, 500, 8000, 100, 75],
+        [15, 1500, 8000, 100, 65],
+        [35, 3500, 8000, 100, 45],
+        [40, 4000, 100],
+        *open_end * 2,  # where all that were expected are done, none are left
     ]
 
 

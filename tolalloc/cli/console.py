@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 _ANSWERS: ContextVar[TextIO | None] = ContextVar("answers", default=None)
 """Where answers to a program go while nothing else shall go there."""
 _PAUSE = 5.0
-"""Time between two lines of a log [s]."""
+"""Time to the first line of a stage in a log; each further one comes after twice the time [s]."""
 _SHORT = 2.0
 """Stages that solve nothing and take less are not worth a line [s]."""
 AsJson = Annotated[bool, typer.Option("--json", help="Print machine-readable output only.")]
@@ -85,12 +85,12 @@ class _Stage:
 
 
 class Lines:
-    """A line every few seconds while a stage works, whether or not units are done, and one when it ends."""
+    """Lines while a stage works, whether or not units are done, each after twice the time, and one when it ends."""
 
     def __init__(self, counted: str) -> None:
         self._counted = counted
         self._stage: _Stage | None = None
-        self._told = 0.0
+        self._told, self._pause = 0.0, _PAUSE
         self._lock, self._over = RLock(), Event()
         self._clock = Thread(target=self._keep_telling, daemon=True, name="progress")
 
@@ -107,7 +107,7 @@ class Lines:
         """Begin a stage of so many units, or of what is counted; the one before is finished."""
         self._end("done")
         with self._lock:
-            self._stage = _Stage(stage, units, counted or self._counted)
+            self._stage, self._pause = _Stage(stage, units, counted or self._counted), _PAUSE
 
     def advance(self, units: int) -> None:
         """So many more units are solved."""
@@ -128,8 +128,9 @@ class Lines:
 
     def _tell_at_times(self) -> None:
         with self._lock:
-            if self._stage and time.perf_counter() - self._told >= _PAUSE:
+            if self._stage and time.perf_counter() - self._told >= self._pause:
                 self._tell(self._stage, "so far")
+                self._pause *= 2
 
     def _end(self, how: str, *, short: bool = False) -> None:
         with self._lock:
