@@ -313,6 +313,19 @@ def test_a_trade_without_any_cost_is_said_in_words(results):
         assert "nan" not in " ".join(own.paragraphs)
 
 
+def test_a_section_that_fails_is_a_card_and_the_rest_stands(results, monkeypatch, capsys):
+    def fails(*_):
+        raise ValueError("no such zone")
+
+    monkeypatch.setattr(tables, "certificate_frame", fails)
+    whole = answer_of(results)
+    headings = [own.heading for own in whole.sections]
+    (card,) = [own for own in whole.sections if own.heading == "A part of this report failed"]
+    assert "ValueError('no such zone')" in card.paragraphs[0] and card.first
+    assert headings[headings.index(card.heading) + 1 :]  # what follows stands
+    assert "no such zone" in capsys.readouterr().err
+
+
 def test_the_front_is_verified_never_rises_and_has_the_drawing_on_it(results):
     front = results.front
     limits, cost = np.array([(own.limit, own.design.cost) for own in front.points]).T

@@ -275,7 +275,7 @@ class LinearLaw:
             source = self.errors.active[at]
             width = float(slope * self.zones[at] / 2 / source.lever)
             if width != 0.0 and not _is_normal(source):
-                found.append(_AddedColumn(source=at, marginal=source.zone_mapping.marginal, width=width))
+                found.append(_AddedColumn(source=int(at), marginal=source.zone_mapping.marginal, width=width))
         return tuple(found)
 
     @cached_property

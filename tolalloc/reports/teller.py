@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
+from traceback import print_exc
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from tolalloc.reports.document import Document, Section
@@ -16,6 +18,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Result = TypeVar("Result")
+
+_FAILED_HEADING = "A part of this report failed"
+_FAILED = "What stands behind “{last}” could not be told: {fault}. All else stands; the terminal says where it failed."
 
 
 class Teller(ABC, Generic[Result]):
@@ -61,6 +66,18 @@ class Teller(ABC, Generic[Result]):
     @abstractmethod
     def sections(self) -> tuple[Section, ...]:
         """Headings with their paragraphs, figures and tables."""
+
+    def standing(self, *makers: Callable[[], Iterable[Section]]) -> tuple[Section, ...]:
+        """Return the sections of all makers; one that fails is a card that says so, and the rest stands."""
+        found = list[Section]()
+        for maker in makers:
+            try:
+                found.extend(maker())
+            except Exception as fault:
+                print_exc()
+                said = _FAILED.format(last=found[-1].heading if found else self.title, fault=f"{fault!r}")
+                found.append(Section(heading=_FAILED_HEADING, paragraphs=(said,), first=True))
+        return tuple(found)
 
     @property
     def assumptions(self) -> tuple[str, ...]:

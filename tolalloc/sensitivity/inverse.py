@@ -141,7 +141,8 @@ class _Openings:
         """Return the quantile of every trial at the target yield, and the ends of its interval [output]."""
         found = list[tuple[float, float, float]]()
         for values, good in self._solved(sources, factors):
-            self._require_few_failures(good, sources[len(found) :], factors[len(found) :])
+            part = slice(len(found), len(found) + len(good))
+            self._require_few_failures(good, sources[part], factors[part])
             found += [self.quantile(*trial) for trial in zip(values, good, strict=True)]
         return np.array(found)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -85,51 +86,63 @@ class AllocationTeller(Teller[AllocationResult]):
     @cached_property
     def sections(self) -> tuple[Section, ...]:
         """The sections of the report."""
-        result, unit = self.result, self.header.cost_unit
-        sources, leading = sources_table(result), short(result.leading)
-        known = ((outcome, count) for outcome, count in self.header.statuses.items() if count)
-        counts = (f"{count} unit{'' if count == 1 else 's'}: {outcome}" for outcome, count in known)
-        return (
+        return self.standing(
             self._today,
-            Section(heading=_say("heading_risks"), paragraphs=risks(result), first=True),
-            *self._front,
+            self._risks,
+            self._front,
             self._dimensions,
-            *assembly_section(result, unit),
-            Section(
-                heading=_say("heading_sources"),
-                figures=(zones_figure(sources.rows),),
-                tables=((sources.name, sources.frame(unit)),),
-                paragraphs=(_say("sources"),),
-                unfolded=True,
-                folded=True,
-            ),
-            Section(
-                heading=_say("heading_shares", output=leading),
-                tables=(("shares", sobol_table(result.shares, "dimension")),) if result.shares else (),
-                folded=True,
-            ),
-            self._requirements.behind_heading,
-            *(own.behind_heading for own in self._illustrated),
+            lambda: assembly_section(self.result, self.header.cost_unit),
+            self._sources,
+            self._shares,
+            self._requirements,
+            self._illustrated,
             self._optimality,
-            *self._what_if,
-            Section(
-                heading=_say("heading_work"),
-                paragraphs=(f"{', '.join(counts)}.",),
-                tables=(
-                    ("tried designs", tables.tried_table(result).frame(unit)),
-                    ("tolerances", tolerances_frame(result, unit)),
-                    ("work", work_table(self.header).drop(columns="units per second [1/s]")),
-                ),
-                folded=True,
-            ),
+            self._what_if,
+            self._work,
         )
 
-    @property
-    def _today(self) -> Section:
-        """The first page: the drawing as it is beside the drawing as drawn."""
+    def _risks(self) -> Iterator[Section]:
+        yield Section(heading=_say("heading_risks"), paragraphs=risks(self.result), first=True)
+
+    def _sources(self) -> Iterator[Section]:
+        sources = sources_table(self.result)
+        yield Section(
+            heading=_say("heading_sources"),
+            figures=(zones_figure(sources.rows),),
+            tables=((sources.name, sources.frame(self.header.cost_unit)),),
+            paragraphs=(_say("sources"),),
+            unfolded=True,
+            folded=True,
+        )
+
+    def _shares(self) -> Iterator[Section]:
+        shares = self.result.shares
+        yield Section(
+            heading=_say("heading_shares", output=short(self.result.leading)),
+            tables=(("shares", sobol_table(shares, "dimension")),) if shares else (),
+            folded=True,
+        )
+
+    def _work(self) -> Iterator[Section]:
+        result, unit = self.result, self.header.cost_unit
+        known = ((outcome, count) for outcome, count in self.header.statuses.items() if count)
+        counts = (f"{count} unit{'' if count == 1 else 's'}: {outcome}" for outcome, count in known)
+        yield Section(
+            heading=_say("heading_work"),
+            paragraphs=(f"{', '.join(counts)}.",),
+            tables=(
+                ("tried designs", tables.tried_table(result).frame(unit)),
+                ("tolerances", tolerances_frame(result, unit)),
+                ("work", work_table(self.header).drop(columns="units per second [1/s]")),
+            ),
+            folded=True,
+        )
+
+    def _today(self) -> Iterator[Section]:
+        """Yield the first page: the drawing as it is beside the drawing as drawn."""
         result, unit = self.result, self.header.cost_unit
         table = tables.today_table(result, unit)
-        return Section(
+        yield Section(
             heading=_say("heading_today"),
             figures=(figures.units_figure(result), *effects_figure(result)),
             tables=((table.name, table.frame(unit)),),
@@ -137,27 +150,23 @@ class AllocationTeller(Teller[AllocationResult]):
             first=True,
         )
 
-    @property
-    def _front(self) -> tuple[Section, ...]:
-        """The first page: what other limits cost."""
+    def _front(self) -> Iterator[Section]:
+        """Yield, on the first page, what other limits cost."""
         result, unit, front = self.result, self.header.cost_unit, self.result.front
-        if front is None:
-            return ()
-        section = Section(
-            heading=_say("heading_front", output=short(result.leading)),
-            paragraphs=texts.front(result, front),
-            figures=(figures.front_figure(result, front, unit),),
-            tables=(("front", tables.front_frame(result, front, unit)),),
-            first=True,
-        )
-        return (section,)
+        if front:
+            yield Section(
+                heading=_say("heading_front", output=short(result.leading)),
+                paragraphs=texts.front(result, front),
+                figures=(figures.front_figure(result, front, unit),),
+                tables=(("front", tables.front_frame(result, front, unit)),),
+                first=True,
+            )
 
-    @property
-    def _dimensions(self) -> Section:
-        """The first page: what to write, a line per dimension."""
+    def _dimensions(self) -> Iterator[Section]:
+        """Yield, on the first page, what to write, a line per dimension."""
         result = self.result
         made = " ".join(texts.amounts_convention(result))
-        return Section(
+        yield Section(
             heading=_say("heading_dimensions"),
             paragraphs=(*((made,) if made else ()), _say("dimensions"), _say("files")),
             tables=(("dimensions", dimensions_table(result).frame(self.header.cost_unit)),),
@@ -165,31 +174,29 @@ class AllocationTeller(Teller[AllocationResult]):
             first=True,
         )
 
-    @property
-    def _requirements(self) -> Section:
-        """How the designs stand against the requirements."""
+    def _requirements(self) -> Iterator[Section]:
+        """Yield how the designs stand against the requirements."""
         shown = (tables.requirements_table(self.result), tables.designs_table(self.result))
-        return Section(
+        yield Section(
             heading=_say("heading_requirements"),
             paragraphs=texts.quantiles(self.result),
             tables=tuple((own.name, own.frame(self.header.cost_unit)) for own in shown),
+            folded=True,
         )
 
-    @property
-    def _illustrated(self) -> tuple[Section, ...]:
-        """The median units before and after, as the model pictures them."""
+    def _illustrated(self) -> Iterator[Section]:
+        """Yield the median units before and after, as the model pictures them."""
         before, after = self.result.free.baseline, self.result.chosen
         units = {
             "median unit before": (before.settings, before.sample.unit_at(0.5)[0]),
             "median unit after": (after.settings, after.sample.unit_at(0.5)[0]),
         }
-        return portrait_of(self.result.model).illustrated(units)
+        yield from (own.behind_heading for own in portrait_of(self.result.model).illustrated(units))
 
-    @property
-    def _optimality(self) -> Section:
-        """How far from optimal the drawing can be."""
+    def _optimality(self) -> Iterator[Section]:
+        """Yield how far from optimal the drawing can be."""
         result, unit = self.result, self.header.cost_unit
-        return Section(
+        yield Section(
             heading=_say("heading_optimality"),
             paragraphs=(_say("bound"), _say("bounds_table")),
             tables=(
@@ -198,29 +205,26 @@ class AllocationTeller(Teller[AllocationResult]):
             ),
         )
 
-    @property
-    def _what_if(self) -> tuple[Section, ...]:
-        """What would be otherwise: settings, yields, assumptions."""
-        result, unit, found = self.result, self.header.cost_unit, list[Section]()
+    def _what_if(self) -> Iterator[Section]:
+        """Yield what would be otherwise: settings, yields, assumptions."""
+        result, unit = self.result, self.header.cost_unit
         if result.trade:
-            trade = Section(
+            yield Section(
                 heading=_say("heading_trade", word=portrait_of(result.model).settings_word.capitalize()),
                 paragraphs=texts.cheapest_settings(result, unit),
                 figures=figures.trade_figures(result, result.trade, unit),
                 tables=(("modification", tables.trade_frame(result.trade, unit)),),
             )
-            found.append(trade)
         if result.prices and result.prices.priced.size:
             priced = (("unit price", tables.prices_frame(result.prices, unit)),)
-            found.append(Section(heading=_say("heading_good_unit"), tables=priced))
+            yield Section(heading=_say("heading_good_unit"), tables=priced)
         if result.robustness:
             moved = tables.robustness_frame(result, result.robustness)
             shown = [("robustness", moved), ("variants", tables.variants_frame(result.robustness, unit))]
             if region := result.robustness.uncertain:
                 shown.append((f"{region.name} region", tables.region_frame(region, result.free.chosen.met)))
             zones = figures.robustness_figure(moved)
-            found.append(Section(heading=_say("heading_robustness"), figures=(zones,), tables=tuple(shown)))
-        return tuple(found)
+            yield Section(heading=_say("heading_robustness"), figures=(zones,), tables=tuple(shown))
 
     @cached_property
     def summary(self) -> dict[str, Any]:

@@ -325,8 +325,8 @@ class RankingTeller(Teller[RankingResult]):
     @cached_property
     def sections(self) -> tuple[Section, ...]:
         """Drivers, limits, and what the answer rests on."""
-        behind = (*self._limit_sections(), *self._trust_sections())
-        return (*self._driver_sections(), *(own.behind_heading for own in behind))
+        behind = self.standing(self._limit_sections, self._trust_sections)
+        return (*self.standing(self._driver_sections), *(own.behind_heading for own in behind))
 
     @cached_property
     def _requirements(self) -> pd.DataFrame:
@@ -381,56 +381,50 @@ class RankingTeller(Teller[RankingResult]):
         unit = result.sample.unit_at(0.5)[0]
         yield from self._portrait.moving(result.errors, unit, result.share_of_source, "median unit")
 
-    def _limit_sections(self) -> tuple[Section, ...]:
-        """Return what the limits do: yield, units beyond them, and how far each zone may open."""
+    def _limit_sections(self) -> Iterator[Section]:
+        """Yield what the limits do: yield, units beyond them, and how far each zone may open."""
         result = self.result
-        return (
-            Section(
-                heading=_say("yield_heading"),
-                figures=(figures.sample_figure(result),),
-                tables=(
-                    ("requirements", self._requirements),
-                    ("beyond the limit", tables.beyond_table(result)),
-                    ("stack-up", tables.stack_up_table(result, f"{self._output} [{self._unit}]")),
-                ),
-            ),
-            Section(
-                heading=_say("rejects_heading"),
-                figures=(figures.reject_figure(result),),
-                tables=(("rejects", tables.reject_table(result.reject)),),
-            ),
-            Section(
-                heading=_say("alone_heading"),
-                figures=tuple(figures.inverse_figures(result)),
-                tables=(("alone", tables.inverse_table(result)),),
+        yield Section(
+            heading=_say("yield_heading"),
+            figures=(figures.sample_figure(result),),
+            tables=(
+                ("requirements", self._requirements),
+                ("beyond the limit", tables.beyond_table(result)),
+                ("stack-up", tables.stack_up_table(result, f"{self._output} [{self._unit}]")),
             ),
         )
+        yield Section(
+            heading=_say("rejects_heading"),
+            figures=(figures.reject_figure(result),),
+            tables=(("rejects", tables.reject_table(result.reject)),),
+        )
+        yield Section(
+            heading=_say("alone_heading"),
+            figures=tuple(figures.inverse_figures(result)),
+            tables=(("alone", tables.inverse_table(result)),),
+        )
 
-    def _trust_sections(self) -> tuple[Section, ...]:
-        """Return what the answer rests on: other measures, surrogates, distributions, work done."""
+    def _trust_sections(self) -> Iterator[Section]:
+        """Yield what the answer rests on: other measures, surrogates, distributions, work done."""
         result = self.result
         statuses = self.header.statuses.items()
-        return (
-            Section(heading=_say("measures_heading"), tables=(("measures", tables.measures_table(result)),)),
-            Section(
-                heading=_say("surrogates_heading"),
-                tables=(("surrogates", tables.surrogate_table(result.choice)),),
+        yield Section(heading=_say("measures_heading"), tables=(("measures", tables.measures_table(result)),))
+        yield Section(
+            heading=_say("surrogates_heading"),
+            tables=(("surrogates", tables.surrogate_table(result.choice)),),
+        )
+        yield Section(
+            heading=_say("mapping_heading"),
+            tables=(
+                ("mapping", tables.mapping_table(result)),
+                *tables.measured_tables(result),
+                ("tolerances", table_frame(result.errors.sources, cost_unit=self.header.cost_unit)),
             ),
-            Section(
-                heading=_say("mapping_heading"),
-                tables=(
-                    ("mapping", tables.mapping_table(result)),
-                    *tables.measured_tables(result),
-                    ("tolerances", table_frame(result.errors.sources, cost_unit=self.header.cost_unit)),
-                ),
-            ),
-            Section(
-                heading=_say("work_heading"),
-                paragraphs=(
-                    ", ".join(_say("work", units=count, outcome=outcome) for outcome, count in statuses if count),
-                ),
-                tables=(("work", tables.work_table(self.header)),),
-            ),
+        )
+        yield Section(
+            heading=_say("work_heading"),
+            paragraphs=(", ".join(_say("work", units=count, outcome=outcome) for outcome, count in statuses if count),),
+            tables=(("work", tables.work_table(self.header)),),
         )
 
     @cached_property

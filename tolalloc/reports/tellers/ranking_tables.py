@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from jaxtyping import Float
+from jaxtyping import Float, Num
 
 from tolalloc.drawings.sources import Source, zone_in, zone_unit
 from tolalloc.reading.units import MICROMETRE, unit_of
@@ -43,7 +43,7 @@ def _told(index: Float[np.ndarray, "*source"]) -> Float[np.ndarray, "*source"]:
     return np.asarray(np.clip(index, 0.0, 1.0))
 
 
-def _ends(name: str, interval: Float[np.ndarray, "end source"]) -> dict[str, Any]:
+def _ends(name: str, interval: Num[np.ndarray, "end source"]) -> dict[str, Any]:
     """Return the columns of the ends of an interval of 90 %, under the name of what they are about."""
     return {f"{name}low 5 % [-]": interval[0], f"{name}high 95 % [-]": interval[1]}
 
