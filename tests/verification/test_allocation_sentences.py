@@ -337,7 +337,7 @@ def test_the_front_is_verified_never_rises_and_has_the_drawing_on_it(results):
     assert says(told.paragraphs, "allocation.front", units=SMALL.front_units)
     assert list(told.figures[0].series[0].y) == cost.tolist()
     table = dict(told.tables)["front"]
-    assert table[""].tolist() == ["this drawing" if own == front.drawn.limit else "" for own in limits]
+    assert table["drawing"].tolist() == ["this drawing" if own == front.drawn.limit else "" for own in limits]
 
 
 def test_amounts_that_are_not_those_of_today_are_said_with_the_zones_on_the_first_page(results):

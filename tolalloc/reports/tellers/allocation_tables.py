@@ -246,7 +246,7 @@ def front_frame(result: AllocationResult, front: CostFront, cost_unit: str) -> p
             f"kept by its units [{unit}]": [own.design.quantile_bound for own in points],
             f"cost [{cost_unit}]": [own.design.cost for own in points],
             **dict(settings),
-            "": [_say("front_here") if own.limit == front.drawn.limit else "" for own in points],
+            "drawing": [_say("front_here") if own.limit == front.drawn.limit else "" for own in points],
         }
     )
 
