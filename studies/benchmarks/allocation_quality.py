@@ -100,11 +100,12 @@ def rival(
 def row(number: int, asked: argparse.Namespace) -> dict[str, Any]:
     """Return what everybody found for one study."""
     study, start = random_study(number), time.process_time()
-    answer = study.allocate(effort=asked.effort).result
+    told = study.allocate(effort=asked.effort)
+    answer = told.result
     seconds, graded = time.process_time() - start, answer.graded is not None
     prepared = Prepared(study=study)
     compared = Compared(prepared=prepared, seeds=SeedTree(study.seed).child("quality"), units=asked.units)
-    calls, chosen, free = sum(answer.statuses.values()), answer.chosen, answer.free
+    calls, chosen, free = sum(told.header.statuses.values()), answer.chosen, answer.free
     found = {"package": judged(compared, chosen.space, chosen.design, graded)}
     found["package"] |= {"seconds": seconds, "calls": calls}
     table, alike = free.baseline, free.proportional

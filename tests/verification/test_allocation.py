@@ -14,6 +14,7 @@ from tests import builders
 from tolalloc import LOST_MOTION, PEAK_TO_PEAK
 from tolalloc import RADIAL_CLEARANCE as RADIAL
 from tolalloc.allocation.cost.model import Process, Reciprocal
+from tolalloc.allocation.search import process_choice
 from tolalloc.allocation.search.steering import Programs
 from tolalloc.allocation.search.zone_allocation import aimed, allocate, kept_stacks, scale_in_proportion
 from tolalloc.allocation.space.effort import SearchEffort
