@@ -65,7 +65,7 @@ def as_it_stands(study):
         locked_cost=study.space.locked_cost,
     )
     names = list({own.dimension: 1 for own in study.errors.active})
-    nothing = dict.fromkeys(("trade", "fronts", "robustness", "prices", "loss", "fixed", "graded"))
+    nothing = dict.fromkeys(("trade", "front", "robustness", "prices", "loss", "fixed", "graded"))
     return AllocationResult(
         name="shop",
         model=study.model,
@@ -75,7 +75,6 @@ def as_it_stands(study):
         shares=SimpleNamespace(sources=names, total=np.ones(len(names))),
         error=0.05,
         examination=study.model.at(design.settings).examined(study.space.units(design.design, SeedTree(2), 16)),
-        statuses={},
         **nothing,
     )
 
