@@ -335,6 +335,7 @@ def test_the_front_is_verified_never_rises_and_has_the_drawing_on_it(results):
     assert all(own.design.met for own in front.points)
     told = section(results, "front", output="peak-to-peak")
     assert says(told.paragraphs, "allocation.front", units=SMALL.front_units)
+    assert says(told.paragraphs, "allocation.front_drawn")
     assert list(told.figures[0].series[0].y) == cost.tolist()
     table = dict(told.tables)["front"]
     assert table["drawing"].tolist() == ["this drawing" if own == front.drawn.limit else "" for own in limits]

@@ -24,14 +24,14 @@ class PricedLimit:
 class CostFront:
     """Cost against the limit of the leading output."""
 
-    points: tuple[PricedLimit, ...]  # The tightest limit first; what the drawing keeps is one of them
-    drawn: PricedLimit  # The drawing, at the limit asked for or, where it misses that, at what it keeps
+    points: tuple[PricedLimit, ...]  # The tightest limit first
+    drawn: PricedLimit | None  # The drawing, one of them; none where it was not shown to keep all limits
     missed: tuple[float, ...]  # Limits that no design was verified to keep [unit of the output]
 
 
 @dataclass(frozen=True, kw_only=True)
 class FrontSearch:
-    """Looks for the cheapest drawings at other limits, one from the other."""
+    """Looks for the cheapest drawings at other limits, each from the one at hand."""
 
     verifier_of: Callable[[float], Verifier]  # Limit → verifies designs that must keep it, on units of its own
     steps: int  # Verified steps at every limit [-]
@@ -46,7 +46,7 @@ class FrontSearch:
         drawn
             The drawing.
         limit
-            What it keeps [unit of the output].
+            What it keeps, or may be hoped to keep where it misses a limit [unit of the output].
         shares
             Other limits over that one [-].
 
@@ -56,22 +56,23 @@ class FrontSearch:
         What keeps a limit keeps every wider one, so cost never rises with the limit. A design for a tighter limit that
         seems cheaper than the drawing does so by what the units of a search err, and does not count.
         """
-        own, found, missed = PricedLimit(limit=limit, design=drawn), list[PricedLimit](), list[float]()
+        own = PricedLimit(limit=limit, design=drawn) if drawn.accepted else None
+        found, missed = [own] if own else [], list[float]()
         at_hand = self.verifier_of(limit)
         units = at_hand.sampled(drawn.design_in(at_hand.space), "drawn")
-        for asked in (share * limit for share in shares):
-            best = self._cheapest(asked, units, drawn.cost * (1 - _SAME) if asked < limit else 0.0)
+        for share in sorted({*shares} - {1.0}):
+            best = self._cheapest(share * limit, units, drawn.cost * (1 - _SAME) if own and share < 1 else 0.0)
+            if best is None and own and share > 1:
+                best = drawn  # which keeps the wider limit too
             if best:
-                found.append(PricedLimit(limit=asked, design=best))
-            elif asked < limit:
-                missed.append(asked)
-            else:  # which the drawing keeps
-                found.append(PricedLimit(limit=asked, design=drawn))
+                found.append(PricedLimit(limit=share * limit, design=best))
+            else:
+                missed.append(share * limit)
         points = list[PricedLimit]()
-        for point in sorted((own, *found), key=lambda one: one.limit):
+        for point in sorted(found, key=lambda one: one.limit):
             known = [one.design for one in (*points[-1:], point)]
             points.append(replace(point, design=min(known, key=lambda one: one.cost)))
-        return CostFront(points=tuple(points), drawn=own, missed=tuple(sorted(missed)))
+        return CostFront(points=tuple(points), drawn=own, missed=tuple(missed))
 
     def _cheapest(self, limit: float, units: DesignSample, floor: float) -> VerifiedDesign | None:
         """Return the cheapest design of a cost or more that units show to keep a limit, none where none was found."""

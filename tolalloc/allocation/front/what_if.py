@@ -46,16 +46,6 @@ class QuantileResponse:
     standard: Float[np.ndarray, "unit column"]  # Standard values of the units that all designs share [-]
     spread: float  # Quantile's distance from the mean over the standard deviation [-]
 
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The design variables."""
-        return self.space.columns
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """The one output."""
-        return (f"quantile of the {self.output}",)
-
     def __call__(self, x: Float[np.ndarray, "design variable"]) -> Evaluation:
         """Return the quantile of every design; a design with a failed unit is a failed sample."""
         values, status = np.empty((x.shape[0], 1)), np.zeros(x.shape[0], np.uint8)

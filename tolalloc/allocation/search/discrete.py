@@ -201,15 +201,6 @@ class GradedAllocation:
         """`least` with locked zones [cost units]."""
         return self.least + self.space.locked_cost
 
-    @property
-    def scales(self) -> dict[str, Float[np.ndarray, " position"]]:
-        """Scales of every group's ladder that a process can hold [-]."""
-        space, found = self.space, {}
-        for at, (group, ladder) in enumerate(zip(space.groups, group_ladders(space), strict=True)):
-            scales = ladder.zones / space.first_zones[at]
-            found[group] = scales[(scales >= space.lower[at]) & (scales <= space.upper[at])]
-        return found
-
     def with_chosen(
         self, drawn: DrawnAmounts, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ...]
     ) -> GradedAllocation:

@@ -256,10 +256,6 @@ class OneSidedConstraint:
         groups = self.stack.worst_case.size
         return np.asarray(self.stack.load(designs[..., :groups], designs[..., groups:]) - self.stack.budget)
 
-    def predicted_value(self, designs: Float[np.ndarray, "*designs variable"]) -> Float[np.ndarray, "*designs"]:
-        """Return the value that the model predicts [unit of the output]."""
-        return self.limit + self.sign * self.predicted(designs)
-
 
 def root_sum_square_stack(
     name: str,

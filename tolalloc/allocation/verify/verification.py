@@ -260,11 +260,14 @@ class Verifier:
         """Return the design with what random units of its own say of it."""
         return self.judged(self.sampled(design, name), name)
 
+    def _in_force(self, design: Float[np.ndarray, " variable"]) -> tuple[Requirement, ...]:
+        """Return what must be kept as the model has it at the settings of a design."""
+        model = self.model.at(self.space.settings_of(design))
+        return tuple(own.in_force(model) for own in self.requirements)
+
     def sampled(self, design: Float[np.ndarray, " variable"], name: str) -> DesignSample:
         """Return random units of a design, others for every name."""
-        seeds, errors = self.seeds.child(name), self.space.errors
-        model = self.model.at(self.space.settings_of(design))
-        requirements = tuple(own.in_force(model) for own in self.requirements)
+        seeds, errors, requirements = self.seeds.child(name), self.space.errors, self._in_force(design)
         outputs = tuple(dict.fromkeys(name for requirement in requirements for name in requirement.outputs))
         return DesignSample(
             space=self.space,
@@ -280,9 +283,7 @@ class Verifier:
 
     def judged(self, sample: DesignSample, name: str) -> VerifiedDesign:
         """Return a design with what random units say of it, also of those of a verifier that asks for other limits."""
-        design, outputs = sample.design, sample.outputs
-        model = self.model.at(self.space.settings_of(design))
-        requirements = tuple(own.in_force(model) for own in self.requirements)
+        design, outputs, requirements = sample.design, sample.outputs, self._in_force(sample.design)
         for own in sample.samples:
             require_few_failures(own, "of a drawing that was tried", self.largest_failed_share)
         read = tuple(requirement.sample(sample, self.confidence) for requirement in requirements)

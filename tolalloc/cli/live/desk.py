@@ -139,7 +139,9 @@ def _found(answer: Any, settings: tuple[str, ...]) -> dict[str, Any]:
     zones = {own.name: own.zone / MICROMETRE for own in result.drawn_sources if own.zone > 0}
     chosen = {name: float(answer.summary[name]) for name in settings if answer.summary.get(name) is not None}
     found = {"met": bool(result.met), "cost": float(result.cost), "zones": zones, "settings": chosen}
-    if result.front:  # Cost against the leading output's limit, as far as the question asked for it
+    if (
+        result.front and result.front.points
+    ):  # Cost against the leading output's limit, as far as the question asked for it
         points = result.front.points
         found["front"] = {"x": [own.limit for own in points], "y": [own.design.cost for own in points]}
     return {**drawn, **found}

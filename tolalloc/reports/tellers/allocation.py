@@ -157,8 +157,8 @@ class AllocationTeller(Teller[AllocationResult]):
             yield Section(
                 heading=_say("heading_front", output=short(result.leading)),
                 paragraphs=texts.front(result, front),
-                figures=(figures.front_figure(result, front, unit),),
-                tables=(("front", tables.front_frame(result, front, unit)),),
+                figures=(figures.front_figure(result, front, unit),) if front.points else (),
+                tables=(("front", tables.front_frame(result, front, unit)),) if front.points else (),
                 first=True,
             )
 

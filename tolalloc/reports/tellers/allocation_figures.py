@@ -46,7 +46,7 @@ def front_figure(result: AllocationResult, front: CostFront, cost_unit: str) -> 
             Series.line(
                 _say("figure_front_verified"), [own.limit for own in points], [own.design.cost for own in points]
             ),
-            Series.points(_say("front_here"), [drawn.limit], [drawn.design.cost]),
+            *((Series.points(_say("front_here"), [drawn.limit], [drawn.design.cost]),) if drawn else ()),
         ),
     )
 

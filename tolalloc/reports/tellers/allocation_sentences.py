@@ -496,8 +496,10 @@ def warnings(result: AllocationResult, header: Header) -> tuple[str, ...]:
 
 def front(result: AllocationResult, found: CostFront) -> tuple[str, ...]:
     """Return how the costs of other limits were found."""
-    units = next((own.design.joint.units for own in found.points if own is not found.drawn), 0)
+    units = next((own.design.joint.units for own in found.points if own.design is not result.chosen), 0)
     said = [_say("front", units=units, simulated=portrait_of(result.model).simulated)] if units else []
+    if units and found.drawn:
+        said.append(_say("front_drawn"))
     if found.missed:
         missed = ", ".join(with_unit(f"{own:.4g}", result.leading) for own in found.missed)
         said.append(_say("front_missed", limits=missed))

@@ -238,7 +238,7 @@ def bounds_frame(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
 
 def front_frame(result: AllocationResult, front: CostFront, cost_unit: str) -> pd.DataFrame:
     """Return what limits of the leading output cost, with the settings of each drawing."""
-    unit, points = unit_of(result.leading), front.points
+    unit, points, here = unit_of(result.leading), front.points, front.drawn
     settings = zip(result.space.shared.names, np.array([own.design.settings for own in points]).T, strict=True)
     return pd.DataFrame(
         {
@@ -246,7 +246,7 @@ def front_frame(result: AllocationResult, front: CostFront, cost_unit: str) -> p
             f"kept by its units [{unit}]": [own.design.quantile_bound for own in points],
             f"cost [{cost_unit}]": [own.design.cost for own in points],
             **dict(settings),
-            "drawing": [_say("front_here") if own.limit == front.drawn.limit else "" for own in points],
+            "drawing": [_say("front_here") if here and own.limit == here.limit else "" for own in points],
         }
     )
 
