@@ -46,7 +46,7 @@ class KnownSample(OutputSample):
         return np.outer(self.values[rows], [1.0, 0.0, 0.0, 0.0]) / self.design[0]
 
     def worst(self, sense):
-        return sense * 7.0, sense * np.array([2.0, 1.5, 0.5, -0.25])
+        return sense * 7.0, 0.0, sense * np.array([2.0, 1.5, 0.5, -0.25])
 
     def linear(self):
         return 0.0, 0.0, np.array([2.0, 1.5]), np.array([0.5, -0.25])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+import tolalloc as ta
 from studies.published.stacks import (
     inertial,
     inflated,
@@ -94,3 +95,31 @@ def test_what_no_stack_can_mean_is_refused():
     ):
         with pytest.raises(InputError, match=f"stack gap: {words}"):
             refuse()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("nominal", [0.0, 10.0])
+def test_a_worst_case_with_bought_parts_costs_what_lagrange_says(nominal):
+    """Seven sizes, three bought: of 15 µm these take 6.5, and the least of Σ cᵢ/tᵢ within 8.5 is (Σ√cᵢ)²/8.5."""
+    row = {"nominal": nominal, "unit": "mm"}
+    halves, costs = {"shaft": 8, "housing": 8, "cover": 2, "spacer": 2}, (16, 20, 10, 7)
+    made = [
+        {"id": name, **row, "plus": half / 1e3, "minus": -half / 1e3, "min": 2e-4, "max": 0.04, "cost": cost}
+        for (name, half), cost in zip(halves.items(), costs, strict=True)
+    ]
+    bought = [
+        {"id": name, **row, "plus": half, "minus": -half, "min": half, "max": half, "cost": 1, "locked": "yes"}
+        for name, half in (("one", 0.0025), ("two", 0.0025), ("ring", 0.0015))
+    ]
+    study = ta.Study(
+        ta.model(
+            lambda a, b, c, d, *e: a - b + c - d + sum(e), inputs=(*halves, "one", "two", "ring"), outputs=("y [mm]",)
+        ),
+        ta.Drawing.of_rows(made + bought),
+        limits={"y [mm]": ta.Limit(lower=3 * nominal - 0.015, upper=3 * nominal + 0.015, show=ta.WorstCase())},
+        effort="quick",
+    )
+    found = study.ask(ta.Allocation(front=False, what_if=False)).result
+    least = sum(np.sqrt(cost * half) for cost, half in zip(costs, halves.values(), strict=True)) ** 2 / 8.5 + 3
+    assert found.met
+    assert found.cost == pytest.approx(least, rel=2e-3)  # whole steps of the zones cost some of it

@@ -29,6 +29,9 @@ _EVEN_ODDS, _TENTH = 0.5, 0.1
 _FURTHER, _SURELY = 4, 200
 """Units that are compared with planes: so many times the share that may fail, and so many more [-]."""
 _HALVINGS = 40
+_MISSED, _ROUNDED = 0.005, 1e-12
+"""Most of the way from the nominal unit to the worst one by which an ascent may have missed it, and of its value what
+sums in another order may differ by [-]."""
 _STEP, _NEAREST = 1e-3, 100
 """Step of the derivative of a share by law, over the range of the furthest units, and units that tell it otherwise [-].
 """
@@ -464,8 +467,10 @@ class DesignSample:
             return self._slopes(self._derivatives(output, rows), standard)
         return np.asarray(self._differences((output,), standard)[0])
 
-    def worst(self, output: str, sense: Literal[1, -1]) -> tuple[float, Float[np.ndarray, " variable"]]:
-        """Return the worst value inside the zones and its derivative by every variable [unit of the output].
+    def worst(self, output: str, sense: Literal[1, -1]) -> tuple[float, float, Float[np.ndarray, " variable"]]:
+        """Return the worst value inside the zones, by how much it may be missed and its derivative by every variable.
+
+        All in the unit of the output. Where all starts of the ascent end at one value, only its rounding is missed.
 
         Notes
         -----
@@ -474,7 +479,9 @@ class DesignSample:
         zones = self.space.zones(self.design)
         experiment = Experiment(self._differentiable(output), self.space.errors, zones, self.seeds.child(output))
         found = worst_unit(experiment, sense=sense)
-        return found.value, np.append(self.space.by_scale(found.by_zone), self._by_setting(output, found.x))
+        apart = float(np.nanmax(found.ends) - np.nanmin(found.ends))
+        missed = max(min(apart, _MISSED * abs(float(found.by_zone @ zones))), _ROUNDED * abs(found.value))
+        return found.value, missed, np.append(self.space.by_scale(found.by_zone), self._by_setting(output, found.x))
 
     def linear(self, output: str) -> tuple[float, Float[np.ndarray, " source"], Float[np.ndarray, " setting"]]:
         """Return the output of the nominal unit, what each source adds at its limit, and its change by settings."""
@@ -614,8 +621,8 @@ class OutputSample:
     def _turned_slopes(self, sign: int, rows: Int[np.ndarray, " few"]) -> Float[np.ndarray, "few variable"]:
         return sign * self.slopes_at(rows)
 
-    def worst(self, sense: Literal[1, -1]) -> tuple[float, Float[np.ndarray, " variable"]]:
-        """Return the worst value inside the zones and its derivative by every variable [unit of the output]."""
+    def worst(self, sense: Literal[1, -1]) -> tuple[float, float, Float[np.ndarray, " variable"]]:
+        """Return the worst value inside the zones, by how much it may be missed and its derivatives."""
         return self.units.worst(self.output, sense)
 
     def linear(self) -> tuple[float, float, Float[np.ndarray, " group"], Float[np.ndarray, " setting"]]:

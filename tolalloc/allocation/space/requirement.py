@@ -418,10 +418,6 @@ def spread_weights(
     return np.asarray(1.0 + spread * (known - known.mean()) / (known.std() or 1.0))
 
 
-_MISSED = 0.005
-"""Share of a worst case by which an ascent may have missed it [-]."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class WorstCase:
     """No unit inside its zones lies beyond a limit, as far as an ascent from many starts can tell."""
@@ -439,7 +435,7 @@ class WorstCase:
         return tuple(self._side(sample, sign, limit) for sign, limit in limits.turned)
 
     def _side(self, sample: OutputSample, sign: Literal[1, -1], limit: float) -> OneSidedConstraint:
-        value, gradient = sample.worst(sign)
+        value, missed, gradient = sample.worst(sign)
         stack = worst_case_stack(
             _name_of(sample, sign), sample.design, sign * (value - limit), sign * gradient, sample.groups
         )
@@ -447,7 +443,7 @@ class WorstCase:
             sign=sign,
             limit=limit,
             value=value,
-            standard_error=_MISSED * abs(value),
+            standard_error=missed,
             scale=_scale_of(sample, limit),
             stack=stack,
         )
