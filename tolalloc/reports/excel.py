@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from itertools import count
-from math import isfinite
+from math import ceil, isfinite
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
@@ -58,6 +58,8 @@ _NO_NAME = re.compile(r"[\[\]:*?/\\']")
 """What no name of a sheet may hold, or what a link to it would have to quote."""
 _CONTROL = re.compile(r"[\000-\010\013\014\016-\037]")
 """What no workbook may hold."""
+_ACROSS = 155
+"""Characters of a row that A4 holds across in letters of 7.5 points [-]."""
 HEAD = {"bold": True, "text_wrap": True, "valign": "top"}
 """Style of a header."""
 
@@ -121,11 +123,18 @@ class Sheet:
         """Set the height of a row."""
         self.inner.set_row(row - 1, points)
 
-    def set_up_print(self, *, headed: bool = True) -> None:
-        """Let the sheet print across on A4, as wide as the paper, with its header, if it has one, on every page."""
+    def set_up_print(self, *, headed: bool = True, characters: float = 0.0) -> None:
+        """Let the sheet print across on A4, with its header, if it has one, on every page.
+
+        It is as wide as the paper, or as several with the first column on each, so that so many characters of a row
+        are printed no smaller than they can be read.
+        """
+        pages = max(ceil(characters / _ACROSS), 1)
         self.inner.set_paper(9)  # A4
         self.inner.set_landscape()
-        self.inner.fit_to_pages(1, 0)
+        self.inner.fit_to_pages(pages, 0)
+        if pages > 1:
+            self.inner.repeat_columns(0)
         if headed:
             self.inner.repeat_rows(0)
         self.inner.set_footer("&L&A&R&P / &N")
@@ -161,15 +170,18 @@ class Book:
         """Return a new sheet with a table: headers frozen, numbers as their unit asks for, set up for print."""
         sheet = self.sheet(name)
         sheet.inner.freeze_panes(1, 0)
-        sheet.set_up_print()
+        characters = 0.0
         for number, header in enumerate(frame.columns, start=1):
             values = frame.iloc[:, number - 1].tolist()
             longest = max([len(str(header)) * 0.7, *(len(str(value)) for value in values[:40])])
-            sheet.width(number, min(max(longest + 2, 10), 60))
+            width = min(max(longest + 2, 10), 60)
+            characters += width
+            sheet.width(number, width)
             sheet.cell(1, number, str(header), **HEAD)
             shown = {"num_format": _FORMATS.get(in_cost_units(unit_of(str(header))), "0.0###")}
             for row, value in enumerate(values, start=2):
                 sheet.cell(row, number, value, **(shown if isinstance(value, float | Formula) else {}))
+        sheet.set_up_print(characters=characters)
         return sheet
 
     def style(self, **properties: object) -> Any:

@@ -21,7 +21,7 @@ from markupsafe import Markup, escape
 
 from tolalloc.reading.files import no_formula
 from tolalloc.reading.units import in_cost_units, unit_of
-from tolalloc.reports.document import Document
+from tolalloc.reports.document import Document, Section
 from tolalloc.reports.excel import ANSWER, CONTENTS, write_sheets
 from tolalloc.reports.figure import Figure, HeatMap, chart
 from tolalloc.reports.page import as_json, scripts, style
@@ -237,6 +237,15 @@ def _drawn_by(record: dict[str, Any]) -> tuple[str, str, Markup]:
     return record["title"], _MOVING if "scene" in record else "figure", as_json(record)
 
 
+def _told_table(section: Section, name: str, frame: pd.DataFrame) -> tuple[str, int, bool, Markup | None]:
+    """Return name and rows of a table, whether it is folded, and what the page shows; a fold in a fold is only named.
+
+    What is large and stands behind a heading decides nothing at a desk: it is read in the workbook.
+    """
+    is_folded = _is_large(frame) and not section.unfolded
+    return name, len(frame), is_folded, None if is_folded and section.folded else html_table(frame)
+
+
 def _write_page(document: Document, path: Path) -> None:
     """Write the page, all that it shows inside."""
     sections: list[dict[str, Any]] = [
@@ -247,10 +256,7 @@ def _write_page(document: Document, path: Path) -> None:
             "folded": section.folded,
             "paragraphs": section.paragraphs,
             "figures": [_drawn_by(chart(figure)) for figure in section.figures],
-            "tables": [
-                (name, len(frame), _is_large(frame) and not section.unfolded, html_table(frame))
-                for name, frame in section.tables
-            ],
+            "tables": [_told_table(section, name, frame) for name, frame in section.tables],
         }
         for section in document.sections
     ]

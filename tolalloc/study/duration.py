@@ -48,6 +48,24 @@ def durations(prepared: Prepared) -> tuple[CheckedTime, ...]:
     return tuple(found)
 
 
+def expected_seconds(prepared: Prepared) -> float:
+    """Return about how long the ranking and the allocation of a study take together on this machine [s].
+
+    Units as `counted` by their efforts, each with what a few random ones take here: of a ranking with all outputs that
+    it ranks, of an allocation with those that are limited.
+    """
+    model, effort = prepared.model, prepared.ranking_effort
+    limited = tuple(dict.fromkeys(own.output for own in prepared.requirements))
+    ranked = tuple(name for name in model.outputs if name in {*model.ranked, *limited})
+    kinds = [question.kind for question in prepared.study.questions]
+    units = {
+        Ranking.kind: (effort.counted(len({*prepared.errors.dimension_of_column})), ranked),
+        Allocation.kind: (prepared.allocation_effort.counted, limited),
+    }
+    asked = [units[kind] for kind in kinds if kind in units]
+    return sum((count * _seconds(prepared, outputs) for count, outputs in asked), 0.0)
+
+
 @dataclass(frozen=True, kw_only=True)
 class _Workload:
     """Units of one kind."""

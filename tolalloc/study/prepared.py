@@ -186,18 +186,32 @@ class Prepared:
     @property
     def ranking_effort(self) -> RankingEffort:
         """How much a ranking may compute, more blocks for a model that answers for whole arrays."""
-        return self.study.effort.of_ranking(self.model, len({*self.errors.dimension_of_column}), self._sharing)
+        return self.study.effort.of_ranking(self.model, self._dimensions, len(self._sharing))
 
     @property
     def allocation_effort(self) -> AllocationEffort:
         """How much an allocation may compute, more units for a model that answers for whole arrays."""
-        return self.study.effort.of_allocation(self.model, self._sharing)
+        return self.study.effort.of_allocation(self.model, len(self._sharing))
 
     @property
-    def _sharing(self) -> int:
-        """Questions that share a time: the rankings and allocations of the study [-]."""
-        kinds = [getattr(question, "kind", "") for question in self.study.questions]
-        return max(sum(kind in ("ranking", "allocation") for kind in kinds), 1)
+    def _dimensions(self) -> int:
+        """Dimensions of the drawing, which a ranking tells apart [-]."""
+        return len({*self.errors.dimension_of_column})
+
+    @property
+    def _sharing(self) -> tuple[str, ...]:
+        """Questions that share a time: the rankings and allocations of the study, by kind."""
+        kinds = tuple(getattr(question, "kind", "") for question in self.study.questions)
+        return tuple(kind for kind in kinds if kind in ("ranking", "allocation")) or ("ranking",)
+
+    @property
+    def _counted(self) -> int:
+        """About how many units the questions that share a time solve [-]."""
+        counted = {
+            "ranking": self.ranking_effort.counted(self._dimensions),
+            "allocation": self.allocation_effort.counted,
+        }
+        return sum(counted[kind] for kind in self._sharing)
 
     @cached_property
     def currency(self) -> str:
@@ -281,6 +295,6 @@ class Prepared:
             assumptions=(
                 *portrait_of(self.model).assumptions,
                 *self.notes,
-                *self.study.effort.notes(self.model),
+                *self.study.effort.notes(self.model, self._counted),
             ),
         )

@@ -27,6 +27,8 @@ _TITLE_BLOCK = ("drawing number", "revision", "author", "material")
 _LONGEST_TEXT = 60
 _NAME = re.compile(r"[\w-][\w. -]{0,99}")
 _SIDE = or_none(number("a finite number; an open side is None"))
+_LONGER = 1.5
+"""How many times the asked time the least effort may take without a word of its own [-]."""
 _NUMBERS = ("one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 _ORDER = re.compile(rf"order of the first ({'|'.join(_NUMBERS)}|[1-9]\d?)")
 _UNTIL = Rule(
@@ -98,7 +100,8 @@ class Effort(NamedFields):
         Whether reports shall say that the run is a quick one.
     seconds
         About how long the ranking and the allocation may take together, by a stated number of units a second for each
-        kind of model: their units are scaled to it, and no clock is read, so that the same study has the same bits [s].
+        kind of model: their units are scaled to it, those of the quick effort where the full one takes longer, and no
+        clock is read, so that the same study has the same bits [s].
     until
         ``"order of the first three"``, any number of places: the blocks of a ranking grow until that order is stable,
         within a limit.
@@ -122,26 +125,43 @@ class Effort(NamedFields):
         said = self.until.split()[-1]
         return int(said) if said.isdigit() else _NUMBERS.index(said) + 1
 
-    def notes(self, model: Model) -> tuple[str, ...]:
-        """Return what a reader must know of the time that was asked for."""
+    def notes(self, model: Model, units: int) -> tuple[str, ...]:
+        """Return what a reader must know of the time that was asked for, of which so many units are made [-]."""
         if self.seconds is None:
             return ()
-        return (
-            f"units for about {self.seconds:,g} s at {model.stated_rate:,.0f} units a second, an assumed rate that no "
-            "clock corrects; four times as long halves the intervals of the indices",
-        )
+        rate = f"at {model.stated_rate:,.0f} units a second, an assumed rate that no clock corrects"
+        takes = units / model.stated_rate
+        if takes > _LONGER * self.seconds:
+            return (f"the least effort that has an answer, for about {takes:,.0f} s {rate}: {self.seconds:,g} s asked",)
+        return (f"units for about {self.seconds:,g} s {rate}; four times as long halves the intervals of the indices",)
 
     def of_ranking(self, model: Model, sources: int, kinds: int) -> RankingEffort:
         """Return how much a ranking may compute, one of so many questions that share the time [-]."""
-        effort = self.ranking.of_fast_model(sources) if is_fast(model) else self.ranking
+
+        def sized(effort: RankingEffort) -> RankingEffort:
+            return effort.of_fast_model(sources) if is_fast(model) else effort
+
+        effort = sized(self.ranking)
         if self.seconds is not None:
-            effort = effort.within(self.seconds / kinds * model.stated_rate, sources)
+            units = self.seconds / kinds * model.stated_rate
+            if self.ranking == RankingEffort() and units < effort.counted(sources):
+                effort = sized(QUICK_RANKING)
+            effort = effort.within(units, sources)
         return effort if self.places is None else effort.until_order(self.places)
 
     def of_allocation(self, model: Model, kinds: int) -> AllocationEffort:
         """Return how much an allocation may compute, one of so many questions that share the time [-]."""
-        effort = self.allocation.of_fast_model if is_fast(model) else self.allocation
-        return effort if self.seconds is None else effort.within(self.seconds / kinds * model.stated_rate)
+
+        def sized(effort: AllocationEffort) -> AllocationEffort:
+            return effort.of_fast_model if is_fast(model) else effort
+
+        effort = sized(self.allocation)
+        if self.seconds is None:
+            return effort
+        units = self.seconds / kinds * model.stated_rate
+        if self.allocation == AllocationEffort() and units < effort.counted:
+            effort = sized(QUICK_ALLOCATION)
+        return effort.within(units)
 
 
 QUICK = Effort(ranking=QUICK_RANKING, allocation=QUICK_ALLOCATION, is_quick=True)

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 _READ_BY_ALL = frozenset({"name", "questions", "effort", "title_block"})
 _JUDGED = 1024
 """Random units that say how the drawing stands as it is [-]."""
+_SHORT = 10.0
+"""Time up to which nobody is told how long it takes [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -281,6 +283,12 @@ def _tell_today(prepared: Prepared, progress: Progress) -> None:
     kept = prepared.kept_limits(_JUDGED)
     progress.advance(kept.joint.units)
     progress.tell(today_sentence(kept))
+    from tolalloc.reports.tellers.check import in_words
+    from tolalloc.study.duration import expected_seconds
+
+    seconds = expected_seconds(prepared)
+    if seconds > _SHORT:
+        progress.tell(f"What is asked takes about {in_words(seconds)} on this machine.")
 
 
 def cache_beside(folder: Path) -> ResultCache:

@@ -14,8 +14,6 @@ The relaxation of the zeros and ones to 0 ≤ z ≤ 1 is made of linear rows, al
 
 * where only one group adds, such as the values of the modification, the budget is known once it is chosen:
   Σ squares·z ≤ Σ (budget − worst_case)²·z over that group. The row is exact for whole z;
-* where several groups add and some add in quadrature, √(Σ squares·z) lies above its chord over a section of its range.
-  The range follows from the other rows and from the cost of an allowed choice; which section holds is one group more;
 * with the vector of groups v(z) = Σ √squares·z, u·v ≤ ‖v‖ for every unit vector u: rows Σ worst_case·z + u·v(z) ≤
   budget at the points that the linear program wants, until it keeps all stacks;
 * a choice that breaks a stack still breaks it where every group takes something that adds no less: one choice of this
@@ -27,7 +25,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -183,18 +180,14 @@ class ChoiceRows:
 
     def __init__(self, program: MultipleChoice) -> None:
         spent = np.maximum.reduceat(np.abs(program.cost), program.starts).sum()
-        self.scale = COSTS / spent if spent else 1.0
-        self._rows: list[Float[np.ndarray, " choice"]] = []
-        self._limits: list[float] = []
-        self._set_up(program)
-        self.mixed = [stack for stack in range(program.budget.size) if not self._add_exact(stack)]
-
-    def _set_up(self, program: MultipleChoice) -> None:
-        """Take what follows from the program alone."""
-        self.program = program
+        self.program, self.scale = program, COSTS / spent if spent else 1.0
         self.cost = program.cost * self.scale
         choices = np.arange(self.cost.size)
         self.one_each = csr_matrix((np.ones(choices.size), (program.group, choices)))
+        self._rows: list[Float[np.ndarray, " choice"]] = []
+        self._limits: list[float] = []
+        for stack in range(program.budget.size):
+            self._add_exact(stack)
 
     @property
     def matrix(self) -> Float[np.ndarray, "row choice"]:
@@ -216,7 +209,7 @@ class ChoiceRows:
         self._rows.append(row)
         self._limits.append(limit)
 
-    def _add_exact(self, stack: int) -> bool:
+    def _add_exact(self, stack: int) -> None:
         """Add the row that is exact for whole numbers, if the stack has one."""
         program = self.program
         worst_case, squares, budget = program.worst_case[stack], program.squares[stack], program.budget[stack]
@@ -229,9 +222,6 @@ class ChoiceRows:
             own = program.group == worst_case_groups[0]
             largest = np.max((budget - worst_case[own]) ** 2) or 1.0  # the row is of order one, like all others
             self.add((squares - np.where(own, (budget - worst_case) ** 2, 0.0)) / largest, 0.0)
-        else:
-            return False
-        return True
 
     def add_tangents(self, values: Float[np.ndarray, " choice"], allowed: float) -> bool:
         """Add a tangent for every stack that a point of the relaxation breaks by more than allowed [-], if any."""
@@ -259,50 +249,12 @@ class ChoiceRows:
         self.add_covers(taken)
         self.add_tangents((taken[self.program.group] == np.arange(self.cost.size)).astype(float), ROUNDING)
 
-    def chord(self, stack: int, start: float, end: float) -> tuple[Float[np.ndarray, " choice"], float]:
-        """Return the row and the limit of a stack with the chord of its root between two values [-].
-
-        √Q ≥ s + (Q − s²)/(s + e) for s² ≤ Q ≤ e², so Σ worst_case·z + Q/(s + e) ≤ budget − s + s²/(s + e).
-        """
-        slope = 1.0 / (start + end)
-        row = self.program.worst_case[stack] + slope * self.program.squares[stack]
-        return row, float(self.program.budget[stack] - start + slope * start**2)
-
-    def add_sections(self, stack: int, ends: Float[np.ndarray, " end"]) -> None:
-        """Add a group whose choice says between which ends a stack's root sum of squares lies, and the chords there."""
-        program, sections = self.program, ends.size - 1
-        chords = [self.chord(stack, *pair) for pair in pairwise(ends.tolist())]
-        none, nothing = np.zeros(sections), np.zeros((program.budget.size, sections))
-        larger = replace(
-            program,
-            group=np.append(program.group, np.full(sections, program.starts.size)),
-            cost=np.append(program.cost, none),
-            worst_case=np.hstack([program.worst_case, nothing]),
-            squares=np.hstack([program.squares, nothing]),
-        )
-        self._set_up(larger)
-        self._rows = [np.append(row, none) for row in self._rows]
-        self.add(np.append(program.squares[stack], -(ends[1:] ** 2)), 0.0)
-        self.add(np.append(-program.squares[stack], ends[:-1] ** 2), 0.0)
-        for at, (row, limit) in enumerate(chords):
-            # Beside its section a chord may lie above the root by as much as it does at the ends of the range.
-            slope = 1.0 / (ends[at] + ends[at + 1])
-            above = float(np.max((ends[[0, -1]] - ends[at]) * (slope * (ends[[0, -1]] + ends[at]) - 1.0)))
-            self.add(np.append(row, np.where(np.arange(sections) == at, above, 0.0)), limit + above)
-
-
-_SLACK = 1e-6
-"""What the smallest and largest sums of squares are widened by, above the linear program's own tolerance [-]."""
 
 _SETTLED = 1e-4
 """Violation up to which the linear program's answer keeps a stack [-]."""
 
 _CUTS = 30
 """Largest number of linear programs."""
-
-_SECTIONS = 4
-"""Sections of the range of a root sum of squares."""
-
 
 ProvenChoice = tuple[Int[np.ndarray, " group"], float, float]
 """What is taken out of every group, its cost, and a lower bound on the cost of every allowed choice [cost units]."""
@@ -337,7 +289,7 @@ class _ChoiceSearch:
         values, multipliers = self._relaxation()
         lift = self._lift(multipliers)
         self._offer(exchanged(self.program, values))
-        kept = self._divide(self.bound + lift <= self.cost + RELAXED * COSTS)
+        kept = self.bound + lift <= self.cost + RELAXED * COSTS
         is_infeasible = False
         while self.nodes_left > 0 and not is_infeasible:
             found, taken = self._decided(kept)
@@ -356,12 +308,11 @@ class _ChoiceSearch:
         cost = float(self.program.cost[self.best].sum())
         return self.best, cost, min(self.bound / self.rows.scale, cost)
 
-    def _offer(self, taken: Int[np.ndarray, " any_group"]) -> bool:
+    def _offer(self, taken: Int[np.ndarray, " group"]) -> bool:
         """Keep a choice if it is allowed and the cheapest so far; return whether it is allowed."""
-        own = taken[: self.program.starts.size]
-        allowed, cost = self.program.allows(own), float(self.rows.cost[own].sum())
+        allowed, cost = self.program.allows(taken), float(self.rows.cost[taken].sum())
         if allowed and cost < self.cost:
-            self.best, self.cost = own, cost
+            self.best, self.cost = taken, cost
         return allowed
 
     def _relaxation(self) -> tuple[Float[np.ndarray, " choice"], Float[np.ndarray, " row"]]:
@@ -387,47 +338,7 @@ class _ChoiceSearch:
         self.bound = float(least.sum() - multipliers @ self.rows.limits[:count])
         return np.asarray(value - least[self.program.group])
 
-    def _divide(self, kept: Bool[np.ndarray, " choice"]) -> Bool[np.ndarray, " more"]:
-        """Add the chords of every stack that several groups add to; return what is kept, with the sections.
-
-        Notes
-        -----
-        The range that is divided starts from the chord over a first one.
-        """
-        for stack in self.rows.mixed:
-            first = self._range(stack, kept)
-            if first is None:
-                continue
-            self.rows.add(*self.rows.chord(stack, *first))
-            second = self._range(stack, kept) or first
-            self.rows.add_sections(stack, np.linspace(*second, _SECTIONS + 1))
-            kept = np.append(kept, np.ones(_SECTIONS, dtype=bool))
-        return kept
-
-    def _range(self, stack: int, kept: Bool[np.ndarray, " more"]) -> tuple[float, float] | None:
-        """Return the least and largest root sum of squares of what may be cheaper, None where nothing is to divide."""
-        from scipy.optimize import linprog
-
-        rows, limits = self.rows.matrix, self.rows.relaxed_limits
-        if self.cost < np.inf:
-            rows = np.vstack([rows, self.rows.cost / COSTS])
-            limits = np.append(limits, self.cost / COSTS + RELAXED)
-        ends = []
-        for sign in (1.0, -1.0):
-            found = linprog(
-                sign * self.rows.program.squares[stack],
-                rows,
-                limits,
-                self.rows.one_each,
-                np.ones(self.rows.program.starts.size),
-                np.stack([np.zeros(kept.size), kept], axis=1),
-            )
-            if found.status != 0:
-                return None
-            ends.append(float(np.sqrt(max(sign * (found.fun - _SLACK), 0.0))))
-        return ends[0], ends[1]
-
-    def _decided(self, kept: Bool[np.ndarray, " more"]) -> tuple[WholeNumbers, Int[np.ndarray, " any_group"] | None]:
+    def _decided(self, kept: Bool[np.ndarray, " choice"]) -> tuple[WholeNumbers, Int[np.ndarray, " group"] | None]:
         """Return what the mixed-integer program of the choices that are left says, and which choices it takes."""
         rows, columns = self.rows, np.flatnonzero(kept)
         found = choose_whole_numbers(

@@ -11,6 +11,8 @@ FEWEST_FOR_YIELD = 1152
 """Units of a design in the shortest run: 1,109 just show the usual yield, 99.73 %, with 95 % confidence [-]."""
 _MOST_OF_DESIGN, _MOST_CONFIRMED = 2**16, 2**23
 """Units of a design, and those that confirm one, that memory holds however long a run may take [-]."""
+_OF_SEARCH, _OF_CONFIRMATION, _OF_FRONT = 1.5, 1.5, 0.7
+"""Time of a unit of a search, a confirmation and a front over that of one with all limited outputs [-]."""
 
 
 def _least(fewest: int) -> Rule:
@@ -107,8 +109,13 @@ class AllocationEffort(NamedFields):
 
     @property
     def counted(self) -> int:
-        """About how many units an allocation solves: steps of two searches, and its confirmation; own count [-]."""
-        return 2 * (self.search.steps + 2) * self.verification_units + 2 * self.confirmation_units
+        """About how many units with all limited outputs an allocation takes the time of [-].
+
+        Steps of its search, its confirmation and its front, as counted and timed in quick runs of shipped studies.
+        """
+        search = (self.search.steps + 2) * self.verification_units
+        front = len(self.front_limits) * (self.front_steps + 1) * self.front_units
+        return round(_OF_SEARCH * search + _OF_CONFIRMATION * self.confirmation_units + _OF_FRONT * front)
 
     def within(self, units: float) -> AllocationEffort:
         """Return this effort scaled to about so many units in all, each number at least what its stage needs.

@@ -40,14 +40,14 @@ class CheckedTime:
     @property
     def sentence(self) -> str:
         """The same in words."""
-        least, most = (_in_words(seconds) for seconds in self.seconds)
+        least, most = (in_words(seconds) for seconds in self.seconds)
         return f"{self.kind}: about {self.units[0]:,} to {self.units[1]:,} units, {least} to {most} here."
 
 
-def _in_words(seconds: float) -> str:
+def in_words(seconds: float) -> str:
     """Return a time as a person says it.
 
-    >>> _in_words(0.4), _in_words(42.0), _in_words(300.0), _in_words(9000.0)
+    >>> in_words(0.4), in_words(42.0), in_words(300.0), in_words(9000.0)
     ('1 s', '42 s', '5.0 min', '2.5 h')
     """
     if seconds < 90:
