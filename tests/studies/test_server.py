@@ -242,9 +242,21 @@ def test_turned_flanks_are_chosen_on_the_page_and_saved_with_the_study(tmp_path)
 def test_a_setting_outside_what_it_may_become_is_said_until_it_is_moved_inside(script):
     script.write_text(STUDY.replace("lower=0.0", "lower=0.02"), encoding="utf-8")
     desk = desk_of(script)
-    (said,) = ask(desk, "examined", design={})["sentences"]
+    (said,) = ask(desk, "examined", design={}, units=256)["sentences"]
     assert said.startswith("shim: 0.01 mm today, not among the 0.02…0.05 mm that it may become")
-    assert ask(desk, "examined", design={"settings": {"shim [mm]": 0.03}})["sentences"] == []
+    assert ask(desk, "examined", design={"settings": {"shim [mm]": 0.03}}, units=256)["sentences"] == []
+
+
+@pytest.mark.slow
+def test_what_a_check_says_of_preload_is_the_share_of_the_units_of_the_verdict():
+    desk = desk_of(Path(__file__).parents[2] / "studies" / "rv20e_allocation.py")
+    for units, clearance in ((256, 8.0), (1024, 8.0), (256, 3.0)):
+        design = {"settings": {"radial clearance [µm]": clearance}}
+        (broken,) = ask(desk, "units", design=design, units=units)["broken"].values()
+        said = " ".join(ask(desk, "examined", design=design, units=units)["sentences"])
+        assert f"Of {units:,} simulated reducers {broken:.1%} are preloaded".replace("%", " %") in said.replace(
+            "\u00a0", " "
+        )
 
 
 def test_a_saved_study_says_the_same_digits_and_overwrites_nothing(script, desk):

@@ -171,7 +171,7 @@ class Desk:
             "study": lambda _: self.session.described,
             "design": self._design,
             "units": self._units,
-            "examined": lambda sent: {"sentences": self.session.examined(self._read(sent))},
+            "examined": lambda sent: {"sentences": self.session.examined(self._read(sent), sent.get("units"))},
             "scaled": self._scaled,
             "scene": self._scene,
             "sweep": self._sweep,

@@ -103,6 +103,13 @@ def _numbers(sent: Any, key: str) -> Mapping[str, float]:
     return found
 
 
+def _count(units: object) -> int:
+    """Return a number of units that a request asks for."""
+    if not (type(units) is int and 1 <= units <= MOST):
+        raise InputError.at("page", "units", units, f"a whole number up to {MOST}")
+    return units
+
+
 def names_in(sent: Mapping[str, Any], key: str, known: Collection[str]) -> frozenset[str]:
     """Return the names that a request lists, none where it lists none."""
     found = sent.get(key, [])
@@ -208,10 +215,9 @@ class Session:
 
     def units(self, design: LiveDesign, count: object, wanted: Callable[[], bool]) -> dict[str, Any] | None:
         """Return what random units of a design say; nothing if they are not wanted any more."""
-        if not (type(count) is int and 1 <= count <= MOST):
-            raise InputError.at("page", "units", count, f"a whole number up to {MOST}")
-        values = self._solved(design, count, wanted)
-        return None if values is None else self._judged(design, values[:count])
+        number = _count(count)
+        values = self._solved(design, number, wanted)
+        return None if values is None else self._judged(design, values[:number])
 
     def _judged(self, design: LiveDesign, values: Float[np.ndarray, "unit output"]) -> dict[str, Any]:
         """Return the yield of all limits, and of each output its quantiles, its share and its histogram.
@@ -280,13 +286,14 @@ class Session:
         wanted = source.zone * factor
         return min((min(max(wanted, low), high) for low, high in held), key=lambda zone: abs(np.log(zone / wanted)))
 
-    def examined(self, design: LiveDesign) -> list[str]:
-        """Return what a check says of the settings and the first random units, such as how many are preloaded."""
+    def examined(self, design: LiveDesign, units: object) -> list[str]:
+        """Return what a check says of the settings and so many random units, such as how many are preloaded."""
+        count = _count(units)
         model, known = self.model(design), self.prepared.model.settings
         chosen = [replace(own, value=value) for own, value in zip(known, design.settings, strict=True)]
         beyond = [f"{own.sentence}." for own in chosen if own.out_of_bounds]
         beyond += [sentence for own in self.sources(design) if (sentence := outside_range(own))]
-        counted = model.examined(self.deviations(design, slice(0, FIRST)))
+        counted = model.examined(self.deviations(design, slice(0, count)))
         return [*beyond, *portrait_of(model).examination(counted).sentences]
 
     @property

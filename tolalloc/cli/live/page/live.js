@@ -104,11 +104,11 @@ async function count(units, record) {
 // More and more of the same units while the hand rests, then what stands behind them: ghosts, other limits, pinned designs.
 async function more(record) {
   if (!(await count(Math.min(1024, study.most), record))) return;
-  const said = await refusable(ask("examined", record));
-  if (said && record.turn === turn) at("cautions").replaceChildren(...said.sentences.map((text) => make("p", {}, text)));
+  await caution(record);
   await picture.follow();
   await haunt(record);
   if (!(await count(study.most, record))) return;
+  await caution(record);
   await scale(record);
   for (const own of designs.pinned) {
     if (own.units >= study.most || record.turn !== turn) continue;
@@ -116,6 +116,12 @@ async function more(record) {
     if (!told || told["called off"]) return;
     designs.refine(own, told);
   }
+}
+
+// What a check says of the units that are counted: the same ones as the verdict's, so that no share stands there twice.
+async function caution(record) {
+  const said = await refusable(ask("examined", { ...record, units: judged.units }));
+  if (said && record.turn === turn) at("cautions").replaceChildren(...said.sentences.map((text) => make("p", {}, text)));
 }
 
 // What stands behind curve and orders: the pinned designs, or the drawing.
