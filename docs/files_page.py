@@ -6,17 +6,15 @@ from collections.abc import Iterator
 from typing import Any
 
 from tolalloc.cli.start import KINDS, schema
+from tolalloc.reducers.families.known import FAMILIES
 
+_FAMILY = "`NAME.reducer.toml` with a table `[{table}]`; `tolalloc new --family {kind}` writes one."
 TITLES = {
+    **{
+        own.new.schema: (own.new.title, _FAMILY.format(table=own.record.table, kind=own.new.schema))
+        for own in FAMILIES.values()
+    },
     "reducer": ("Reducer", "`NAME.reducer.toml`: sizes, stiffness, modification and load; `tolalloc new` writes one."),
-    "rv-centre-gear": (
-        "RV reducer with centre gear",
-        "`NAME.reducer.toml` with a table `[centre_gear]`; `tolalloc new --family rv-centre-gear` writes one.",
-    ),
-    "single-stage": (
-        "Single-stage drive",
-        "`NAME.reducer.toml` with a table `[output_pins]`; `tolalloc new --family single-stage` writes one.",
-    ),
     "unit": ("One unit", "`NAME.unit.toml`: the part errors of one reducer, for `te` and `simulate`."),
     "stiffness": ("Identified stiffness", "`NAME.stiffness.toml`: `tolalloc identify --write` writes it."),
     "bench": ("Measurements", "`measurement.toml`: what a test bench has read, for `tolalloc identify`."),

@@ -22,7 +22,8 @@ from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.files import read_toml, shipped_or_path, validated
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.reducer.design import Reducer, at_torque
-from tolalloc.reducers.reducer.files import PRESETS, ReducerRecord
+from tolalloc.reducers.reducer.files import PRESETS
+from tolalloc.reducers.reducer.records import ReducerRecord
 
 __all__ = [
     "Clearance",

@@ -13,7 +13,9 @@ from tests.studies.command import refused, tolalloc
 from tolalloc.cli.main import app
 from tolalloc.cli.start import KINDS, schema
 from tolalloc.exceptions import TolallocError
-from tolalloc.reducers.reducer.files import PRESETS, ReducerRecord, load_reducer
+from tolalloc.reducers.families.known import family_of
+from tolalloc.reducers.reducer.files import PRESETS, load_reducer
+from tolalloc.reducers.reducer.records import ReducerRecord
 from tolalloc.wings.assembly.files import DATA, load_plan
 from tolalloc.wings.bench.measurements import load_measurements
 
@@ -67,7 +69,7 @@ def fits(value: object, own: dict, whole: dict) -> bool:
 @pytest.mark.parametrize(("kind", "path"), [(kind, path) for kind, own in SHIPPED.items() for path in own])
 def test_every_shipped_file_is_what_the_schema_allows(kind, path):
     content = tomllib.loads(path.read_text(encoding="utf-8"))
-    own = "single-stage" if "output_pins" in content else "rv-centre-gear" if "centre_gear" in content else kind
+    own = family_of(load_reducer(path)).new.schema if kind == "reducer" else kind
     assert fits(content, schema(own), schema(own))
 
 

@@ -59,7 +59,7 @@ def krol() -> Reducer:
         face_width=WIDTH,
     )
     steel = Material(elastic_modulus=200e9, poisson_ratio=0.3)
-    holes = replace(drive.holes, count=8, circle_radius=0.040, pin_radius=0.005, hole_radius=0.008)
+    holes = replace(drive.output_pins, count=8, circle_radius=0.040, pin_radius=0.005, hole_radius=0.008)
     return replace(drive, disc_count=1, output_pins=holes, disc_material=steel, pin_material=steel)
 
 
@@ -118,7 +118,9 @@ def test_readings_of_a_printed_drive_are_what_one_micrometre_on_the_flank_leaves
     stage = drive.cycloid_stage
     assert (stage.pin_count, stage.pin_circle_radius, stage.pin_radius, stage.eccentricity) == (30, 0.04, 0.0025, 0.001)
     exact = with_stage()
-    tight = replace(exact, output_pins=replace(drive.holes, hole_radius=drive.holes.pin_radius + stage.eccentricity))
+    tight = replace(
+        exact, output_pins=replace(drive.output_pins, hole_radius=drive.output_pins.pin_radius + stage.eccentricity)
+    )
     one = replace(tight, modification=replace(tight.modification, equidistant=1e-6))
     assert measured == pytest.approx(0.252, abs=1e-3)
     assert backlash(one) == pytest.approx(0.238, abs=2e-3)
@@ -128,7 +130,9 @@ def test_readings_of_a_printed_drive_are_what_one_micrometre_on_the_flank_leaves
 def test_play_of_discs_that_are_too_small_all_round():
     """2·0.05 mm over e·zc of 19.5 mm is 17.6′, here 17.8′; read were 1.36°: 81.6′, or 6.3′ if it was at the motor."""
     loose = with_stage(pin_count=14, disc_teeth=13, pin_circle_radius=0.034, pin_radius=0.0035, eccentricity=0.0015)
-    holes = replace(loose.holes, circle_radius=0.018, pin_radius=0.003, hole_radius=0.0045)  # assumed, without room
+    holes = replace(
+        loose.output_pins, circle_radius=0.018, pin_radius=0.003, hole_radius=0.0045
+    )  # assumed, without room
     loose = replace(loose, disc_count=1, output_pins=holes)
     loose = replace(loose, modification=replace(loose.modification, equidistant=50e-6))
     found = backlash(loose)

@@ -20,7 +20,8 @@ from tolalloc.reading.files import validated
 from tolalloc.reading.units import ARCMINUTE, DEGREE
 from tolalloc.reducers.equivalent.hysteresis import hysteresis_loop
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.reducer.files import PRESETS, ReducerRecord, load_reducer
+from tolalloc.reducers.reducer.files import PRESETS, load_reducer
+from tolalloc.reducers.reducer.records import ReducerRecord
 
 RIGIDITY, LOST_MOTION = (131.98, 125.55, 117.41), (0.364, 0.389, 0.412)  # N·m/arcmin, arcmin
 ANGLES = 3 * DEGREE * np.arange(3)

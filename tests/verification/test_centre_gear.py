@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -15,8 +15,9 @@ from tolalloc.reducers.equivalent.friction import friction_torques
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import Solved, forces
 from tolalloc.reducers.equivalent.perfect import perfect_reducer
+from tolalloc.reducers.families.centre_gear.design import CentreGearClearances, CentreGearReducer
 from tolalloc.reducers.reducer.bearings import loss_factor
-from tolalloc.reducers.reducer.design import CentreGearClearances, Reducer, interface_forces
+from tolalloc.reducers.reducer.design import Reducer, interface_forces
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.wings.motion.motion import inertia_of
 
@@ -182,12 +183,12 @@ def test_orders_are_turns_of_the_gears_per_turn_of_the_output(reducer):
         after = model.equilibria(unit_with(model, **{f"{part}__eccentricity__y": 8e-6}), -20.0, at).transmission_error
         found = order_spectrum(after - before)
         assert int(found.order[np.argmax(found.amplitude[0])]) == order
-        assert found.amplitude[0].max() == pytest.approx(8e-6 / (own.centre_pair.base_radius * 53), rel=1e-9)
+        assert found.amplitude[0].max() == pytest.approx(8e-6 / (own.centre_gear.base_radius * 53), rel=1e-9)
 
 
 def test_a_rigid_centre_gear_leaves_the_reducer_without_one(reducer):
     stiff = rigid(replace(reducer, stiffness=replace(reducer.stiffness, centre_mesh=RIGID)))
-    without = replace(stiff, centre_gear=None, stiffness=replace(stiff.stiffness, centre_mesh=0.0))
+    without = Reducer(**{own.name: getattr(stiff, own.name) for own in fields(Reducer)})
     at, found = np.linspace(0.0, 6.0, 7), []
     for own in (stiff, without):
         model = EquivalentModel(own)
@@ -202,7 +203,7 @@ def test_the_mesh_yields_as_statics_say(reducer):
     for stiffness in (own.stiffness.centre_mesh, RIGID):
         model = EquivalentModel(replace(own, stiffness=replace(own.stiffness, centre_mesh=stiffness)))
         found.append(float(model.equilibria(unit_with(model), torque, at).transmission_error[0, 0]))
-    lever = own.centre_pair.base_radius * own.sun_ratio
+    lever = own.centre_gear.base_radius * own.sun_ratio
     expected = torque / lever**2 * (1 / own.stiffness.centre_mesh - 1 / RIGID)
     assert found[0] - found[1] == pytest.approx(expected, rel=1e-6)
     solved = EquivalentModel(own).equilibria(unit_with(EquivalentModel(own)), torque, at)
@@ -220,7 +221,7 @@ def test_backlash_of_the_mesh_is_lost_motion_over_the_ratio(reducer, clearance):
         ends = [model.equilibria(unit_with(model), torque, np.array([0.3])) for torque in (-8.0, 8.0)]
         assert max(end.status.max() for end in ends) == 0
         twist.append(float(ends[1].transmission_error[0, 0] - ends[0].transmission_error[0, 0]))
-    free = 2 * clearance / (own.centre_pair.base_radius * own.sun_ratio)
+    free = 2 * clearance / (own.centre_gear.base_radius * own.sun_ratio)
     assert twist[1] - twist[0] == pytest.approx(free, rel=1e-6)
 
 
@@ -278,4 +279,4 @@ def test_what_knows_no_centre_gear_says_so_in_one_sentence(reducer):
     with pytest.raises(TolallocError, match="a centre gear is not moved in time"):
         inertia_of(reducer)
     with pytest.raises(TolallocError, match=r"this needs a table \[centre_gear\]"):
-        _ = load_reducer("rv20e").centre_pair
+        CentreGearReducer.of(load_reducer("rv20e"))

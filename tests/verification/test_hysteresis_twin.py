@@ -17,7 +17,8 @@ from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.perfect import exact_unit
 from tolalloc.reducers.reducer.design import Reducer
-from tolalloc.reducers.reducer.files import PRESETS, ReducerRecord, load_reducer
+from tolalloc.reducers.reducer.files import PRESETS, load_reducer
+from tolalloc.reducers.reducer.records import ReducerRecord
 
 ORDERS = (1, 2)
 ANGLES = np.array([0.41, 2.3, 0.0, 5.1])

@@ -46,12 +46,12 @@ def free_by_side(reducer: Reducer, side: int, angle: float) -> list[float]:
         own = reducer.modification
         gap = own.equidistant - own.shift * (1 - ratio * np.cos(phi)) / root
         turn = stage.disc_teeth  # the shaft is held: the disc turns about its centre
-        if not reducer.output_pins:  # the sun is held: cranks carry the centre around
+        if reducer.crank_count:  # the sun is held: cranks carry the centre around
             turn = stage.pin_count * reducer.ratio / (reducer.ratio - 1)
         way = side * eccentricity * turn * np.sin(phi) / root
         free = (gap[way > 1e-12] / way[way > 1e-12]).min()
-        if reducer.output_pins:
-            holes = reducer.holes
+        if not reducer.crank_count:
+            holes = reducer.output_pins
             at = angle + 2 * np.pi * np.arange(holes.count) / holes.count
             room = holes.hole_radius - holes.pin_radius - eccentricity
             free += room / (holes.circle_radius * (-side * np.sin(crank - at)).max())
@@ -91,7 +91,7 @@ RIGID = load_reducer("rv20e_liu2020").stiffness
 )
 def test_backlash_of_a_contact_is_that_of_the_whole_train(name, flank, radial):
     reducer = with_clearances(load_reducer(name), flank, radial)
-    if not reducer.output_pins:
+    if reducer.crank_count:
         reducer = replace(reducer, parts=(), stiffness=RIGID)
     found = contact_of(reducer, -reducer.load.rated_torque, phases=1)
     expected = free_rotation(reducer)

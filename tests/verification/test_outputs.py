@@ -202,7 +202,7 @@ def test_errors_of_gears_that_one_turn_cuts_are_one_wave_of_the_size_that_the_le
     design = load_reducer("rv27c")
     model = EquivalentModel(design)
     pitch_radius = design.sun_base_radius / cos(design.gears.pressure_angle)
-    radius = pitch_radius if column.startswith("sun") else design.centre_pair.base_radius
+    radius = pitch_radius if column.startswith("sun") else design.centre_gear.base_radius
     size = error / (radius * design.sun_ratio) / ARCSECOND
     (first, amplitude), *others = named(
         model, exact_unit(model) + error * (np.array(model.columns) == column), angles

@@ -14,6 +14,7 @@ from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.cycloid.tooth_profile import normals
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.outputs import attribute, forces
+from tolalloc.reducers.families.single_stage.design import SingleStageReducer
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import load_reducer
 
@@ -39,8 +40,8 @@ def random_unit(model: EquivalentModel, seed: int, size: float = 3e-6) -> np.nda
 def rigid(drive: Reducer, gap: float = 0.0, count: int = 8) -> Reducer:
     """Return the drive with stiff bearings, so that discs and carrier turn about their centres alone."""
     stiff = replace(drive.stiffness, shaft_support=RIGID, eccentric_bearing=RIGID, carrier_bearing=RIGID)
-    radius = drive.holes.pin_radius + drive.cycloid_stage.eccentricity + gap
-    return replace(drive, stiffness=stiff, output_pins=replace(drive.holes, hole_radius=radius, count=count))
+    radius = drive.output_pins.pin_radius + drive.cycloid_stage.eccentricity + gap
+    return replace(drive, stiffness=stiff, output_pins=replace(drive.output_pins, hole_radius=radius, count=count))
 
 
 class Plain:
@@ -48,7 +49,7 @@ class Plain:
 
     def __init__(self, model: EquivalentModel, errors: np.ndarray, angle: float) -> None:
         self.own, self.angle = dict(zip(model.columns, errors[0], strict=True)), angle
-        self.drive, self.stage, self.pins = model.reducer, model.reducer.cycloid_stage, model.reducer.holes
+        self.drive, self.stage, self.pins = model.reducer, model.reducer.cycloid_stage, model.reducer.output_pins
         self.orders = model.orders
 
     def vector(self, name: str) -> complex:
@@ -145,7 +146,7 @@ def test_equilibria_balance_all_forces_of_the_plain_geometry(model, seed, torque
     assert found.status.max() == 0
     own, retained = Plain(model, errors, angle), found.retained[0, 0]
     lever = np.ones(retained.size)
-    lever[2:-3:3], lever[-1] = model.reducer.cycloid_stage.disc_pitch_radius, model.reducer.holes.circle_radius
+    lever[2:-3:3], lever[-1] = model.reducer.cycloid_stage.disc_pitch_radius, model.reducer.output_pins.circle_radius
     q = retained / lever
     spring = model.reducer.stiffness
     journals = sum(
@@ -188,7 +189,7 @@ def test_a_pattern_of_pins_or_holes_that_is_turned_turns_the_output(drive):
             for axis, way in tangent.items()
         }
         after = model.equilibria(unit_with(model, **moved), -20.0, at).transmission_error
-        assert (after - before)[0, 0] == pytest.approx(sign * 4e-6 / drive.holes.circle_radius, rel=1e-9)
+        assert (after - before)[0, 0] == pytest.approx(sign * 4e-6 / drive.output_pins.circle_radius, rel=1e-9)
 
 
 def test_holes_without_room_share_the_torque_as_sines(drive):
@@ -200,7 +201,7 @@ def test_holes_without_room_share_the_torque_as_sines(drive):
     found = forces(model.equilibria(np.zeros((1, len(model.columns))), -40.0, np.array([angle])))
     pins = found.of("output_pin")[0, 0, :8]
     across = np.sin(2 * np.pi * np.arange(8) / 8)
-    expected = 4 * 20.0 / (8 * own.holes.circle_radius) * np.maximum(-across, 0.0)
+    expected = 4 * 20.0 / (8 * own.output_pins.circle_radius) * np.maximum(-across, 0.0)
     np.testing.assert_allclose(np.sort(pins), np.sort(expected), atol=0.02 * expected.max())
 
 
@@ -216,7 +217,7 @@ def test_room_in_the_holes_is_lost_motion(drive, gap):
             twist.append(float(np.diff([own.transmission_error[0, 0] for own in found])[0]))
         direction = [-29 * angle, -29 * angle + np.pi]
         best = [max(np.sin(side * (around + angle - own)).max() for own in direction) for side in (1, -1)]
-        free = sum(gap / (drive.holes.circle_radius * own) for own in best)
+        free = sum(gap / (drive.output_pins.circle_radius * own) for own in best)
         assert abs(twist[1] - twist[0]) == pytest.approx(free, rel=2e-3)
 
 
@@ -262,4 +263,4 @@ def test_what_only_an_rv_reducer_has_is_refused_in_one_sentence(drive):
     with pytest.raises(InputError, match="a single stage has neither sun nor planets"):
         _ = drive.gears
     with pytest.raises(InputError, match="has no output pins"):
-        _ = load_reducer("rv20e").holes
+        SingleStageReducer.of(load_reducer("rv20e"))

@@ -49,9 +49,8 @@ def new(
     chosen = Likeness(preset=preset_of(family, like), cranks=cranks, discs=discs)
     reducer, sources = NewFolder(place=name, like=chosen, samples=chosen.kinds(samples)).write()
     varied = sum(own.zone > 0 and not own.locked for own in sources)
-    drives = f"{reducer.crank_count} cranks" if reducer.crank_count else f"{reducer.drive_count} output pins"
     say(
-        f"{name}: {reducer.name} with {drives} and {reducer.disc_count} discs, like "
+        f"{name}: {reducer.name} with {reducer.drive_count} {reducer.driven_by} and {reducer.disc_count} discs, like "
         f"{chosen.preset}; {len(sources)} sources, of which {varied} may change."
     )
     say("Every zone and cost is assumed: open zones.xlsx and write your own.")

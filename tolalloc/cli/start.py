@@ -30,21 +30,18 @@ from tolalloc.reducers.equivalent.sources import ErrorSource
 from tolalloc.reducers.families.family import NewRows
 from tolalloc.reducers.families.known import FAMILIES, SOURCES, family_of
 from tolalloc.reducers.reducer.design import Modification, Reducer
-from tolalloc.reducers.reducer.files import (
-    CentreGearRecord,
-    IdentifiedStiffnessRecord,
-    ReducerRecord,
-    SingleStageRecord,
-    load_reducer,
-)
+from tolalloc.reducers.reducer.files import IdentifiedStiffnessRecord, load_reducer
 from tolalloc.reducers.unit_file import UnitRecord
 from tolalloc.study.sample import NewReducer, Sample
 from tolalloc.wings import wings
 
+
+def _just(record: type[BaseModel]) -> Callable[[], type[BaseModel]]:
+    return lambda: record
+
+
 KINDS: dict[str, Callable[[], type[BaseModel]]] = {
-    "reducer": lambda: ReducerRecord,
-    "rv-centre-gear": lambda: CentreGearRecord,
-    "single-stage": lambda: SingleStageRecord,
+    **{own.new.schema: _just(own.record) for own in FAMILIES.values()},
     "unit": lambda: UnitRecord,
     "stiffness": lambda: IdentifiedStiffnessRecord,
     **{kind: record for wing in wings() for kind, record in wing.schemas.items()},

@@ -183,7 +183,7 @@ def _settled(
 
 def _loads(reducer: Reducer, cases: Sequence[LoadCase], warmer: float) -> tuple[CaseLoads, ...]:
     """Return the loads of every load case, its discs warmer than the ring unless it states a temperature [K]."""
-    idle = IdleTorque.of(reducer).turning if reducer.first_stage else 0.0
+    idle = IdleTorque.of(reducer).turning if reducer.friction_dimensions.has_idle else 0.0
     time = sum(case.share for case in cases)
     return tuple(_loads_of(reducer, case, case.share / time, warmer, idle) for case in cases)
 

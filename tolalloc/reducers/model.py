@@ -256,8 +256,8 @@ class ReducerModel(Model):
 
     @property
     def stated_rate(self) -> float:
-        """Of the limited outputs of a reducer whose bearings yield, on two cores, or of one with output pins [1/s]."""
-        return 100.0 if self.reducer.output_pins else 500.0
+        """Of the limited outputs of a reducer of its family, its bearings yielding, on two cores [1/s]."""
+        return family_of(self.reducer).rate
 
     @property
     def differentiable(self) -> tuple[str, ...]:
@@ -476,7 +476,7 @@ class ReducerModel(Model):
         With either the pins' friction may take no more without load than the catalogue allows, where it states that:
         less what seals, grease and preloaded rollers take.
         """
-        pressed = self.reducer.parts or self.reducer.output_pins
+        pressed = self.reducer.parts or self.reducer.is_dimensioned
         limits = {PRELOAD: self.rated_pin_force} if pressed else {}
         catalogue = self.reducer.catalogue
         if catalogue and catalogue.no_load_torque:

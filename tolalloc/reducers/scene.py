@@ -27,7 +27,7 @@ from tolalloc.reducers.equivalent.condensation import (
 from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel, Status
 from tolalloc.reducers.equivalent.outputs import Forces, forces
 from tolalloc.reducers.equivalent.springs import Coordinates, Positions, SpringGroup
-from tolalloc.reducers.families.family import Place
+from tolalloc.reducers.families.family import Place, first_tooth
 from tolalloc.reducers.families.known import SOURCES, family_of
 from tolalloc.reducers.reducer.design import Reducer
 
@@ -317,7 +317,7 @@ def _motion(reducer: Reducer) -> tuple[dict[str, float], dict[str, list[float]]]
         "disc": [float(-still.disc_direction(disc)[0] / stage.disc_teeth) for disc in discs],
         "pin": [float(direction) for direction in still.pin_direction],
         "planet": [
-            _first_tooth(reducer.gears.sun_teeth, reducer.gears.planet_teeth, float(still.crank_position(crank)[0]))
+            first_tooth(reducer.gears.sun_teeth, reducer.gears.planet_teeth, float(still.crank_position(crank)[0]))
             for crank in cranks
         ],
         "sun": [float(still.sun_angle[0])],
@@ -330,19 +330,9 @@ def _motion(reducer: Reducer) -> tuple[dict[str, float], dict[str, list[float]]]
         "planet": turns(lambda at: at.crank_angle),
         "sun": turns(lambda at: at.sun_angle),
     }
-    if centre := reducer.centre_gear:
-        start |= {"centre": start["sun"], "pinion": [_first_tooth(centre.teeth, centre.pinion_teeth, 0.0)]}
-        rates |= {"centre": rates["sun"], "pinion": turns(lambda at: at.pinion_angle)}
+    for part, (angle, first) in family_of(reducer).turning(reducer).items():
+        start[part], rates[part] = [first], turns(angle)
     return rates, start
-
-
-def _first_tooth(teeth: int, others: int, direction: float) -> float:
-    """Return where the first tooth of a gear stands that meshes with another, such as the sun, from a direction [rad].
-
-    The gear has the number of others, the one in the middle, whose first tooth stands at 0, that of teeth.
-    """
-    ahead = direction * teeth / (2 * pi) % 1.0
-    return direction + pi + (ahead - 0.5) * 2 * pi / others
 
 
 def _magnification(reducer: Reducer, *states: States) -> float:

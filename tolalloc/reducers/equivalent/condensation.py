@@ -61,7 +61,7 @@ def rotation_scale(reducer: Reducer, coordinates: Coordinates) -> Float[np.ndarr
     Own derivation: x = ℓ·θ with ℓ = r_b2, r_d, and a_sp or a; any lever gives the same equilibrium.
     """
     scale = np.ones(coordinates.count)
-    if reducer.centre_gear:
+    if coordinates.input_turns:
         scale[coordinates.input + 2] = 1 / reducer.sun_base_radius
     for crank in range(reducer.crank_count):
         scale[coordinates.planet(crank) + 2] = 1 / reducer.planet_base_radius

@@ -14,10 +14,10 @@ from jaxtyping import Float
 from tolalloc.reducers.cycloid.tooth_profile import normals, pole_distance
 from tolalloc.reducers.equivalent.hysteresis import DRAWN, LOST_MOTION, HysteresisLoop, loop_torques
 from tolalloc.reducers.equivalent.model import Curves, EquivalentModel, Errors
-from tolalloc.reducers.equivalent.outputs import SINGLE, Forces, Solved, angles_of_pins
+from tolalloc.reducers.equivalent.outputs import MESHES, Forces, Solved, angles_of_pins
 from tolalloc.reducers.equivalent.springs import AtAngles
 from tolalloc.reducers.reducer.bearings import CRANK_BEARINGS, FrictionDimensions, loss_factor
-from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.design import Mesh, Reducer
 
 AtLevels = Float[np.ndarray, "sample level"]
 AtSteps = Float[np.ndarray, "sample step"]
@@ -128,17 +128,15 @@ def friction_torques(solved: Solved) -> dict[str, Curves]:
     for name in (*CRANK_BEARINGS, "carrier_bearing"):
         if getattr(dimensions, name) is not None:
             torques[name] = _bearing(reducer, dimensions, found, name)
-    if MESH not in dimensions.unknown and dimensions.contact_ratio is not None:
-        first, own = reducer.gears, reducer.centre_gear
-        loss = loss_factor(first.sun_teeth, first.planet_teeth, dimensions.contact_ratio)
-        # Seen from the carrier the sun turns by ratio − 1 per radian of the output.
-        transmitted = found.of(MESH).sum(axis=2) * reducer.sun_base_radius * (reducer.sun_ratio - 1.0)
-        torques[MESH] = reducer.friction.gear_mesh * loss * transmitted
-        if own and (contact_ratio := dimensions.centre_contact_ratio):
-            loss = loss_factor(own.pinion_teeth, own.teeth, contact_ratio)
-            transmitted = found.of("centre_mesh").sum(axis=2) * own.base_radius * reducer.sun_ratio
-            torques[MESH] += reducer.friction.gear_mesh * loss * transmitted
+    if MESH not in dimensions.unknown and reducer.meshes:
+        torques[MESH] = sum(_mesh(reducer, found, own, ratio) for own in reducer.meshes if (ratio := own.contact_ratio))
     return torques
+
+
+def _mesh(reducer: Reducer, found: Forces, own: Mesh, contact_ratio: float) -> Curves:
+    """Return the friction torque of gear meshes of one kind."""
+    transmitted = found.of(own.interface).sum(axis=2) * own.lever * own.turns
+    return np.asarray(reducer.friction.gear_mesh * loss_factor(*own.teeth, contact_ratio) * transmitted)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -310,13 +308,13 @@ def _disc_ways(
 def _mesh_force(solved: Solved) -> Float[np.ndarray, "sample angle mesh"]:
     """Return the force of every mesh along its line of action, with its sign, that of a centre gear last [N]."""
     found = solved.forces
-    return np.concatenate([found.vectors(name)[..., 0] for name in SINGLE if name in found.rows_of_stiffness], axis=2)
+    return np.concatenate([found.vectors(name)[..., 0] for name in MESHES if name in found.rows_of_stiffness], axis=2)
 
 
 def _mesh_way(solved: Solved) -> Float[np.ndarray, "sample angle mesh"]:
     """Return how far every mesh yields, its nominal clearance included [m]."""
     reducer, force = solved.equilibria.reducer, _mesh_force(solved)
-    names = (["gear_mesh"] * reducer.crank_count + ["centre_mesh"])[: force.shape[2]]
+    names = [own.interface for own in reducer.meshes for _ in range(own.count)]
     stiffness = np.array([getattr(reducer.stiffness, name) for name in names])
     clearance = np.array([reducer.clearance_of(name) for name in names])
     return np.asarray(force / stiffness + np.sign(force) * clearance)

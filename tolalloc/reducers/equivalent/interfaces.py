@@ -36,6 +36,10 @@ class Interface:
 
     rows: Callable[[Positions], SpringGroup]
     sources: tuple[ErrorSource, ...]
+    stiffness: str  # Field of `tolalloc.reducers.reducer.stiffness.Stiffness`
+    symbol: str = ""  # Of a stiffness that measured units may tell
+    called: str = ""  # In the names of outputs; nothing where the force in it is none of them
+    is_mesh: bool = False  # Whether it carries along one direction; the others carry x and y
 
 
 _STANDS_OFF = Characteristic("coaxiality", "how far an assembly stands off is drawn as coaxiality")
@@ -85,6 +89,8 @@ def sun_support(at: Positions) -> SpringGroup:
 
 SUN_SUPPORT = Interface(
     rows=sun_support,
+    stiffness="sun_support",
+    symbol="K_s",
     sources=(
         ErrorSource(
             name="sun.assembly", fixed=True, characteristic=_STANDS_OFF, shape="vector", place="sun", first_stage=True
@@ -122,7 +128,7 @@ def gear_mesh(at: Positions) -> SpringGroup:
         rows.displacement[:, crank, coordinates.input : coordinates.input + 2] = normal
         rows.displacement[:, crank, planet : planet + 2] = -normal
         rows.displacement[:, crank, planet + 2] = reducer.planet_base_radius
-        if reducer.centre_gear:
+        if coordinates.input_turns:
             rows.displacement[:, crank, coordinates.input + 2] = reducer.sun_base_radius
         # Pitch deviations, counter-clockwise about their own gear, lie along the pitch circle, so cos α of them along
         # the line of action. The teeth in mesh stand at P_i seen from the sun's centre and opposite to it seen from the
@@ -142,6 +148,10 @@ def gear_mesh(at: Positions) -> SpringGroup:
 
 GEAR_MESH = Interface(
     rows=gear_mesh,
+    stiffness="gear_mesh",
+    symbol="K_sp",
+    called="mesh",
+    is_mesh=True,
     sources=(
         eccentricity_source("sun"),
         ErrorSource(name="sun.pitch", shape="waves", place="sun.teeth", neglected="sun.pitch", first_stage=True),
@@ -225,6 +235,9 @@ def crank_disc(at: Positions) -> SpringGroup:
 
 CRANK_DISC = Interface(
     rows=crank_disc,
+    stiffness="crank_disc_bearing",
+    symbol="K_pd",
+    called="crank–disc bearing",
     sources=(
         ErrorSource(name="crank{i}.journal{j}.eccentricity", shape="vector", place="crank{i}.journal{j}"),
         ErrorSource(name="disc{j}.bore{i}.position", shape="vector", place="disc{j}.bore{i}"),
@@ -270,6 +283,9 @@ def crank_carrier(at: Positions) -> SpringGroup:
 
 CRANK_CARRIER = Interface(
     rows=crank_carrier,
+    stiffness="crank_carrier_bearing",
+    symbol="K_b",
+    called="crank–carrier bearing",
     sources=(
         ErrorSource(name="carrier.bore{i}.position", shape="vector", place="carrier.bore{i}"),
         clearance_source("carrier.bore{i}"),
@@ -298,6 +314,9 @@ def carrier_support(at: Positions) -> SpringGroup:
 
 CARRIER_SUPPORT = Interface(
     rows=carrier_support,
+    stiffness="carrier_bearing",
+    symbol="K_ca",
+    called="carrier bearing",
     sources=(
         ErrorSource(name="carrier.assembly", fixed=True, characteristic=_STANDS_OFF, shape="vector", place="carrier"),
         clearance_source("carrier", fixed=True),

@@ -23,25 +23,19 @@ from tolalloc.reducers.equivalent.interfaces import pin_contact
 from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel, Errors
 from tolalloc.reducers.equivalent.solvers.records import design_of
 from tolalloc.reducers.equivalent.springs import AtAngles, Positions, harmonic_waves
+from tolalloc.reducers.families.family import PIN_SHARE
+from tolalloc.reducers.families.known import INTERFACES, family_of
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.form import PartForm
 
-SINGLE = ("gear_mesh", "centre_mesh")
-"""Interfaces that carry along one direction; the others carry x and y."""
+MESHES = tuple(own.stiffness for own in INTERFACES if own.is_mesh)
+"""Interfaces that carry along one direction, named as in `Stiffness`; the others carry x and y."""
 _ROUNDING = 1e-4
 """Amplitude over the largest one below which an order is not named [-]."""
 _MULTIPLE, _OTHERS, _MOST = 936, 241, 20 * 936
 """Angles of a spectrum are a multiple of the first, a prime more for the curve that confirms it, and at most [-]."""
 _CONFIRMED = 0.1
 """Difference of a wave on either, over its amplitude, up to which it is believed [-]."""
-_BEARINGS = {
-    "crank–disc bearing": "crank_disc_bearing",
-    "crank–carrier bearing": "crank_carrier_bearing",
-    "eccentric bearing": "eccentric_bearing",
-    "output pin": "output_pin",
-    "carrier bearing": "carrier_bearing",
-}
-"""Bearing, or contact that carries as one, in words → the interface as in `Stiffness`."""
 TORQUE, CLEARANCE, CURVATURE = "torque", "nominal clearance", "curvature of the contact law"
 FORM = "form of flanks and pins"
 
@@ -67,7 +61,7 @@ class Forces:
         if own.start >= bilateral:
             return self.elements[:, :, own.start - bilateral : own.stop - bilateral]
         rows = self.rows[:, :, own]
-        if interface in SINGLE:
+        if interface in MESHES:
             return np.stack([rows, np.zeros_like(rows)], axis=-1)
         return rows.reshape(*rows.shape[:2], -1, 2)
 
@@ -202,13 +196,14 @@ Quantity = tuple[str, Callable[[Solved], Float[np.ndarray, " sample"]]]
 
 def bearings_of(reducer: Reducer) -> dict[str, str]:
     """Return what bearings a reducer has besides pins and teeth, in words, and the interface as in `Stiffness`."""
-    return {own: name for own, name in _BEARINGS.items() if getattr(reducer.stiffness, name)}
+    own = family_of(reducer).interfaces
+    return {each.called: each.stiffness for each in own if each.called and not each.is_mesh}
 
 
 def outputs_of(reducer: Reducer) -> dict[str, Quantity]:
     """Return every output of one solve, largest forces of those interfaces that the reducer has."""
-    named = {"mesh": "gear_mesh", "centre gear mesh": "centre_mesh"}
-    mesh = {own: name for own, name in named.items() if getattr(reducer.stiffness, name)}
+    known = family_of(reducer).interfaces
+    mesh = {own.called: own.stiffness for own in INTERFACES if own.is_mesh and own in known}
     return {
         "mean transmission error": ("arcsec", lambda own: own.equilibria.transmission_error.mean(axis=1) / ARCSECOND),
         "pins in contact on a disc, least": ("-", lambda own: own.pins_in_contact.min(axis=(1, 2)).astype(float)),
@@ -218,7 +213,7 @@ def outputs_of(reducer: Reducer) -> dict[str, Quantity]:
             f"largest {called} force": ("N", _interface_force(name))
             for called, name in (mesh | bearings_of(reducer)).items()
         },
-        "share of the pin force on the most loaded disc": ("-", lambda own: load_share(own.forces.pins).max(axis=1)),
+        PIN_SHARE: ("-", lambda own: load_share(own.forces.pins).max(axis=1)),
     }
 
 

@@ -37,8 +37,8 @@ class ErrorSource:
     name: str
     # What one deviation is: a number, a vector in the plane, or waves along a ring
     shape: Literal["number", "vector", "waves"] = "number"
-    # Whether every ``pin``, every ``tooth`` or every ``output pin`` (or its hole) has a deviation of its own
-    each: Literal["", "pin", "tooth", "output pin"] = ""
+    # Feature of which each has a deviation of its own, such as ``pin`` or ``tooth``, of `Reducer.like_features`
+    each: str = ""
     place: str = ""  # Where the picture shows it, as `tolalloc.reducers.scene.Place.id` says; nowhere if empty
     # What a vector becomes where half a turn carries the reducer into itself: its direction is ``reversed``, or
     # ``kept`` where it counts along the part's own radius or acts by its height between the discs
@@ -65,10 +65,7 @@ class ErrorSource:
 
     def count(self, reducer: Reducer) -> int:
         """Return how many like features each have a deviation of their own [-]."""
-        stage = reducer.cycloid_stage
-        if self.each == "output pin":
-            return reducer.holes.count
-        return {"": 1, "pin": stage.pin_count, "tooth": stage.disc_teeth}[self.each]
+        return reducer.like_features[self.each]
 
     @cached_property
     def pattern(self) -> re.Pattern[str]:

@@ -23,19 +23,16 @@ HARMONICS = (1, 2, 4)
 
 @dataclass(frozen=True)
 class Coordinates:
-    """Index of every displacement in the vector q: 2 + 3·cranks + 3·discs + 3 of them; a single stage has no crank.
-
-    A centre gear adds the rotation of the sun, which is given without one.
-    """
+    """Index of every displacement in the vector q: 2 + 3·cranks + 3·discs + 3 of them, and the input's turn if free."""
 
     crank_count: int
     disc_count: int
-    input_count: int = 2  # Of the sun or the input shaft
+    input_count: int = 2  # Of the sun or the input shaft, 3 where its rotation is not given
 
     @classmethod
     def of(cls, reducer: Reducer) -> Coordinates:
         """Return the layout of a reducer's displacements."""
-        return cls(reducer.crank_count, reducer.disc_count, 2 if reducer.centre_gear is None else 3)
+        return cls(reducer.crank_count, reducer.disc_count, reducer.input_count)
 
     @property
     def count(self) -> int:
@@ -44,8 +41,13 @@ class Coordinates:
 
     @property
     def input(self) -> int:
-        """First of the sun gear's, Xs and Ys, or of a single stage's input shaft [m], with a centre gear θs [rad]."""
+        """First of the sun gear's or input shaft's, Xs and Ys [m], and θs where it turns freely [rad]."""
         return 0
+
+    @property
+    def input_turns(self) -> bool:
+        """Whether the rotation of the input is a coordinate."""
+        return self.input_count == 3
 
     def planet(self, crank: int) -> int:
         """First of a planet's three, Xp and Yp [m] and θp [rad]."""
@@ -88,7 +90,7 @@ class Positions:
         return self.crank_angle + 2 * np.pi * disc / self.reducer.disc_count
 
     def crank_position(self, crank: int) -> AtAngles:
-        """P_i = θc + φ_i, the direction of a crank axis, or of an output pin, on the carrier [rad]."""
+        """P_i = θc + φ_i, the direction on the carrier of a crank axis, or of what else drives it [rad]."""
         return self.carrier_angle + 2 * np.pi * crank / self.reducer.drive_count
 
     def plane(self, disc: int) -> float:

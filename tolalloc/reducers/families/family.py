@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from math import pi
 from typing import Any
 
 from tolalloc.reducers.equivalent.interfaces import Interface
 from tolalloc.reducers.equivalent.sources import ErrorSource, ErrorSources
-from tolalloc.reducers.equivalent.springs import Positions, SpringGroup
+from tolalloc.reducers.equivalent.springs import AtAngles, Positions, SpringGroup
 from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.records import AnyReducerRecord
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +31,8 @@ HOUSING_PLACES = (
     Place(id="pins", label="pins", part="pins"),
 )
 """Of the housing with its pins, which all families have."""
+PIN_SHARE = "share of the pin force on the most loaded disc"
+"""Output of one solve, which all families have."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +47,17 @@ class NewRows:
     lost_motion: float  # Limit that its first study asks for [arcmin]
     priced: tuple[str, str, str]  # Patterns of sources that the sample of process costs prices
     schema: str  # Kind of its reducer files
+    title: str  # What they are called
     stiffer: str  # Stiffness whose true value the simulated bench differs in, a field of `Stiffness`
+
+
+def first_tooth(teeth: int, others: int, direction: float) -> float:
+    """Return where the first tooth of a gear stands that meshes with another, such as the sun, from a direction [rad].
+
+    The gear has the number of others, the one in the middle, whose first tooth stands at 0, that of teeth.
+    """
+    ahead = direction * teeth / (2 * pi) % 1.0
+    return direction + pi + (ahead - 0.5) * 2 * pi / others
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,12 +67,17 @@ class ReducerFamily:
     name: str
     interfaces: tuple[Interface, ...]  # All spring groups but the contact of pins and teeth
     contact_sources: tuple[ErrorSource, ...]  # What that contact declares
+    record: type[AnyReducerRecord]  # What its files hold
+    limited: tuple[str, ...]  # Outputs of one solve that a requirement may limit under the rated torque
+    rate: float  # Answers of limited outputs that two cores give [1/s]
     places: Callable[[Reducer], Iterable[Place]]  # In the picture, from the inside of the housing to the input
     identified: tuple[str, ...]  # Stiffnesses that measured units tell unless others are asked for, of `Stiffness`
     axes: Callable[[Reducer], dict[str, str]]  # Place of an axis in the picture → source whose vector moves it there
     # Radii and counts for the picture [mm, -], and what of them is an assumption of the drawing
     outlines: Callable[[Reducer], tuple[dict[str, Any], tuple[str, ...]]]
     new: NewRows
+    # Gears before the sun in the picture: part → what it turns by, and where its first tooth starts [rad]
+    turning: Callable[[Reducer], Mapping[str, tuple[Callable[[Positions], AtAngles], float]]] = lambda _: {}
 
     @cached_property
     def sources(self) -> ErrorSources:

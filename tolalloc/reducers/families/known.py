@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from tolalloc.reducers.equivalent.sources import ErrorSources
-from tolalloc.reducers.families.centre_gear import CENTRE_GEAR
+from tolalloc.reducers.families.centre_gear.family import CENTRE_GEAR
 from tolalloc.reducers.families.family import ReducerFamily
 from tolalloc.reducers.families.rv import RV
-from tolalloc.reducers.families.single_stage import SINGLE_STAGE
+from tolalloc.reducers.families.single_stage.family import SINGLE_STAGE
 from tolalloc.reducers.reducer.design import Reducer
 
 FAMILIES = {own.name: own for own in (RV, CENTRE_GEAR, SINGLE_STAGE)}
 """Name → family."""
+
+INTERFACES = tuple(dict.fromkeys(interface for own in FAMILIES.values() for interface in own.interfaces))
+"""Interfaces of all families."""
 
 SOURCES = ErrorSources(dict.fromkeys(kind for own in FAMILIES.values() for kind in own.sources.kinds))
 """Kinds of sources of all families, to be asked by a name alone: one name is one kind in all of them."""

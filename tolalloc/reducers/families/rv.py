@@ -15,9 +15,10 @@ from tolalloc.reducers.equivalent.interfaces import (
     PIN_SOURCES,
     SUN_SUPPORT,
 )
-from tolalloc.reducers.families.family import HOUSING_PLACES, NewRows, Place, ReducerFamily
+from tolalloc.reducers.families.family import HOUSING_PLACES, PIN_SHARE, NewRows, Place, ReducerFamily
 from tolalloc.reducers.reducer.bearings import RollingBearing
 from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.records import ReducerRecord
 
 
 def _places(reducer: Reducer) -> Iterator[Place]:
@@ -113,6 +114,9 @@ RV = ReducerFamily(
     name="RV",
     interfaces=(SUN_SUPPORT, GEAR_MESH, CRANK_DISC, CRANK_CARRIER, CARRIER_SUPPORT),
     contact_sources=PIN_SOURCES,
+    record=ReducerRecord,
+    limited=("largest pin force", "largest crank–disc bearing force", PIN_SHARE),
+    rate=500.0,
     places=_places,
     identified=("crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing"),  # as liu2020
     axes=_axes,
@@ -126,6 +130,7 @@ RV = ReducerFamily(
         lost_motion=1.0,
         priced=("disc?.bore?.position", "crank?.journal?.eccentricity", "pin.diameter"),
         schema="reducer",
+        title="Reducer",
         stiffer="crank_disc_bearing",
     ),
 )

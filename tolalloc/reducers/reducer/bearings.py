@@ -334,33 +334,20 @@ class FrictionDimensions:
     """Dimensions from which friction follows; none where a file states a stiffness instead."""
 
     contacts: ClassVar[tuple[str, ...]] = tuple(CONTACTS)  # Kinds of contact that have a coefficient of friction
+    has_idle: ClassVar[bool] = True  # Whether seals and grease count where the reducer turns under load
 
     crank_disc_bearing: RollingBearing | None = None  # One journal's
     crank_carrier_bearing: RollingBearing | None = None  # Both of one crankshaft as rows of one
     carrier_bearing: RollingBearing | None = None
     contact_ratio: float | None = None  # Of a sun–planet mesh [-]
-    # Of input pinion and centre gear, 0 in a reducer without one [-]
-    centre_contact_ratio: float | None = 0.0
 
     @property
     def unknown(self) -> tuple[str, ...]:
         """Kinds of contact whose friction does not follow from what the file states."""
-        meshes = (self.contact_ratio, self.centre_contact_ratio)
+        meshes = (value for name, value in vars(self).items() if "contact_ratio" in name)
         bearings = tuple(name for name, value in vars(self).items() if value is None and "contact_ratio" not in name)
         known = all(ratio is not None and ratio <= LARGEST_CONTACT_RATIO for ratio in meshes)
         return bearings if known else (*bearings, "gear_mesh")
-
-
-@dataclass(frozen=True, kw_only=True)
-class SingleStageFriction(FrictionDimensions):
-    """Those of a single stage, whose file states no bearing by its dimensions: pins and teeth alone are known."""
-
-    contacts: ClassVar[tuple[str, ...]] = ("pins",)
-
-    @property
-    def unknown(self) -> tuple[str, ...]:
-        """Kinds of contact whose friction does not follow from what the file states."""
-        return ("eccentric_bearing", "output_pin", "carrier_bearing")
 
 
 def loss_factor(first_teeth: int, second_teeth: int, contact_ratio: float) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import cos, lcm, sqrt
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from pydantic import Field
@@ -52,38 +52,6 @@ class FirstStage:
     # Module m and pressure angle α [m, rad]
     module: Annotated[float, Field(alias="module_mm", ge=0.1, le=20), times(MILLIMETRE)]
     pressure_angle: Annotated[float, Field(alias="pressure_angle_deg", ge=5, le=45), times(DEGREE)]
-
-
-@dataclass(frozen=True, kw_only=True)
-class CentreGear:
-    """Input pinion and outer toothing of the gear on a hollow shaft that carries the sun; table ``[centre_gear]``."""
-
-    # Numbers of teeth Z3 and Z4 [-]
-    pinion_teeth: Teeth
-    teeth: Teeth
-    # Module and pressure angle of the pair, spur gears [m, rad]
-    module: Annotated[float, Field(alias="module_mm", ge=0.1, le=20), times(MILLIMETRE)]
-    pressure_angle: Annotated[float, Field(alias="pressure_angle_deg", ge=5, le=45), times(DEGREE)]
-
-    @property
-    def base_radius(self) -> float:
-        """Base radius r_b4 of the outer toothing, m·Z4·cos(α)/2 [m]."""
-        return self.module * self.teeth * cos(self.pressure_angle) / 2
-
-
-@dataclass(frozen=True, kw_only=True)
-class OutputPins:
-    """Pins or rollers of the output in holes of the discs; table ``[output_pins]`` of a reducer file."""
-
-    count: Annotated[int, Field(ge=3, le=40)]  # Number n [-]
-    # Radius a of the circle that they stand on, r_o of a pin with its roller, R_h of a hole [m]
-    circle_radius: Annotated[float, Field(alias="circle_radius_mm", ge=2, le=900), times(MILLIMETRE)]
-    pin_radius: Annotated[float, Field(alias="pin_radius_mm", ge=0.1, le=100), times(MILLIMETRE)]
-    hole_radius: Annotated[float, Field(alias="hole_radius_mm", ge=0.1, le=200), times(MILLIMETRE)]
-
-    def gap(self, eccentricity: float) -> float:
-        """Return the nominal gap that a pin has towards the wall that it drives, R_h − r_o − e [m]."""
-        return self.hole_radius - self.pin_radius - eccentricity
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,7 +163,12 @@ class Modification:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Clearances:
+class NominalClearances:
+    """Nominal clearances of the bilateral interfaces of a family, named as in `Stiffness`; table ``[clearances]``."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clearances(NominalClearances):
     """Nominal clearance, half the play, of the bilateral interfaces, 0 where there is none; table ``[clearances]``."""
 
     # Half the normal backlash of a sun–planet mesh [m]
@@ -205,22 +178,6 @@ class Clearances:
     crank_carrier_bearing: Annotated[
         float, Field(alias="crank_carrier_bearing_um", ge=0, le=200), times(MICROMETRE)
     ] = 0.0
-    carrier_bearing: Annotated[float, Field(alias="carrier_bearing_um", ge=0, le=200), times(MICROMETRE)] = 0.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class CentreGearClearances(Clearances):
-    """Those of an RV reducer with a centre gear; table ``[clearances]``."""
-
-    # Half the normal backlash of input pinion and centre gear [m]
-    centre_mesh: Annotated[float, Field(alias="centre_mesh_um", ge=0, le=200), times(MICROMETRE)] = 0.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class SingleStageClearances:
-    """Nominal radial clearances of the bearings of a single stage, half the diametral ones; table ``[clearances]``."""
-
-    eccentric_bearing: Annotated[float, Field(alias="eccentric_bearing_um", ge=0, le=200), times(MICROMETRE)] = 0.0
     carrier_bearing: Annotated[float, Field(alias="carrier_bearing_um", ge=0, le=200), times(MICROMETRE)] = 0.0
 
 
@@ -247,8 +204,31 @@ class Catalogue:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Mesh:
+    """Gear meshes of one kind before the cycloid stage."""
+
+    interface: str  # Field of `Stiffness`
+    count: int  # Number of meshes [-]
+    teeth: tuple[int, int]  # Numbers of teeth of the pair [-]
+    contact_ratio: float | None  # Unless the file states a stiffness instead [-]
+    lever: float  # Base radius of the gear that is driven or drives the planets [m]
+    turns: float  # Its turns against what carries the pair, per turn of the output [-]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Reducer:
-    """Nominal design, materials, stiffness and load of one reducer; ``assumptions`` says what no source prints."""
+    """Nominal design, materials, stiffness and load of one reducer; ``assumptions`` says what no source prints.
+
+    It is that of an RV reducer; those of other families, `tolalloc.reducers.families`, say what is otherwise in them.
+    """
+
+    family: ClassVar[str] = "RV"  # Name of the family
+    driven_by: ClassVar[str] = "cranks"  # What drives the carrier
+    input_count: ClassVar[int] = 2  # Coordinates of sun or shaft; 3 where its rotation is not given [-]
+    unmoved: ClassVar[str] = ""  # What of it no equation of motion in time has
+    has_half_turn: ClassVar[bool] = True  # Whether half a turn may carry it into itself, as it does no pinion
+    is_dimensioned: ClassVar[bool] = False  # Whether dimensions say its preload, even where it has no `parts`
+    lacking: ClassVar[str] = ""  # What a reducer of another family lacks, in words
 
     name: str
     source: str
@@ -260,49 +240,38 @@ class Reducer:
     stiffness: Stiffness
     modification: Modification
     load: Load
-    clearances: Clearances | SingleStageClearances = field(default_factory=Clearances)
+    clearances: NominalClearances = field(default_factory=Clearances)
     # Parts that yield in series, of the interfaces whose stiffness follows from dimensions
     parts: tuple[Part, ...] = ()
     friction: Friction = field(default_factory=Friction)
     friction_dimensions: FrictionDimensions = field(default_factory=FrictionDimensions)
     catalogue: Catalogue | None = None
-    # Sun and planets of an RV reducer, pins of the output of a single stage: a reducer has the one or the other
-    first_stage: FirstStage | None = None
-    centre_gear: CentreGear | None = None  # Between motor and sun, of an RV reducer that has one
-    output_pins: OutputPins | None = None
+    first_stage: FirstStage | None = None  # Sun and planets
     assumptions: tuple[str, ...] = field(default=())
     # Free profile of the flanks, form of measured discs and pins; none unless stated
     form: PartForm | None = field(default=None, repr=False)
 
-    @property
-    def family(self) -> str:
-        """Name of the family, `tolalloc.reducers.families`."""
-        if self.output_pins is not None:
-            return "single stage"
-        return "RV" if self.centre_gear is None else "RV centre gear"
+    @classmethod
+    def of(cls, reducer: Reducer) -> Self:
+        """Return a reducer of this family or one made from it.
+
+        Raises
+        ------
+        InputError
+            It is of another one.
+        """
+        if not isinstance(reducer, cls):
+            raise InputError(f"reducer {reducer.name}: {cls.lacking}")
+        return reducer
 
     @property
     def gears(self) -> FirstStage:
         """Sun and planets."""
         if self.first_stage is None:
             raise InputError(
-                f"reducer {self.name}: a single stage has neither sun nor planets; this needs an RV reducer."
+                f"reducer {self.name}: a {self.family} has neither sun nor planets; this needs an RV reducer."
             )
         return self.first_stage
-
-    @property
-    def centre_pair(self) -> CentreGear:
-        """Input pinion and centre gear."""
-        if self.centre_gear is None:
-            raise InputError(f"reducer {self.name}: there is no centre gear; this needs a table [centre_gear].")
-        return self.centre_gear
-
-    @property
-    def holes(self) -> OutputPins:
-        """Output pins and the holes of the discs that they stand in."""
-        if self.output_pins is None:
-            raise InputError(f"reducer {self.name}: an RV reducer has no output pins; this needs a single stage.")
-        return self.output_pins
 
     def clearance_of(self, interface: str) -> float:
         """Return the nominal clearance of an interface, named as in `Stiffness`, 0 where there is none [m]."""
@@ -310,13 +279,13 @@ class Reducer:
 
     @property
     def drive_count(self) -> int:
-        """Number of cranks, or of output pins, that drive the carrier [-]."""
-        return self.output_pins.count if self.output_pins else self.crank_count
+        """Number of cranks, or of what else drives the carrier [-]."""
+        return self.crank_count
 
     @property
     def carrier_radius(self) -> float:
-        """Radius at which the carrier is driven, by cranks or by output pins [m]."""
-        return self.output_pins.circle_radius if self.output_pins else self.crank_circle_radius
+        """Radius at which the carrier is driven [m]."""
+        return self.crank_circle_radius
 
     @property
     def crank_circle_radius(self) -> float:
@@ -370,42 +339,56 @@ class Reducer:
 
     @property
     def ratio(self) -> float:
-        """Turns of the motor's shaft per turn of the carrier, the pin housing fixed [-].
-
-        That of the sun, −Z4/Z3 times as many where a pinion drives it by a centre gear.
-        """
-        gear = self.centre_gear
-        return -self.sun_ratio * gear.teeth / gear.pinion_teeth if gear else self.sun_ratio
+        """Turns of the motor's shaft per turn of the carrier, the pin housing fixed [-]."""
+        return self.sun_ratio
 
     @property
     def sun_ratio(self) -> float:
-        """Turns of the sun, or of a single stage's shaft, per turn of the carrier, the pin housing fixed [-].
+        """Turns of the sun per turn of the carrier, the pin housing fixed, 1 + (Z2/Z1)·zp [-]."""
+        return 1.0 + self.gears.planet_teeth / self.gears.sun_teeth * self.cycloid_stage.pin_count
 
-        1 + (Z2/Z1)·zp of an RV reducer's sun; −zc of a single stage's shaft, which turns against its output.
-        """
-        if self.first_stage is None:
-            return -float(self.cycloid_stage.disc_teeth)
-        return 1.0 + self.first_stage.planet_teeth / self.first_stage.sun_teeth * self.cycloid_stage.pin_count
+    @property
+    def sun_turns(self) -> Fraction:
+        """Turns of the sun beyond those of the carrier, per turn of it, exactly [-]."""
+        return Fraction(self.gears.planet_teeth * self.cycloid_stage.pin_count, self.gears.sun_teeth)
 
     @property
     def closing_turns(self) -> int:
         """Turns of the carrier after which every part is where it was [-]."""
-        if self.first_stage is None:
-            return 1
-        gears, centre = self.first_stage, self.centre_gear
-        sun = Fraction(gears.planet_teeth * self.cycloid_stage.pin_count, gears.sun_teeth)
-        motor = (1 + sun) * Fraction(centre.teeth, centre.pinion_teeth) if centre else sun
-        return lcm(sun.denominator, motor.denominator)
+        return self.sun_turns.denominator
+
+    @property
+    def input_orders(self) -> tuple[float, ...]:
+        """Waves per output turn that errors of sun and meshes make [-]."""
+        meshes = self.sun_ratio - 1.0
+        return (meshes, self.crank_count * meshes)
 
     @property
     def open_orders(self) -> tuple[float, ...]:
-        """Waves per output turn that errors of sun, centre gear and pinion make, as far as one turn cuts them [-]."""
-        meshes, housing = self.sun_ratio - 1.0, (self.sun_ratio, abs(self.ratio)) if self.centre_gear else ()
-        return tuple(own for own in (meshes, self.crank_count * meshes, *housing) if abs(own - round(own)) > 1e-9)
+        """Those of `input_orders` that one output turn cuts [-]."""
+        return tuple(own for own in self.input_orders if abs(own - round(own)) > 1e-9)
+
+    @property
+    def meshes(self) -> tuple[Mesh, ...]:
+        """Gear meshes before the cycloid stage: sun and planets, where the sun turns by i − 1 seen from the carrier."""
+        own = Mesh(
+            interface="gear_mesh",
+            count=self.crank_count,
+            teeth=(self.gears.sun_teeth, self.gears.planet_teeth),
+            contact_ratio=self.friction_dimensions.contact_ratio,
+            lever=self.sun_base_radius,
+            turns=self.sun_ratio - 1.0,
+        )
+        return (own,)
+
+    @property
+    def like_features(self) -> dict[str, int]:
+        """Kind of feature of which each has a deviation of its own → their number [-]."""
+        return {"": 1, "pin": self.cycloid_stage.pin_count, "tooth": self.cycloid_stage.disc_teeth}
 
     @property
     def contact_orders(self) -> tuple[int, int]:
-        """Waves per output turn that exact parts make: pins with teeth, pins with cranks or output pins [-].
+        """Waves per output turn that exact parts make: pins with teeth, pins with what drives the carrier [-].
 
         lcm(n, zp)·zc and lcm(n, n_drive)·zp with n discs, which all meet a pin at once where n divides the number.
         """
@@ -442,12 +425,10 @@ def interface_forces(reducer: Reducer, torque: float) -> dict[str, float]:
     crank = size / (reducer.crank_count * reducer.crank_circle_radius)
     tangential = crank / reducer.disc_count
     pins = size / (reducer.disc_count * reducer.crank_count * stage.eccentricity * stage.pin_count)
-    centre = reducer.centre_gear
     return {
         "crank_carrier_bearing": crank,
         "crank_disc_bearing": float(np.abs(tangential + pins * np.exp(1j * _PHASES)).mean()),
-        "gear_mesh": size / (reducer.sun_ratio * reducer.crank_count * reducer.sun_base_radius),
-        **({"centre_mesh": size / (reducer.sun_ratio * centre.base_radius)} if centre else {}),
+        **{own.interface: size / (reducer.sun_ratio * own.count * own.lever) for own in reducer.meshes},
         "sun_support": 0.0,
         "carrier_bearing": 0.0,
     }

@@ -40,6 +40,7 @@ from tolalloc.reducers.equivalent.outputs import (
     unit_pressure,
 )
 from tolalloc.reducers.equivalent.perfect import friction_torque_derivatives, pin_force_derivatives, preload
+from tolalloc.reducers.families.known import family_of
 from tolalloc.reducers.load_case import OverLoadCases
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.response.kernel import KernelResponse, Samples
@@ -47,14 +48,6 @@ from tolalloc.running.chunks import map_chunks
 
 Errors = Float[np.ndarray, "chunk all_columns"]
 Answer = tuple[Float[np.ndarray, "chunk output"], UInt8[np.ndarray, " chunk"]]
-_SHARE = "share of the pin force on the most loaded disc"
-_RV = ("largest pin force", "largest crank–disc bearing force", _SHARE)
-_FORCES = {
-    "RV": _RV,
-    "RV centre gear": _RV,
-    "single stage": ("largest pin force", "largest eccentric bearing force", "largest output pin force", _SHARE),
-}
-"""Family → outputs of one solve that a requirement may limit under the rated torque."""
 WITH_FRICTION = (EFFICIENCY, LOST_MOTION_WITH_FRICTION, HYSTERESIS_LOSS)
 """Outputs of the loop with friction."""
 Derived = tuple[Float[np.ndarray, " chunk"], Float[np.ndarray, "chunk all_columns"], UInt8[np.ndarray, " chunk"]]
@@ -103,7 +96,7 @@ def _load(kernel: KernelResponse, errors: Errors) -> Answer:
     model, torque = kernel.model, kernel.load_torque
     solved = Solved.of(model.at_torque(torque).equilibria(errors, torque, TURN_ANGLES))
     every = outputs_of(model.reducer)
-    own = [every[name][1](solved) for name in _FORCES[model.reducer.family]]
+    own = [every[name][1](solved) for name in family_of(model.reducer).limited]
     # At the deeper end of a tooth whose disc is tilted; the force spreads evenly where no disc is.
     line_load = peak_line_load(solved.equilibria, solved.forces)
     pressure = unit_pressure(solved.equilibria) * np.sqrt(line_load)
@@ -126,28 +119,22 @@ _PEAK_TO_PEAK = Reading(outputs=(PEAK_TO_PEAK,), read=_peak_to_peak)
 _LOOP = Reading(outputs=(LOST_MOTION, BACKLASH, TORSIONAL_STIFFNESS), read=_loop)
 _FRICTION_LOOP = Reading(outputs=(*_LOOP.outputs, *WITH_FRICTION), read=_friction_loop)
 
-_REQUIREMENTS = {
-    family: (
-        _PEAK_TO_PEAK,
-        _LOOP,
-        Reading(
-            outputs=(
-                *(f"{name}, rated torque [{'-' if name == _SHARE else 'N'}]" for name in names),
-                "largest line load, rated torque [N/mm]",
-                "peak pressure, rated torque [MPa]",
-            ),
-            read=_load,
-        ),
-        Reading(outputs=(PRELOAD, FRICTION_TORQUE), read=_preload),
-        Reading(outputs=(RADIAL_CLEARANCE,), read=_radial_clearance),
-    )
-    for family, names in _FORCES.items()
-}
-
 
 def requirements_of(reducer: Reducer) -> tuple[Reading, ...]:
     """Return what a requirement may limit without friction."""
-    return _REQUIREMENTS[reducer.family]
+    every = outputs_of(reducer)
+    under_load = (
+        *(f"{name}, rated torque [{every[name][0]}]" for name in family_of(reducer).limited),
+        "largest line load, rated torque [N/mm]",
+        "peak pressure, rated torque [MPa]",
+    )
+    return (
+        _PEAK_TO_PEAK,
+        _LOOP,
+        Reading(outputs=under_load, read=_load),
+        Reading(outputs=(PRELOAD, FRICTION_TORQUE), read=_preload),
+        Reading(outputs=(RADIAL_CLEARANCE,), read=_radial_clearance),
+    )
 
 
 def limited_outputs(reducer: Reducer) -> tuple[str, ...]:

@@ -12,17 +12,11 @@ from jaxtyping import Float
 
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import ARCSECOND
+from tolalloc.reducers.families.known import INTERFACES
 from tolalloc.reducers.reducer.design import Reducer
 
 SYMBOLS = {
-    "sun_support": "K_s",
-    "gear_mesh": "K_sp",
-    "crank_disc_bearing": "K_pd",
-    "crank_carrier_bearing": "K_b",
-    "carrier_bearing": "K_ca",
-    "shaft_support": "K_i",
-    "eccentric_bearing": "K_e",
-    "output_pin": "K_o",
+    **{own.stiffness: own.symbol for own in INTERFACES if own.symbol},
     "pin_contact": "C",
     "torque": "torque",
     "bias": "bias",

@@ -56,7 +56,7 @@ def _past(kind: ErrorSource, name: str) -> int:
 def has_half_turn(reducer: Reducer, columns: Sequence[str]) -> bool:
     """Return whether half a turn carries the reducer into itself, as it does no pinion, and these columns too."""
     even = reducer.disc_count == 2 and reducer.crank_count == 2 and reducer.cycloid_stage.pin_count % 2 == 0
-    even &= (reducer.form is None or not reducer.form.is_measured) and reducer.centre_gear is None
+    even &= (reducer.form is None or not reducer.form.is_measured) and reducer.has_half_turn
     return even and {_image(name, reducer) for name in columns} == set(columns)
 
 

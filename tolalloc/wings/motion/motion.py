@@ -120,7 +120,7 @@ def motion_of(
     >>> round(float(found.carrier_speed[-1]) * 60 / (2 * np.pi), 4)  # 525 rpm over a ratio of 81 [rpm]
     6.4815
     """
-    _without_centre_gear(reducer)
+    _require_motion(reducer)
     if not 0.0 < duration < np.inf:
         raise InputError.at("motion", "duration", duration, "a positive time")
     if steps < 1:
@@ -135,10 +135,10 @@ def motion_of(
     )
 
 
-def _without_centre_gear(reducer: Reducer) -> None:
-    """Raise where the motor drives the sun by a centre gear, whose own motion no equation of motion has."""
-    if reducer.centre_gear:
-        raise InputError(f"reducer {reducer.name}: a centre gear is not moved in time; this needs one without it.")
+def _require_motion(reducer: Reducer) -> None:
+    """Raise where a part of the reducer moves as no equation of motion says, such as a centre gear."""
+    if reducer.unmoved:
+        raise InputError(f"reducer {reducer.name}: {reducer.unmoved} is not moved in time; this needs one without it.")
 
 
 def nominal_acceleration(at: Positions, motion: Motion) -> Float[np.ndarray, "time coordinate"]:
@@ -217,7 +217,7 @@ def inertia_of(reducer: Reducer, density: float = 7850.0, output_inertia: float 
     >>> f"{found.disc:.3f} kg, {found.disc_moment:.3e} kg·m²"
     '1.101 kg, 2.049e-03 kg·m²'
     """
-    _without_centre_gear(reducer)
+    _require_motion(reducer)
     if not 0.0 <= output_inertia < np.inf:
         raise InputError.at("inertia", "output_inertia", output_inertia, "0 or a positive number")
     stage, gears = reducer.cycloid_stage, reducer.gears

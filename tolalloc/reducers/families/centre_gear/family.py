@@ -6,7 +6,7 @@ mesh of the pinion a spring group more; all behind the sun is the RV reducer as 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -14,8 +14,9 @@ import numpy as np
 
 from tolalloc.reading.units import MILLIMETRE
 from tolalloc.reducers.equivalent.interfaces import Interface, clearance_source, eccentricity_source
-from tolalloc.reducers.equivalent.springs import Positions, SpringGroup, SpringRows, turned, vector_columns
-from tolalloc.reducers.families.family import Place, ReducerFamily
+from tolalloc.reducers.equivalent.springs import AtAngles, Positions, SpringGroup, SpringRows, turned, vector_columns
+from tolalloc.reducers.families.centre_gear.design import CentreGearRecord, CentreGearReducer
+from tolalloc.reducers.families.family import Place, ReducerFamily, first_tooth
 from tolalloc.reducers.families.rv import RV
 from tolalloc.reducers.reducer.design import Reducer
 
@@ -31,7 +32,7 @@ def centre_mesh(at: Positions) -> SpringGroup:
 
     Own derivation, as liu2020's of sun and planets.
     """
-    gear, sun = at.reducer.centre_pair, at.coordinates.input
+    gear, sun = CentreGearReducer.of(at.reducer).centre_gear, at.coordinates.input
     line_of_action = np.pi / 2 + gear.pressure_angle
     normal, rows = np.array([np.cos(line_of_action), np.sin(line_of_action)]), SpringRows(at, 1)
     rows.displacement[:, 0, sun : sun + 3] = [*-normal, -gear.base_radius]
@@ -42,6 +43,9 @@ def centre_mesh(at: Positions) -> SpringGroup:
 
 CENTRE_MESH = Interface(
     rows=centre_mesh,
+    stiffness="centre_mesh",
+    called="centre gear mesh",
+    is_mesh=True,
     sources=(
         eccentricity_source("pinion"),
         eccentricity_source("centre", with_part=("sun", "outer.eccentricity")),
@@ -64,7 +68,7 @@ def _axes(reducer: Reducer) -> dict[str, str]:
 def _outlines(reducer: Reducer) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Return what the picture of an RV reducer needs, and pinion and centre gear with its hollow shaft [mm, -]."""
     outline, assumed = RV.outlines(reducer)
-    gear = reducer.centre_pair
+    gear = CentreGearReducer.of(reducer).centre_gear
     outline |= {
         "centre_teeth": gear.teeth,
         "pinion_teeth": gear.pinion_teeth,
@@ -77,6 +81,14 @@ def _outlines(reducer: Reducer) -> tuple[dict[str, Any], tuple[str, ...]]:
     return outline, (f"{assumed[0]}, hollow shaft", *assumed[1:])
 
 
+def _turning(reducer: Reducer) -> dict[str, tuple[Callable[[Positions], AtAngles], float]]:
+    gear = CentreGearReducer.of(reducer).centre_gear
+    return {
+        "centre": (lambda at: at.sun_angle, 0.0),
+        "pinion": (lambda at: at.pinion_angle, first_tooth(gear.teeth, gear.pinion_teeth, 0.0)),
+    }
+
+
 CENTRE_GEAR: ReducerFamily = replace(
     RV,
     name="RV centre gear",
@@ -84,12 +96,15 @@ CENTRE_GEAR: ReducerFamily = replace(
     places=_places,
     axes=_axes,
     outlines=_outlines,
+    record=CentreGearRecord,
+    turning=_turning,
     new=replace(
         RV.new,
         presets=("rv27c",),
         table="rv27c_drawing",
         diameter=136.0,
         schema="rv-centre-gear",
+        title="RV reducer with centre gear",
     ),
 )
 """An RV reducer whose sun is the second toothing of a centre gear; one mesh more, upstream of the sun."""

@@ -16,10 +16,15 @@ from tolalloc.reading.units import MILLIMETRE
 from tolalloc.reducers.equivalent.interfaces import CARRIER_SUPPORT, PIN_SOURCES, Interface, clearance_source, lever
 from tolalloc.reducers.equivalent.sources import ErrorSource, Nominal
 from tolalloc.reducers.equivalent.springs import Positions, SpringGroup, SpringRows, support, turned, vector_columns
-from tolalloc.reducers.families.family import HOUSING_PLACES, NewRows, Place, ReducerFamily
+from tolalloc.reducers.families.family import HOUSING_PLACES, PIN_SHARE, NewRows, Place, ReducerFamily
+from tolalloc.reducers.families.single_stage.design import OutputPins, SingleStageRecord, SingleStageReducer
 from tolalloc.reducers.reducer.design import Reducer
 
 _STANDS_OFF = Characteristic("coaxiality", "how far the shaft stands off is drawn as coaxiality")
+
+
+def _pins_of(reducer: Reducer) -> OutputPins:
+    return SingleStageReducer.of(reducer).output_pins
 
 
 def shaft_support(at: Positions) -> SpringGroup:
@@ -33,6 +38,8 @@ def shaft_support(at: Positions) -> SpringGroup:
 
 SHAFT_SUPPORT = Interface(
     rows=shaft_support,
+    stiffness="shaft_support",
+    symbol="K_i",
     sources=(
         ErrorSource(name="shaft.assembly", fixed=True, characteristic=_STANDS_OFF, shape="vector", place="shaft"),
     ),
@@ -63,6 +70,9 @@ def eccentric_bearing(at: Positions) -> SpringGroup:
 
 ECCENTRIC_BEARING = Interface(
     rows=eccentric_bearing,
+    stiffness="eccentric_bearing",
+    symbol="K_e",
+    called="eccentric bearing",
     sources=(
         ErrorSource(name="shaft.journal{j}.eccentricity", shape="vector", place="shaft.journal{j}"),
         ErrorSource(name="disc{j}.bore.position", shape="vector", place="disc{j}.bore"),
@@ -83,7 +93,8 @@ def output_pins(at: Positions) -> SpringGroup:
 
     Own derivation; the gap of one pin is the hole's radius less the pin's and the eccentricity.
     """
-    pins, discs, carrier, offset = at.reducer.holes, at.reducer.disc_count, at.coordinates.carrier, "output.offset"
+    pins, discs = _pins_of(at.reducer), at.reducer.disc_count
+    carrier, offset = at.coordinates.carrier, "output.offset"
     elements = list(np.ndindex(discs, pins.count))
     rows, with_carrier = SpringRows(at, 2 * len(elements)), turned(at.carrier_angle)
     for element, (disc, pin) in enumerate(elements):
@@ -114,6 +125,9 @@ def output_pins(at: Positions) -> SpringGroup:
 
 OUTPUT_PINS = Interface(
     rows=output_pins,
+    stiffness="output_pin",
+    symbol="K_o",
+    called="output pin",
     sources=(
         ErrorSource(name="output.pin.position", shape="vector", each="output pin", place="output.pins"),
         ErrorSource(name="disc{j}.hole.position", shape="vector", each="output pin", place="disc{j}.holes"),
@@ -121,13 +135,13 @@ OUTPUT_PINS = Interface(
             name="disc{j}.hole.radius",
             each="output pin",
             place="disc{j}.holes",
-            nominal=Nominal(said="its hole radius", of=lambda reducer: reducer.holes.hole_radius),
+            nominal=Nominal(said="its hole radius", of=lambda reducer: _pins_of(reducer).hole_radius),
         ),
         ErrorSource(
             name="output.pin.radius",
             each="output pin",
             place="output.pins",
-            nominal=Nominal(said="its output pin radius", of=lambda reducer: reducer.holes.pin_radius),
+            nominal=Nominal(said="its output pin radius", of=lambda reducer: _pins_of(reducer).pin_radius),
         ),
     ),
 )
@@ -150,7 +164,7 @@ def _places(reducer: Reducer) -> Iterator[Place]:
 
 def _axes(reducer: Reducer) -> dict[str, str]:
     """Return the axes as the picture names them: holes are the discs' bores, output pins stand in the carrier's."""
-    pins, discs = range(1, reducer.holes.count + 1), range(1, reducer.disc_count + 1)
+    pins, discs = range(1, _pins_of(reducer).count + 1), range(1, reducer.disc_count + 1)
     found = {f"carrier.bore{pin}": f"output.pin.position.{pin}" for pin in pins}
     for disc in discs:
         found[f"shaft.journal{disc}"] = f"shaft.journal{disc}.eccentricity"
@@ -160,7 +174,7 @@ def _axes(reducer: Reducer) -> dict[str, str]:
 
 def _outlines(reducer: Reducer) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Return radii and counts [mm, -] with names for the picture, and what of them is an assumption of the drawing."""
-    stage, pins = reducer.cycloid_stage, reducer.holes
+    stage, pins = reducer.cycloid_stage, _pins_of(reducer)
     circle, root = stage.pin_circle_radius, stage.pin_circle_radius - stage.eccentricity - stage.pin_radius
     bore = 0.8 * (pins.circle_radius - pins.hole_radius)
     lengths = {
@@ -193,6 +207,9 @@ SINGLE_STAGE = ReducerFamily(
     name="single stage",
     interfaces=(SHAFT_SUPPORT, ECCENTRIC_BEARING, OUTPUT_PINS, CARRIER_SUPPORT),
     contact_sources=PIN_SOURCES,
+    record=SingleStageRecord,
+    limited=("largest pin force", "largest eccentric bearing force", "largest output pin force", PIN_SHARE),
+    rate=100.0,
     places=_places,
     identified=("eccentric_bearing",),
     axes=_axes,
@@ -206,6 +223,7 @@ SINGLE_STAGE = ReducerFamily(
         lost_motion=2.0,
         priced=("disc?.hole.position", "shaft.journal?.eccentricity", "pin.diameter"),
         schema="single-stage",
+        title="Single-stage drive",
         stiffer="eccentric_bearing",
     ),
 )
