@@ -13,7 +13,7 @@ from tests.studies.command import refused, tolalloc
 from tolalloc.cli.main import app
 from tolalloc.cli.start import KINDS, schema
 from tolalloc.exceptions import TolallocError
-from tolalloc.reducers.families.known import family_of
+from tolalloc.reducers.families.known import FAMILIES, family_of
 from tolalloc.reducers.reducer.files import PRESETS, load_reducer
 from tolalloc.reducers.reducer.records import ReducerRecord
 from tolalloc.wings.assembly.files import DATA, load_plan
@@ -139,3 +139,12 @@ def test_kinds_are_those_of_the_help_and_another_is_refused():
     said = get_command(app).commands["schema"].params[0].help
     assert said == f"Kind of TOML file: {', '.join([*KINDS][:-1])} or {[*KINDS][-1]}."
     refused(tolalloc("schema", "bnch"), "bnch", "bench")
+
+
+def test_families_and_their_presets_are_those_of_the_help():
+    family, like = (own.help for own in get_command(app).commands["new"].params[1:3])
+    presets = {own.new.schema.replace("reducer", "rv"): ", ".join(own.new.presets) for own in FAMILIES.values()}
+    assert family == f"Family of reducers: {', '.join([*presets][:-1])} or {[*presets][-1]}; that of the preset."
+    first, *others = presets.items()
+    named = [first[1], *(f"{word}: {own}" for word, own in others)]
+    assert like == f"Preset that it is like: {'; '.join(named)}."

@@ -285,6 +285,7 @@ class AnyReducerRecord(Record):
     """What the files of all families state."""
 
     table: ClassVar[str]  # By which a file is known to be of the family
+    design: ClassVar[type[Reducer]]  # Of the family
 
     name: str
     source: str
@@ -343,7 +344,7 @@ class AnyReducerRecord(Record):
 class ReducerRecord(AnyReducerRecord):
     """A whole file of an RV reducer."""
 
-    table: ClassVar[str] = "first_stage"
+    table = "first_stage"
     design: ClassVar[type[Reducer]] = Reducer
 
     crank_count: Annotated[int, Field(ge=2, le=6)]

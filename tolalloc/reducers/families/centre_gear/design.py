@@ -125,7 +125,7 @@ class CentreGearStiffnessRecord(StiffnessRecord):
 class CentreGearRecord(ReducerRecord):
     """A whole file of an RV reducer with centre gear and hollow shaft, which has a table ``[centre_gear]``."""
 
-    table: ClassVar[str] = "centre_gear"
+    table = "centre_gear"
     design: ClassVar[type[Reducer]] = CentreGearReducer
 
     centre_gear: CentreGear

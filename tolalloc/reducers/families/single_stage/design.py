@@ -126,7 +126,8 @@ class SingleStageStiffnessRecord(Record):
 class SingleStageRecord(AnyReducerRecord):
     """A whole file of a single-stage drive, which has a table ``[output_pins]``."""
 
-    table: ClassVar[str] = "output_pins"
+    table = "output_pins"
+    design: ClassVar[type[Reducer]] = SingleStageReducer
 
     output_pins: OutputPins
     stiffness: SingleStageStiffnessRecord
@@ -151,10 +152,10 @@ class SingleStageRecord(AnyReducerRecord):
         self.require_catalogue(self.reducer())
         return self
 
-    def reducer(self) -> SingleStageReducer:
+    def reducer(self) -> Reducer:
         """Return the reducer in SI units."""
         stated = self.stated()
-        return SingleStageReducer(
+        return self.design(
             output_pins=self.output_pins,
             stiffness=self.stiffness.stiffness(stated["disc_material"], stated["pin_material"], self.cycloid_stage),
             friction_dimensions=SingleStageFriction(),
