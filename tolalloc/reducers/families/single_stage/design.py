@@ -154,9 +154,8 @@ class SingleStageRecord(AnyReducerRecord):
 
     def reducer(self) -> Reducer:
         """Return the reducer in SI units."""
-        stated = self.stated()
+        stated = self.stated() | {"output_pins": self.output_pins}
         return self.design(
-            output_pins=self.output_pins,
             stiffness=self.stiffness.stiffness(stated["disc_material"], stated["pin_material"], self.cycloid_stage),
             friction_dimensions=SingleStageFriction(),
             clearances=self.clearances,
