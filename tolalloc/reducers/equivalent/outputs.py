@@ -23,7 +23,6 @@ from tolalloc.reducers.equivalent.interfaces import pin_contact
 from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel, Errors
 from tolalloc.reducers.equivalent.solvers.records import design_of
 from tolalloc.reducers.equivalent.springs import AtAngles, Positions, harmonic_waves
-from tolalloc.reducers.families.family import PIN_SHARE
 from tolalloc.reducers.families.known import INTERFACES, family_of
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.form import PartForm
@@ -213,7 +212,7 @@ def outputs_of(reducer: Reducer) -> dict[str, Quantity]:
             f"largest {called} force": ("N", _interface_force(name))
             for called, name in (mesh | bearings_of(reducer)).items()
         },
-        PIN_SHARE: ("-", lambda own: load_share(own.forces.pins).max(axis=1)),
+        "share of the pin force on the most loaded disc": ("-", lambda own: load_share(own.forces.pins).max(axis=1)),
     }
 
 

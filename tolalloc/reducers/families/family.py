@@ -31,8 +31,6 @@ HOUSING_PLACES = (
     Place(id="pins", label="pins", part="pins"),
 )
 """Of the housing with its pins, which all families have."""
-PIN_SHARE = "share of the pin force on the most loaded disc"
-"""Output of one solve, which all families have."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +66,7 @@ class ReducerFamily:
     interfaces: tuple[Interface, ...]  # All spring groups but the contact of pins and teeth
     contact_sources: tuple[ErrorSource, ...]  # What that contact declares
     record: type[AnyReducerRecord]  # What its files hold
-    limited: tuple[str, ...]  # Outputs of one solve that a requirement may limit under the rated torque
+    limited: tuple[Interface, ...]  # Whose largest force under the rated torque a requirement may limit
     rate: float  # Answers of limited outputs that two cores give [1/s]
     places: Callable[[Reducer], Iterable[Place]]  # In the picture, from the inside of the housing to the input
     identified: tuple[str, ...]  # Stiffnesses that measured units tell unless others are asked for, of `Stiffness`

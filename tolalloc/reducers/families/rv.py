@@ -15,7 +15,7 @@ from tolalloc.reducers.equivalent.interfaces import (
     PIN_SOURCES,
     SUN_SUPPORT,
 )
-from tolalloc.reducers.families.family import HOUSING_PLACES, PIN_SHARE, NewRows, Place, ReducerFamily
+from tolalloc.reducers.families.family import HOUSING_PLACES, NewRows, Place, ReducerFamily
 from tolalloc.reducers.reducer.bearings import RollingBearing
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.records import ReducerRecord
@@ -115,7 +115,7 @@ RV = ReducerFamily(
     interfaces=(SUN_SUPPORT, GEAR_MESH, CRANK_DISC, CRANK_CARRIER, CARRIER_SUPPORT),
     contact_sources=PIN_SOURCES,
     record=ReducerRecord,
-    limited=("largest pin force", "largest crank–disc bearing force", PIN_SHARE),
+    limited=(CRANK_DISC,),
     rate=500.0,
     places=_places,
     identified=("crank_disc_bearing", "crank_carrier_bearing", "carrier_bearing"),  # as liu2020

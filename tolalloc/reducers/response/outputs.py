@@ -92,11 +92,17 @@ def _found(columns: list[Float[np.ndarray, " chunk"]]) -> Answer:
     return values, status.astype(np.uint8)
 
 
+def _under_load(reducer: Reducer) -> tuple[str, ...]:
+    """Return the outputs of one solve that a requirement may limit under the rated torque."""
+    forces = (f"largest {own.called} force" for own in family_of(reducer).limited)
+    return ("largest pin force", *forces, "share of the pin force on the most loaded disc")
+
+
 def _load(kernel: KernelResponse, errors: Errors) -> Answer:
     model, torque = kernel.model, kernel.load_torque
     solved = Solved.of(model.at_torque(torque).equilibria(errors, torque, TURN_ANGLES))
     every = outputs_of(model.reducer)
-    own = [every[name][1](solved) for name in family_of(model.reducer).limited]
+    own = [every[name][1](solved) for name in _under_load(model.reducer)]
     # At the deeper end of a tooth whose disc is tilted; the force spreads evenly where no disc is.
     line_load = peak_line_load(solved.equilibria, solved.forces)
     pressure = unit_pressure(solved.equilibria) * np.sqrt(line_load)
@@ -124,7 +130,7 @@ def requirements_of(reducer: Reducer) -> tuple[Reading, ...]:
     """Return what a requirement may limit without friction."""
     every = outputs_of(reducer)
     under_load = (
-        *(f"{name}, rated torque [{every[name][0]}]" for name in family_of(reducer).limited),
+        *(f"{name}, rated torque [{every[name][0]}]" for name in _under_load(reducer)),
         "largest line load, rated torque [N/mm]",
         "peak pressure, rated torque [MPa]",
     )

@@ -16,7 +16,7 @@ from tolalloc.reading.units import MILLIMETRE
 from tolalloc.reducers.equivalent.interfaces import CARRIER_SUPPORT, PIN_SOURCES, Interface, clearance_source, lever
 from tolalloc.reducers.equivalent.sources import ErrorSource, Nominal
 from tolalloc.reducers.equivalent.springs import Positions, SpringGroup, SpringRows, support, turned, vector_columns
-from tolalloc.reducers.families.family import HOUSING_PLACES, PIN_SHARE, NewRows, Place, ReducerFamily
+from tolalloc.reducers.families.family import HOUSING_PLACES, NewRows, Place, ReducerFamily
 from tolalloc.reducers.families.single_stage.design import OutputPins, SingleStageRecord, SingleStageReducer
 from tolalloc.reducers.reducer.design import Reducer
 
@@ -208,7 +208,7 @@ SINGLE_STAGE = ReducerFamily(
     interfaces=(SHAFT_SUPPORT, ECCENTRIC_BEARING, OUTPUT_PINS, CARRIER_SUPPORT),
     contact_sources=PIN_SOURCES,
     record=SingleStageRecord,
-    limited=("largest pin force", "largest eccentric bearing force", "largest output pin force", PIN_SHARE),
+    limited=(ECCENTRIC_BEARING, OUTPUT_PINS),
     rate=100.0,
     places=_places,
     identified=("eccentric_bearing",),
