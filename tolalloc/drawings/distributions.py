@@ -383,8 +383,8 @@ class Folded:
         return np.asarray(np.maximum(2.0 * self.symmetric.probability(value) - 1.0, 0.0))
 
 
-def smoothed(values: Float[np.ndarray, " part"], width: float) -> Mixture:
-    """Return the distribution of measured values, each widened to a normal one of this σ [half zone].
+def smoothed(values: Float[np.ndarray, " part"]) -> Mixture:
+    """Return the distribution of measured values, each widened to a normal one [half zone].
 
     The values are drawn together around their mean by as much, so that mean and standard deviation stay as measured.
 
@@ -392,13 +392,14 @@ def smoothed(values: Float[np.ndarray, " part"], width: float) -> Mixture:
     ----------
     Silverman, Density estimation for statistics and data analysis, 1986, section 6.4.1.
     """
+    width = _smoothing_width(values)
     shrink = 1.0 / sqrt(1.0 + (width / float(values.std())) ** 2)
     places = values.mean() + shrink * (values - values.mean())
     spread = shrink * width * NORMAL.reach
     return Mixture(NORMAL, tuple(Batch(weight=1.0, shift=float(place), spread=spread) for place in places))
 
 
-def smoothing_width(values: Float[np.ndarray, " part"]) -> float:
+def _smoothing_width(values: Float[np.ndarray, " part"]) -> float:
     """Return Silverman's width for the smoothing of measured values [unit of the values].
 
     References
@@ -415,5 +416,5 @@ def smoothed_magnitude(values: Float[np.ndarray, " part"]) -> Folded:
     The mean square stays the measured one; mean and standard deviation do as far as no part lies within the smoothing
     width of 0.
     """
-    batches = smoothed(values, smoothing_width(values)).batches
+    batches = smoothed(values).batches
     return Folded(Mixture(NORMAL, batches + tuple(replace(batch, shift=-batch.shift) for batch in batches)))

@@ -23,7 +23,6 @@ from tolalloc.drawings.distributions import (
     Marginal,
     smoothed,
     smoothed_magnitude,
-    smoothing_width,
 )
 from tolalloc.drawings.heads import split_header
 from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table
@@ -169,7 +168,7 @@ class MeasuredParts:
     def smoothed(self) -> Marginal:
         """Distribution of the parts themselves, smoothed [half zone]."""
         own = self.relative
-        return smoothed_magnitude(own) if self.are_radii else smoothed(own, smoothing_width(own))
+        return smoothed_magnitude(own) if self.are_radii else smoothed(own)
 
     @property
     def doubt(self) -> str:

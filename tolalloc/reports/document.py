@@ -126,9 +126,6 @@ def joined(title: str, subtitle: str, parts: Iterable[tuple[str, Document]], **m
         What is needed to repeat the run and to trust it.
     """
     sections: list[Section] = []
-    warnings: list[str] = []
-    assumptions: list[str] = []
-    summary: dict[str, Any] = {}
     drawn: set[str] = set()
     known: dict[str, pd.DataFrame] = {}
     reports = tuple(parts)
@@ -151,9 +148,6 @@ def joined(title: str, subtitle: str, parts: Iterable[tuple[str, Document]], **m
                     figures=tuple(replace(figure, name=figures[figure.name]) for figure in section.figures),
                 )
             )
-        warnings += document.warnings
-        assumptions += document.assumptions
-        summary[part] = document.summary
     # The report that has something for the first page comes first.
     leading_first = sorted(reports, key=lambda report: report[0] not in leading)
     sections.sort(key=lambda section: section.part != leading_first[0][1].title)
@@ -161,10 +155,10 @@ def joined(title: str, subtitle: str, parts: Iterable[tuple[str, Document]], **m
         title=title,
         subtitle=subtitle,
         answer=tuple(sentence for _, document in leading_first for sentence in document.answer),
-        warnings=_once(warnings),
+        warnings=_once(sentence for _, document in reports for sentence in document.warnings),
         sections=tuple(sections),
-        assumptions=tuple(dict.fromkeys(assumptions)),
-        summary=summary,
+        assumptions=tuple(dict.fromkeys(sentence for _, document in reports for sentence in document.assumptions)),
+        summary={part: document.summary for part, document in reports},
         seed=manifest.get("seed"),
         manifest=manifest,
         answers=tuple((document.title, document.answer) for _, document in leading_first) if len(reports) > 1 else (),

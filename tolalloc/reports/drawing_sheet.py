@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import asin, degrees
 from pathlib import Path
 from textwrap import wrap
@@ -79,7 +79,7 @@ class DrawingSheet:
     tables: tuple[SheetTable, ...] = ()
     sketches: tuple[SignSketch, ...] = ()
     notes: tuple[str, ...] = ()
-    title_block: tuple[tuple[str, str], ...] = field(default=())  # Label and value; an empty one is filled in by hand
+    title_block: tuple[tuple[str, str], ...] = ()  # Label and value; an empty one is filled in by hand
 
 
 def _letters(width: float, height: float) -> int:

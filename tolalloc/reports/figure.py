@@ -115,11 +115,11 @@ class HeatMap:
     name: str  # File name without ending
     title: str  # What it shows, as a sentence
     _: KW_ONLY
+    x_label: str = ""  # What the columns are
+    label: str  # What a cell says, with its unit
     # Names of the columns and the rows
     columns: Sequence[str]
     rows: Sequence[str]
-    x_label: str = ""  # What the columns are
-    label: str  # What a cell says, with its unit
     values: Sequence[Sequence[float]]  # One row of numbers per row; the darkest is the largest
 
     @property
@@ -149,30 +149,17 @@ def chart(figure: object) -> dict[str, Any]:
 
 @chart.register
 def _(figure: Figure) -> dict[str, Any]:
-    return {
-        "title": figure.title,
-        "x_label": figure.x_label,
-        "y_label": figure.y_label,
-        "series": [_series(item, figure) for item in figure.series],
-        "vertical": [[value, name] for value, name in figure.vertical],
-        "horizontal": [[value, name] for value, name in figure.horizontal],
-        "logarithmic": figure.logarithmic,
-        "logarithmic_x": figure.logarithmic_x,
-        "equal": figure.equal,
-    }
+    return _fields(figure) | {"series": [_series(item, figure) for item in figure.series]}
 
 
 @chart.register
 def _(figure: HeatMap) -> dict[str, Any]:
-    return {
-        "title": figure.title,
-        "x_label": figure.x_label,
-        "label": figure.label,
-        "columns": list(figure.columns),
-        "rows": list(figure.rows),
-        "values": [numbers(row) for row in figure.values],
-        "texts": figure.texts,
-    }
+    return _fields(figure) | {"values": [numbers(row) for row in figure.values], "texts": figure.texts}
+
+
+def _fields(figure: Figure | HeatMap) -> dict[str, Any]:
+    """Return what a figure states, without the name of its file."""
+    return {name: own for name, own in vars(figure).items() if name != "name"}
 
 
 def numbers(values: Iterable[object]) -> list[float | None]:

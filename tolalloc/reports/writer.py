@@ -250,11 +250,7 @@ def _write_page(document: Document, path: Path) -> None:
     """Write the page, all that it shows inside."""
     sections: list[dict[str, Any]] = [
         {
-            "part": section.part,
-            "heading": section.heading,
-            "first": section.first,
-            "folded": section.folded,
-            "paragraphs": section.paragraphs,
+            **vars(section),
             "figures": [_drawn_by(chart(figure)) for figure in section.figures],
             "tables": [_told_table(section, name, frame) for name, frame in section.tables],
         }

@@ -111,11 +111,6 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
         return (*model.reducer.assumptions, *unit, *self.left_out, *without)
 
     @property
-    def left_out(self) -> tuple[str, ...]:
-        """What binding the drawing to the reducer assumed."""
-        return self.model.left_out
-
-    @property
     def remarks(self) -> tuple[str, ...]:
         """Rigidity and lost motion beside the catalogue's."""
         sentence, _ = against_catalogue(self.model.reducer, self.model.exact_loop_in_force)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import isfinite
+from typing import TYPE_CHECKING, Any
 
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.reading.units import MICROMETRE, unit_of
@@ -12,6 +13,9 @@ from tolalloc.reports.header import Header
 from tolalloc.reports.tellers import allocation_sentences as texts
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import quantity
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 NAME = "answer"
 """Name of the sheet."""
@@ -69,9 +73,7 @@ class AnswerSheet:
         self.sheet.inner.conditional_format(place, {**rule, "stop_if_true": last})
 
 
-def add_answer(
-    book: Book, result: AllocationResult, header: Header, predicted: dict[str, Formula | float | None]
-) -> None:
+def add_answer(book: Book, result: AllocationResult, header: Header, watched: pd.DataFrame) -> None:
     """Write the sheet, on which the workbook opens.
 
     Parameters
@@ -80,8 +82,8 @@ def add_answer(
         It has no sheet yet, and gets ``drawing`` and ``requirements`` after this one.
     result, header
         The allocation, and what is said of its run.
-    predicted
-        What is limited, or the cost → what the other sheets predict of it, in their order.
+    watched
+        The table of ``requirements``: every limited side, and the cost.
     """
     rows, groups = AnswerSheet(book), len(result.drawn.groups)
     rows.across(texts.title(result, header))
@@ -91,7 +93,7 @@ def add_answer(
     rows.across(" ".join(texts.verdict(result)), name=_say("sheet_verdict"))
     rows.sheet.cell(3, 2, **(_GOOD if result.met and not texts.examined(result).fault else _BAD))
     _guard(rows, groups)
-    _limits(rows, result, header.cost_unit, predicted)
+    _limits(rows, result, watched)
     _amounts(rows, result)
     for at, text in enumerate(texts.warnings(result, header)):
         if at == 0:
@@ -118,43 +120,34 @@ def _guard(rows: AnswerSheet, groups: int) -> None:
         rows.rule(GUARD, condition, style, last=True)
 
 
-def _limits(
-    rows: AnswerSheet, result: AllocationResult, cost_unit: str, predicted: dict[str, Formula | float | None]
-) -> None:
+def _limits(rows: AnswerSheet, result: AllocationResult, watched: pd.DataFrame) -> None:
     """Write every limit beside what was verified and what the zones of the workbook would keep, and the cost."""
     held = result.model_range
     key = "sheet_range" if held.designs else "sheet_range_alone"
     rows.across(_say(key, low=1 / held.factor, high=held.factor, count=held.designs), name=_say("sheet_range_name"))
     rows.row += 1
     rows.line(*_say("sheet_limits").split("|"), bold=True)
-    first = rows.row + 1
-    for at, (side, off) in enumerate(zip(result.chosen.alone, held.off, strict=True), start=2):
-        name = side.stack.name
+    first, sides = rows.row + 1, result.chosen.alone
+    for at, (side, off) in enumerate(zip(sides, held.off, strict=True)):
         rows.line(
-            name,
+            side.stack.name,
             side.limit,
             side.value if isfinite(side.value) else None,
-            _linked("D", at, predicted[name]),
-            _linked("E", at, _kept(side.sign, side.limit, predicted[name])),
+            linked(watched, at, "D"),
+            linked(watched, at, "E"),
             off if isfinite(off) else None,
-            number={"mm": "0.0000", "in": "0.000000"}.get(unit_of(name), "0.00##"),
+            number={"mm": "0.0000", "in": "0.000000"}.get(unit_of(side.stack.name), "0.00##"),
         )
-    cost = f"cost [{cost_unit}]"
-    rows.line(cost, None, result.cost, _linked("D", len(result.chosen.alone) + 2, predicted[cost]), number="0.00")
+    rows.line(watched["what"].iloc[-1], None, result.cost, linked(watched, len(sides), "D"), number="0.00")
     place = f"E{first}:E{rows.row}"
     rows.rule(place, f'E{first}="yes"', _GOOD)
     rows.rule(place, f'AND(E{first}<>"",E{first}<>"yes")', _BAD)
 
 
-def _linked(column: str, row: int, held: Formula | float | str | None) -> Formula:
-    """Return a cell that shows one of the sheet ``requirements``."""
-    return Formula(f"=requirements!{column}{row}", held.value if isinstance(held, Formula) else held)
-
-
-def _kept(sign: int, limit: float, predicted: Formula | float | None) -> str:
-    """Return whether the limit is kept, as far as the models tell of the verified zones."""
-    value = predicted.value if isinstance(predicted, Formula) else predicted
-    return "yes" if isinstance(value, float) and sign * value <= sign * limit else "no"
+def linked(watched: pd.DataFrame, at: int, column: str) -> Formula:
+    """Return a cell that shows one of the sheet ``requirements``, by its place in the table and its column's letter."""
+    held: Any = watched.iloc[at, "ABCDE".index(column)]
+    return Formula(f"=requirements!{column}{at + 2}", held.value if isinstance(held, Formula) else held)
 
 
 def _amounts(rows: AnswerSheet, result: AllocationResult) -> None:

@@ -13,6 +13,8 @@ from tolalloc.allocation.front.uncertain_region import UncertainRegion
 from tolalloc.allocation.front.what_if import Robustness, SettingTrade
 from tolalloc.allocation.result import AllocationResult, limit_price, solver_noise, unit_quantile
 from tolalloc.allocation.search.candidates import GRADES
+from tolalloc.allocation.search.discrete import GradedAllocation
+from tolalloc.allocation.search.zone_allocation import ZoneAllocation
 from tolalloc.allocation.space.joint_yield import JointRequirement
 from tolalloc.allocation.space.problem import OneSidedConstraint
 from tolalloc.allocation.space.requirement import AtYield, Check
@@ -183,35 +185,28 @@ def tried_table(result: AllocationResult) -> Table[_Named]:
 
 def certificate_frame(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     """Return cost, lower bound and the cheapest design of the local model of every search."""
-    at_limits = f"cheapest by the local model, at the limits [{cost_unit}]"
-    rows: list[dict[str, object]] = [
+    found = list[tuple[str, ZoneAllocation | GradedAllocation, str, float, float, float]]()
+    for label, own in searches(result).items():
+        holds = "every drawing" if own.lower_bound.certified else "drawings near by"
+        at_limits, inside = own.optimum.cost + own.locked_cost, own.inside.cost + own.locked_cost
+        found.append((label, own, holds, at_limits, inside, own.optimum.gap))
+    if graded := result.graded:
+        at_limits = graded.solution.cost + graded.space.locked_cost
+        found.append((GRADES, graded, "choices near by", at_limits, np.nan, graded.solution.gap))
+    return pd.DataFrame(
         {
             "search": label,
-            f"verified cost [{cost_unit}]": found.chosen.cost,
-            f"lower bound, 95 % [{cost_unit}]": found.bound,
-            "verified cost above the lower bound [%]": found.gap * 100,
-            "lower bound holds for": "every drawing" if found.lower_bound.certified else "drawings near by",
-            at_limits: found.optimum.cost + found.locked_cost,
-            f"cheapest by the local model, inside [{cost_unit}]": found.inside.cost + found.locked_cost,
-            "gap of the convex program [-]": found.optimum.gap,
-            "designs verified [-]": len(found.tried),
+            f"verified cost [{cost_unit}]": search.chosen.cost,
+            f"lower bound, 95 % [{cost_unit}]": search.bound,
+            "verified cost above the lower bound [%]": (search.chosen.cost / search.bound - 1) * 100,
+            "lower bound holds for": holds,
+            f"cheapest by the local model, at the limits [{cost_unit}]": at_limits,
+            f"cheapest by the local model, inside [{cost_unit}]": inside,
+            "gap of the convex program [-]": gap,
+            "designs verified [-]": len(search.tried),
         }
-        for label, found in searches(result).items()
-    ]
-    if graded := result.graded:
-        rows.append(
-            {
-                "search": GRADES,
-                f"verified cost [{cost_unit}]": graded.chosen.cost,
-                f"lower bound, 95 % [{cost_unit}]": graded.bound,
-                "verified cost above the lower bound [%]": (graded.chosen.cost / graded.bound - 1) * 100,
-                "lower bound holds for": "choices near by",
-                at_limits: graded.solution.cost + graded.space.locked_cost,
-                "gap of the convex program [-]": graded.solution.gap,
-                "designs verified [-]": len(graded.tried),
-            }
-        )
-    return pd.DataFrame(rows)
+        for label, search, holds, at_limits, inside, gap in found
+    )
 
 
 def bounds_frame(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
@@ -266,7 +261,7 @@ def robustness_frame(result: AllocationResult, found: Robustness) -> pd.DataFram
     """Return how far every free zone moves when an assumption is wrong."""
     unit, length = length_unit(result.space.errors.sources)
     ratios, best = found.ratios, found.optimum * (result.space.first_zones / length)
-    return pd.DataFrame(
+    frame = pd.DataFrame(
         {
             "group": found.groups,
             f"free zone [{unit}]": best,
@@ -275,13 +270,12 @@ def robustness_frame(result: AllocationResult, found: Robustness) -> pd.DataFram
             "same from cost times [-]": [own.low for own in found.prices],
             "same to cost times [-]": [own.high for own in found.prices],
             "same in all": ["yes" if same else "no" for same in found.same],
-            **{
-                name: [getattr(own, end) for own in found.graded]
-                for name, end in (("graded same from cost times [-]", "low"), ("graded same to cost times [-]", "high"))
-                if found.graded
-            },
         }
     )
+    if found.graded:
+        frame["graded same from cost times [-]"] = [own.low for own in found.graded]
+        frame["graded same to cost times [-]"] = [own.high for own in found.graded]
+    return frame
 
 
 def variants_frame(found: Robustness, cost_unit: str) -> pd.DataFrame:

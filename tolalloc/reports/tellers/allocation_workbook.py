@@ -7,7 +7,7 @@ more: small changes of zones are judged well, large ones by ``tolalloc`` on unit
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from functools import singledispatch
 
 import numpy as np
@@ -23,7 +23,7 @@ from tolalloc.reports.excel import Book, Formula, Sheet, letter
 from tolalloc.reports.feature_frame import FINEST, FeatureFrame, writing_unit
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
-from tolalloc.reports.tellers.allocation_answer_sheet import add_answer
+from tolalloc.reports.tellers.allocation_answer_sheet import add_answer, linked
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import number as signed
 
@@ -46,6 +46,15 @@ _RESULT = {"bg_color": "#E2EFDA"}
 _WRAPPED = {"text_wrap": True, "valign": "top"}
 
 
+@dataclass(frozen=True)
+class _Line:
+    """A line of the drawing."""
+
+    name: str
+    source: Source  # The member that stands for all
+    group: str  # Group whose zone it has, or follows in the ratio of the tolerance table; empty where it is locked
+
+
 def add_calculator(book: Book, result: AllocationResult, header: Header, notes: Sequence[str]) -> None:
     """Add the sheets ``answer``, ``drawing`` (to change and to print) and ``requirements`` (how the limits follow).
 
@@ -58,70 +67,85 @@ def add_calculator(book: Book, result: AllocationResult, header: Header, notes: 
     notes
         What must be said with the zones.
     """
-    watched = _requirements(result, header.cost_unit)
-    add_answer(
-        book, result, header, dict(zip(map(str, watched["what"]), watched["predicted for the zones"], strict=True))
-    )
+    lines, watched = _lines(result), _requirements(result, header.cost_unit)
+    add_answer(book, result, header, watched)
     jointly = (_say("workbook_jointly"),) if result.chosen.jointly else ()
     below = (*notes, *_without_weight(result), *jointly, _say("workbook_change"), _say("workbook_models"))
-    _add_drawing(book, result, _drawing(result, header.cost_unit), watched, below)
+    sheet = book.table("drawing", _drawing(result, lines, header.cost_unit))
+    _mark(result, lines, sheet)
+    _below(sheet, watched, len(lines), below)
+    _lay_out(sheet, len(_WIDTHS) + 2 * len(result.chosen.alone))
     _add_requirements(book, watched)
 
 
-def _drawing(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
-    """Return one row per group, with what to write, what it costs and what it adds to every limited side."""
-    space, chosen = result.drawn, result.chosen
-    groups, callouts = len(space.groups), [_frame(result, _first_member(result, name)) for name in space.groups]
+def _lines(result: AllocationResult) -> list[_Line]:
+    """Return the lines as the sheet has them: one to change of each group, those that follow one, and locked ones."""
+    to_change = {
+        group: next(own for own in result.dimensions[group] if not own.locked) for group in result.drawn.groups
+    }
+    changed, following, locked = dict[str, _Line](), list[_Line](), list[_Line]()
+    for group, members in result.lines:
+        name, first = result.line_name((group, members)), members[0]
+        if group in to_change and to_change[group] in members:
+            changed[group] = _Line(name, to_change[group], group)
+        elif group in to_change and not first.locked:
+            following.append(_Line(name, first, group))
+        else:
+            locked.append(_Line(name, first, ""))
+    return [*(changed[group] for group in to_change), *following, *locked]
+
+
+def _drawing(result: AllocationResult, lines: Sequence[_Line], cost_unit: str) -> pd.DataFrame:
+    """Return one row per line: what to write, and of a group what it costs and what it adds to every limited side."""
+    space, chosen, reach = result.drawn, result.chosen, result.model_range.factor
     unit, length = length_unit(space.errors.sources)
     near = f"{_AS_VERIFIED * MICROMETRE / length:.12f}".rstrip("0")
-    scales, zones = chosen.design[:groups], space.first_zones * chosen.design[:groups] / length
-    rows, reach = range(_FIRST, _FIRST + groups), result.model_range.factor
-    made = [
-        feature.processes[at]
-        for feature, at in zip(space.features, space.process_positions(chosen.design), strict=True)
-    ]
-    table = pd.DataFrame(
-        {
-            "group": [_first_line(result, name) for name in space.groups],
-            f"zone to change [{unit}]": zones,
-            f"zone in the tolerance table [{unit}]": space.first_zones / length,
-            "scale [-]": [Formula(f"=B{row}/C{row}", scale) for row, scale in zip(rows, scales.tolist(), strict=True)],
-            f"smallest [{unit}]": space.first_zones * [process.minimum for process in made] / length,
-            f"largest [{unit}]": space.first_zones * [process.maximum for process in made] / length,
-            "inside": [
-                Formula(f'=IF(AND(B{row}>=E{row}-{near},B{row}<=F{row}+{near}),"yes","no")', "yes") for row in rows
-            ],
-            "process": chosen.processes,
-            f"cost [{cost_unit}]": [
-                Formula(
-                    f"={cost_formula(process.cost, f'D{row}')}+{number(process.change)}",
-                    float(process.total(np.array(scale))),
-                )
-                for process, row, scale in zip(made, rows, scales, strict=True)
-            ],
-            "characteristic": [_characteristic(result, _first_member(result, name)) for name in space.groups],
-            _write_head(result): [
-                _written(result, _first_member(result, name), row, zone, length)
-                for row, name, zone in zip(rows, space.groups, zones.tolist(), strict=True)
-            ],
-            "datum": [" ".join(own.datums) for own in callouts],
-            f"verified zone [{unit}]": zones,
-            f"weights hold from [{unit}]": zones / reach,
-            f"weights hold to [{unit}]": zones * reach,
-            "weights hold": [
-                Formula(f'=IF(AND(B{row}>=N{row}-{near},B{row}<=O{row}+{near}),"yes","no")', "yes") for row in rows
-            ],
-        }
-    )
-    for side in chosen.alone:
-        table[f"{side.stack.name}: added per scale [{unit_of(side.stack.name)}]"] = side.stack.worst_case + side.relief
-        table[f"{side.stack.name}: spread per scale [{unit_of(side.stack.name)}]"] = side.stack.root_sum_square
-    return pd.concat([table, *_lines_below(result)], ignore_index=True)
+    positions, first = space.process_positions(chosen.design), space.first_zones.tolist()
 
+    def stated(line: _Line, written: Formula | float) -> dict[str, object]:
+        head, datums = f"write [{writing_unit(result.drawn_sources)}]", _frame(result, line.source).datums
+        return {"characteristic": _characteristic(result, line.source), head: written, "datum": " ".join(datums)}
 
-def _write_head(result: AllocationResult) -> str:
-    """Return the head of what the drawing states."""
-    return f"write [{writing_unit(result.drawn_sources)}]"
+    rows = list[dict[str, object]]()
+    for at, (line, scale) in enumerate(zip(lines, chosen.scales.tolist(), strict=False)):
+        row, zone, process = _FIRST + at, first[at] * scale / length, space.features[at].processes[positions[at]]
+        cost = f"={cost_formula(process.cost, f'D{row}')}+{number(process.change)}"
+        rows.append(
+            {
+                "group": line.name,
+                f"zone to change [{unit}]": zone,
+                f"zone in the tolerance table [{unit}]": first[at] / length,
+                "scale [-]": Formula(f"=B{row}/C{row}", scale),
+                f"smallest [{unit}]": first[at] * process.minimum / length,
+                f"largest [{unit}]": first[at] * process.maximum / length,
+                "inside": Formula(f'=IF(AND(B{row}>=E{row}-{near},B{row}<=F{row}+{near}),"yes","no")', "yes"),
+                "process": chosen.processes[at],
+                f"cost [{cost_unit}]": Formula(cost, float(process.total(np.array(scale)))),
+                **stated(line, _written(result, line.source, row, zone, length)),
+                f"verified zone [{unit}]": zone,
+                f"weights hold from [{unit}]": zone / reach,
+                f"weights hold to [{unit}]": zone * reach,
+                "weights hold": Formula(f'=IF(AND(B{row}>=N{row}-{near},B{row}<=O{row}+{near}),"yes","no")', "yes"),
+            }
+        )
+        for side in chosen.alone:
+            name, added = side.stack.name, side.stack.worst_case + side.relief
+            rows[at][f"{name}: added per scale [{unit_of(name)}]"] = added[at]
+            rows[at][f"{name}: spread per scale [{unit_of(name)}]"] = side.stack.root_sum_square[at]
+    # The others add nothing to cost and limits.
+    for row, line in enumerate(lines[len(rows) :], start=_FIRST + len(rows)):
+        own, zone = line.source, line.source.zone / length
+        shown: dict[str, object] = {"group": line.name, f"zone to change [{unit}]": zone}
+        if line.group:
+            at = space.groups.index(line.group)
+            ratio = number(own.zone / lines[at].source.zone)
+            shown[f"zone to change [{unit}]"] = Formula(f"=B{_FIRST + at}*{ratio}", zone)
+            rows.append({**shown, **stated(line, _written(result, own, row, zone, length))})
+        else:
+            half = own.zone / 2 if _frame(result, own).is_deviation else own.zone
+            written = rounded_down(half, FINEST[own.length_name][0]) / LENGTHS[own.length_name]
+            rows.append({**shown, "inside": _say("workbook_locked"), **stated(line, written)})
+    return pd.DataFrame(rows)
 
 
 def _frame(result: AllocationResult, source: Source) -> FeatureFrame:
@@ -139,68 +163,6 @@ def _characteristic(result: AllocationResult, source: Source) -> str:
     if frame.is_deviation and source.middle:
         where = f"about nominal {signed(source.middle / LENGTHS[unit], '+.5f')} {unit}"
     return " ".join(filter(None, (frame.symbol, frame.characteristic, where)))
-
-
-def _further(result: AllocationResult) -> list[tuple[str, tuple[Source, ...]]]:
-    """Return the lines of the drawing whose zone follows that of another line, in the ratio of the tolerance table."""
-    first = [_first_member(result, name) for name in result.drawn.groups]
-    return [
-        line
-        for line in result.lines
-        if line[0] in result.drawn.groups and not line[1][0].locked and not any(own in line[1] for own in first)
-    ]
-
-
-def _first_member(result: AllocationResult, group: str) -> Source:
-    """Return the member of a group whose zone is the one to change."""
-    return next(own for own in result.dimensions[group] if not own.locked)
-
-
-def _first_line(result: AllocationResult, group: str) -> str:
-    """Return the name of the line of a group whose zone is changed."""
-    first = _first_member(result, group)
-    return result.line_name(next(line for line in result.lines if first in line[1]))
-
-
-def _others(result: AllocationResult) -> list[tuple[str, tuple[Source, ...]]]:
-    """Return the lines of the drawing whose zones are locked."""
-    changed = {_first_line(result, name) for name in result.drawn.groups}
-    changed |= {result.line_name(line) for line in _further(result)}
-    return [line for line in result.lines if result.line_name(line) not in changed]
-
-
-def _line_row(
-    result: AllocationResult, line: tuple[str, tuple[Source, ...]], zone: Formula | float, stated: Formula | float
-) -> dict[str, object]:
-    """Return the row of a line below the groups: its zone, and what the drawing states of it."""
-    own, (unit, _) = line[1][0], length_unit(result.space.errors.sources)
-    return {
-        "group": result.line_name(line),
-        f"zone to change [{unit}]": zone,
-        "characteristic": _characteristic(result, own),
-        _write_head(result): stated,
-        "datum": " ".join(_frame(result, own).datums),
-    }
-
-
-def _lines_below(result: AllocationResult) -> list[pd.DataFrame]:
-    """Return one row for every line whose zone follows that of its group, which adds nothing to cost and limits.
-
-    And one for every line whose zones are locked, for the drawing to be whole. Nothing without any.
-    """
-    first = {name: _FIRST + at for at, name in enumerate(result.drawn.groups)}
-    rows, (_, length) = [], length_unit(result.space.errors.sources)
-    for row, (name, members) in enumerate(_further(result), start=_FIRST + len(first)):
-        own, zone = members[0], members[0].zone / length
-        ratio = number(own.zone / _first_member(result, name).zone)
-        followed, stated = Formula(f"=B{first[name]}*{ratio}", zone), _written(result, own, row, zone, length)
-        rows.append(_line_row(result, (name, members), followed, stated))
-    for line in _others(result):
-        own = line[1][0]
-        half = own.zone / 2 if _frame(result, own).is_deviation else own.zone
-        written = rounded_down(half, FINEST[own.length_name][0]) / LENGTHS[own.length_name]
-        rows.append({**_line_row(result, line, own.zone / length, written), "inside": _say("workbook_locked")})
-    return [pd.DataFrame(rows)] if rows else []
 
 
 def _written(result: AllocationResult, source: Source, row: int, zone: float, shown: float) -> Formula:
@@ -265,21 +227,13 @@ def _requirements(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     return pd.DataFrame([*watched, {"what": f"cost [{cost_unit}]", "predicted for the zones": total}])
 
 
-def _add_drawing(
-    book: Book, result: AllocationResult, frame: pd.DataFrame, watched: pd.DataFrame, below: tuple[str, ...]
-) -> None:
-    """Make a table a drawing: cells to change marked and guarded, cost, limits and notes below."""
-    sheet = book.table("drawing", frame)
-    _mark(result, sheet)
-    for row, name in enumerate(frame["group"], start=_FIRST):
-        sheet.cell(row, 1, **_WRAPPED)
-        sheet.height(row, _LINE * (1 + len(str(name)) // _NAMES))
-    _below(sheet, watched, len(frame), below)
-    sheet.height(1, 4 * _LINE)
-    for column in range(1, frame.shape[1] + 1):
-        sheet.width(column, _WIDTHS[column - 1] if column < _WEIGHTS else 16)
-    sheet.inner.freeze_panes(1, 2)
-    sheet.inner.print_area(f"A1:{letter(_WEIGHTS - 1)}{sheet.rows}")
+def _lay_out(drawing: Sheet, columns: int) -> None:
+    """Set heights and widths of the drawing, and what of it is printed."""
+    drawing.height(1, 4 * _LINE)
+    for column in range(1, columns + 1):
+        drawing.width(column, _WIDTHS[column - 1] if column < _WEIGHTS else 16)
+    drawing.inner.freeze_panes(1, 2)
+    drawing.inner.print_area(f"A1:{letter(_WEIGHTS - 1)}{drawing.rows}")
 
 
 def _add_requirements(book: Book, watched: pd.DataFrame) -> None:
@@ -295,9 +249,9 @@ def _add_requirements(book: Book, watched: pd.DataFrame) -> None:
     sheet.inner.print_area(f"A1:E{sheet.rows}")
 
 
-def _mark(result: AllocationResult, drawing: Sheet) -> None:
+def _mark(result: AllocationResult, lines: Sequence[_Line], drawing: Sheet) -> None:
     """Mark and guard the zones to change, and show what to write as a drawing does."""
-    groups = result.drawn.groups
+    groups = len(result.drawn.groups)
     guard = {
         "validate": "decimal",
         "criteria": "between",
@@ -307,14 +261,14 @@ def _mark(result: AllocationResult, drawing: Sheet) -> None:
         "error_title": "zone",
         "error_message": _say("workbook_guard"),
     }
-    drawing.inner.data_validation(f"B{_FIRST}:B{_FIRST + len(groups) - 1}", guard)
-    for row, name in enumerate(groups, start=_FIRST):
-        drawing.cell(row, 2, **_INPUT)
-        drawing.cell(row, 4, num_format="0.000")
-        drawing.cell(row, 11, num_format=_written_as(_frame(result, _first_member(result, name))))
-    below = [*_further(result), *_others(result)]
-    for row, (_, members) in enumerate(below, start=_FIRST + len(groups)):
-        drawing.cell(row, 11, num_format=_written_as(_frame(result, members[0])))
+    drawing.inner.data_validation(f"B{_FIRST}:B{_FIRST + groups - 1}", guard)
+    for row, line in enumerate(lines, start=_FIRST):
+        drawing.cell(row, 1, **_WRAPPED)
+        drawing.height(row, _LINE * (1 + len(line.name) // _NAMES))
+        drawing.cell(row, 11, num_format=_written_as(_frame(result, line.source)))
+        if row < _FIRST + groups:
+            drawing.cell(row, 2, **_INPUT)
+            drawing.cell(row, 4, num_format="0.000")
 
 
 def _written_as(frame: FeatureFrame) -> str:
@@ -330,18 +284,13 @@ def _below(drawing: Sheet, watched: pd.DataFrame, rows: int, notes: tuple[str, .
     for column, header in enumerate(("what", "limit", "predicted", "kept"), start=1):
         drawing.cell(start, column, header, bold=True)
     for at, own in enumerate(watched.to_dict("records")):
-        row, there = start + 1 + at, _FIRST + at
+        row = start + 1 + at
         drawing.cell(row, 1, str(own["what"]), **_WRAPPED)
         drawing.height(row, _LINE * (1 + len(str(own["what"])) // _NAMES))
-        for column, place, held in (
-            (2, "B", own["limit"]),
-            (3, "D", own["predicted for the zones"]),
-            (4, "E", own["kept by the model"]),
-        ):
-            value = held.value if isinstance(held, Formula) else held
-            if isinstance(value, str) or (value is not None and value == value):
-                shown = Formula(f"=requirements!{place}{there}", value)
-                shown_as = "0.000000" if _is_in_inches(own["what"]) else "0.00"
+        shown_as = "0.000000" if _is_in_inches(own["what"]) else "0.00"
+        for column, place in enumerate("BDE", start=2):
+            shown = linked(watched, at, place)
+            if not pd.isna(shown.value):
                 drawing.cell(row, column, shown, num_format=shown_as, **_RESULT)
     for row, text in enumerate(notes, start=drawing.rows + 2):
         drawing.cell(row, 1, text, italic=True)

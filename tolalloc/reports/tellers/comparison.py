@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -147,20 +148,14 @@ class ComparisonTeller(Teller[Comparison]):
     def _ranking(self) -> pd.DataFrame:
         """Every dimension with its rank and total index in both, and whether their intervals lie apart."""
         columns = ["rank [-]", TOTAL, LOW, HIGH]
-        first, second = (run.ranking.set_index("dimension")[columns] for run in self.result.runs)
-        joint = first.add_suffix(" A").join(second.add_suffix(" B"), how="outer")
+        joint = _joined([run.ranking.set_index("dimension")[columns] for run in self.result.runs])
         apart = (joint[f"{LOW} A"] > joint[f"{HIGH} B"]) | (joint[f"{LOW} B"] > joint[f"{HIGH} A"])
         missing = joint[f"{TOTAL} A"].isna() | joint[f"{TOTAL} B"].isna()
-        return pd.DataFrame(
-            {
-                "dimension": joint.index,
-                "rank A [-]": joint["rank [-] A"].to_numpy(),
-                "rank B [-]": joint["rank [-] B"].to_numpy(),
-                "total index A [-]": joint[f"{TOTAL} A"].to_numpy(),
-                "total index B [-]": joint[f"{TOTAL} B"].to_numpy(),
-                "90 % intervals": np.select([missing, apart], ["only in one", "apart"], "overlap"),
-            }
-        ).sort_values(["rank A [-]", "rank B [-]"], ignore_index=True)
+        joint["90 % intervals"] = np.select([missing, apart], ["only in one", "apart"], "overlap")
+        heads = {f"rank [-] {run}": f"rank {run} [-]" for run in "AB"}
+        heads |= {f"{TOTAL} {run}": f"total index {run} [-]" for run in "AB"}
+        found = joint.reset_index().rename(columns=heads)[["dimension", *heads.values(), "90 % intervals"]]
+        return found.sort_values(["rank A [-]", "rank B [-]"], ignore_index=True)
 
     @cached_property
     def _answers(self) -> pd.DataFrame:
@@ -195,27 +190,24 @@ def _named(name: str, cost_unit: str) -> str:
     return f"{quantity(name)} [{cost_unit}]" if unit_of(name) == COST_UNITS else name
 
 
+def _joined(sides: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """Return the tables of A and B beside each other, with the rows that either has."""
+    return sides[0].add_suffix(" A").join(sides[1].add_suffix(" B"), how="outer")
+
+
 def _zones(comparison: Comparison, cost_unit: str) -> pd.DataFrame:
     """Return every zone and cost in both."""
-    parts = []
-    for run in comparison.runs:
-        zone = run.zones["plus [unit]"] - run.zones["minus [unit]"]
-        parts.append(pd.DataFrame({"zone": zone, "cost": run.zones["cost [cost units]"], "unit": run.zones["unit"]}))
-        parts[-1].index = pd.Index(_names(run.zones), name="source")
-    joint = parts[0].add_suffix(" A").join(parts[1].add_suffix(" B"), how="outer")
-    joint = joint[(joint[["zone A", "zone B"]] != 0.0).any(axis=1)]  # what both neglect is left out
-    change = (joint["zone B"] / joint["zone A"].where(joint["zone A"] > 0) - 1) * 100
-    return pd.DataFrame(
-        {
-            "source": joint.index,
-            "unit": joint["unit A"].fillna(joint["unit B"]).to_numpy(),
-            "zone A": joint["zone A"].to_numpy(),
-            "zone B": joint["zone B"].to_numpy(),
-            "B over A, less 1 [%]": change.to_numpy(),
-            f"cost A [{cost_unit}]": joint["cost A"].to_numpy(),
-            f"cost B [{cost_unit}]": joint["cost B"].to_numpy(),
-        }
-    )
+    sides = []
+    for zones in (run.zones for run in comparison.runs):
+        side = pd.DataFrame({"source": _names(zones), "zone": zones["plus [unit]"] - zones["minus [unit]"]})
+        sides.append(side.assign(cost=zones["cost [cost units]"], unit=zones["unit"]).set_index("source"))
+    joint = _joined(sides)
+    joint = joint[(joint[["zone A", "zone B"]] != 0.0).any(axis=1)].reset_index()  # what both neglect is left out
+    joint["unit"] = joint["unit A"].fillna(joint["unit B"])
+    joint["B over A, less 1 [%]"] = (joint["zone B"] / joint["zone A"].where(joint["zone A"] > 0) - 1) * 100
+    costs = {f"cost {run}": f"cost {run} [{cost_unit}]" for run in "AB"}
+    shown = ["source", "unit", "zone A", "zone B", "B over A, less 1 [%]", *costs.values()]
+    return joint.rename(columns=costs)[shown]
 
 
 def _changed(zones: pd.DataFrame) -> str:

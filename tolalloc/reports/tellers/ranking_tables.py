@@ -19,7 +19,7 @@ from tolalloc.reports.wording import quantity
 from tolalloc.sensitivity.derivatives import LineDerivatives
 from tolalloc.sensitivity.inverse import InverseSensitivity
 from tolalloc.sensitivity.ranking import Neighbours
-from tolalloc.sensitivity.result import OutputCapability, RankingResult
+from tolalloc.sensitivity.result import RankingResult
 from tolalloc.sensitivity.shapley import ShapleyEffects
 from tolalloc.sensitivity.sobol import SourceIndices
 from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
@@ -94,16 +94,15 @@ def ranking_table(result: RankingResult) -> pd.DataFrame:
     return _with_own_words(frame, result.members)
 
 
-def _derivatives(result: RankingResult, per_micrometre: str) -> dict[str, dict[str, Any]]:
-    """Return Sens and the order per micrometre of what is ranked, under their heads, where it has any."""
-    unit, lines = unit_of(result.leading), {name: _line(result, own) for name, own in result.members.items()}
-    known = {name: own for name, own in lines.items() if own}
-    names, changes = list(known), [own.per_micrometre for own in known.values()]
+def _derivatives(result: RankingResult, head: str) -> dict[str, dict[str, Any]]:
+    """Return Sens and the order per micrometre, under a head, of what is ranked, where it has any."""
+    unit, lines, changes = unit_of(result.leading), _lines(result), per_micrometre(result)
+    order = [[*changes][at] for at in largest_first([*changes.values()])]
     return {
-        f"Sens [{unit}/µm]": {name: span(*own.slope) for name, own in known.items()},
-        per_micrometre: dict(zip(names, changes, strict=True)),
-        "rank per µm [-]": {names[at]: rank for rank, at in enumerate(largest_first(changes), start=1)},
-        f"rms change by its zone [{unit}]": {name: own.by_zone for name, own in known.items()},
+        f"Sens [{unit}/µm]": {name: span(*own.slope) for name, own in lines.items()},
+        head: changes,
+        "rank per µm [-]": {name: rank for rank, name in enumerate(order, start=1)},
+        f"rms change by its zone [{unit}]": {name: own.by_zone for name, own in lines.items()},
     }
 
 
@@ -152,17 +151,18 @@ def dimensions_table(result: RankingResult) -> pd.DataFrame:
 
 def per_micrometre(result: RankingResult) -> dict[str, float]:
     """Return what a micrometre in every place of each of them does, root mean square [unit of the output per µm]."""
-    lines = {name: _line(result, own) for name, own in result.members.items()}
-    return {name: own.per_micrometre for name, own in lines.items() if own}
+    return {name: own.per_micrometre for name, own in _lines(result).items()}
 
 
-def _line(result: RankingResult, members: Sequence[Source]) -> LineDerivatives | None:
-    """Return what a micrometre in every place does; none of what is no length, or where places depend on each other."""
-    names = {own.name for own in members}
-    dependent = any(len(block) > 1 and names & {*block} for block in result.errors.blocks)
-    if not names or dependent or not names <= {*result.local.sources}:
-        return None
-    return result.local.of_line([own.name for own in members])
+def _lines(result: RankingResult) -> dict[str, LineDerivatives]:
+    """Return what a micrometre in every place of what is ranked does.
+
+    Nothing of what is no length, or where places depend on each other.
+    """
+    independent = {block[0] for block in result.errors.blocks if len(block) == 1}
+    known = independent & {*result.local.sources}
+    names = {name: [own.name for own in members] for name, members in result.members.items()}
+    return {name: result.local.of_line(own) for name, own in names.items() if own and known.issuperset(own)}
 
 
 def pairs_table(sobol: SourceIndices, named: str) -> Table[int]:
@@ -200,7 +200,7 @@ def convergence_table(result: RankingResult) -> pd.DataFrame:
         "first places": [", ".join(names[at] for at in step.first) for step in history],
         "share of the resamples with this order [%]": [step.probability * 100 for step in history],
     }
-    return of_positions("convergence", columns).frame()
+    return pd.DataFrame(columns)
 
 
 def wave_unit(result: RankingResult) -> str:
@@ -212,21 +212,19 @@ def orders_table(result: RankingResult) -> pd.DataFrame:
     """Return what each error adds to the wave of each order, alone and with others."""
     found = result.orders
     assert found is not None
-    first, total = found.first_interval, found.total_interval
-    rows = [(at, source) for at in range(len(found.orders)) for source in largest_first(found.total[at])]
-    columns: dict[str, list[Any]] = {
-        "order of the output turn [-]": [found.orders[at] for at, _ in rows],
-        f"standard deviation of the wave [{wave_unit(result)}]": [found.deviation[at] for at, _ in rows],
-        result.by: [found.sources[source] for _, source in rows],
+    order, source = np.array([(at, own) for at, row in enumerate(found.total) for own in largest_first(row)]).T
+    columns: dict[str, Any] = {
+        "order of the output turn [-]": np.array(found.orders)[order],
+        f"standard deviation of the wave [{wave_unit(result)}]": found.deviation[order],
+        result.by: np.array(found.sources)[source],
     }
-    for name, short, shares, ends in (
-        ("share alone [-]", "alone", found.first, first),
-        ("share with others [-]", "with others", found.total, total),
+    for name, shares, ends in (
+        ("alone", found.first, found.first_interval),
+        ("with others", found.total, found.total_interval),
     ):
-        columns[name] = [_told(shares)[row] for row in rows]
-        columns[f"{short} low 5 % [-]"] = [ends[at, 0, source] for at, source in rows]
-        columns[f"{short} high 95 % [-]"] = [ends[at, 1, source] for at, source in rows]
-    return of_positions("orders", columns).frame()
+        columns[f"share {name} [-]"] = _told(shares)[order, source]
+        columns |= _ends(f"{name} ", ends[order, :, source].T)
+    return pd.DataFrame(columns)
 
 
 def shapley_table(found: ShapleyEffects) -> pd.DataFrame:
@@ -242,44 +240,36 @@ def shapley_table(found: ShapleyEffects) -> pd.DataFrame:
 
 def capability_table(result: RankingResult) -> pd.DataFrame:
     """Return every requirement with its distribution, capability and yield."""
-
-    def limited(own: OutputCapability, value: Any) -> Any:
-        return np.nan if own.limits is None or own.inside is None else value(own)
-
-    def able(own: OutputCapability, name: str) -> Any:
-        found = None if own.capability is None else getattr(own.capability, name)
-        return np.nan if found is None else found
-
-    def end(own: OutputCapability, name: str) -> float:
-        found = None if own.limits is None else getattr(own.limits, name)
-        return np.nan if found is None else found
-
-    values: dict[str, Any] = {
-        "requirement": lambda own: quantity(own.output),
-        "unit": lambda own: unit_of(own.output),
-        "Mean": lambda own: own.mean,
-        "Sigma": lambda own: own.deviation,
-        "Min": lambda own: own.least,
-        "Max": lambda own: own.most,
-        f"{result.target:.2%} quantile, low 2.5 %": lambda own: own.quantile.low,
-        f"{result.target:.2%} quantile, high 97.5 %": lambda own: (
-            own.quantile.high if np.isfinite(own.quantile.high) else _say("too_small")
-        ),
-        "LSL": lambda own: end(own, "lower"),
-        "USL": lambda own: end(own, "upper"),
-        "Yield [%]": lambda own: limited(own, lambda own: own.inside.estimate * 100),
-        "Yield low 2.5 % [%]": lambda own: limited(own, lambda own: own.inside.low * 100),
-        "Yield high 97.5 % [%]": lambda own: limited(own, lambda own: own.inside.high * 100),
-        "% out [%]": lambda own: limited(own, lambda own: (1 - own.inside.estimate) * 100),
-        "PPM [1e-6]": lambda own: limited(own, lambda own: (1 - own.inside.estimate) * 1e6),
-        "OK": lambda own: limited(own, lambda own: "yes" if own.inside.bound >= result.target else "no"),
-        "Pp [-]": lambda own: able(own, "pp"),
-        "Ppk [-]": lambda own: able(own, "ppk"),
-        "PPM if normal [1e-6]": lambda own: able(own, "normal_ppm"),
-    }
-    columns = tuple(Column[OutputCapability](header=header, value=value) for header, value in values.items())
-    table = Table(name="requirements", columns=columns, rows=result.capabilities)
-    return table.frame().dropna(axis="columns", how="all")
+    rows = []
+    for own in result.capabilities:
+        quantile, limits, inside, able = own.quantile, own.limits, own.inside, own.capability
+        row: dict[str, object] = {
+            "requirement": quantity(own.output),
+            "unit": unit_of(own.output),
+            "Mean": own.mean,
+            "Sigma": own.deviation,
+            "Min": own.least,
+            "Max": own.most,
+            f"{result.target:.2%} quantile, low 2.5 %": quantile.low,
+            f"{result.target:.2%} quantile, high 97.5 %": (
+                quantile.high if np.isfinite(quantile.high) else _say("too_small")
+            ),
+        }
+        if limits and inside:
+            row |= {
+                "LSL": limits.lower,
+                "USL": limits.upper,
+                "Yield [%]": inside.estimate * 100,
+                "Yield low 2.5 % [%]": inside.low * 100,
+                "Yield high 97.5 % [%]": inside.high * 100,
+                "% out [%]": (1 - inside.estimate) * 100,
+                "PPM [1e-6]": (1 - inside.estimate) * 1e6,
+                "OK": "yes" if inside.bound >= result.target else "no",
+            }
+        if able:
+            row |= {"Pp [-]": able.pp, "Ppk [-]": able.ppk, "PPM if normal [1e-6]": able.normal_ppm}
+        rows.append(row)
+    return pd.DataFrame(rows).dropna(axis="columns", how="all")
 
 
 def beyond_table(result: RankingResult) -> pd.DataFrame:
@@ -295,7 +285,7 @@ def beyond_table(result: RankingResult) -> pd.DataFrame:
         "relied on": ["yes" if item is found.estimate else "no" for item in rows],
         "cautions": ["; ".join(item.cautions) for item in rows],
     }
-    return of_positions("beyond the limit", columns).frame()
+    return pd.DataFrame(columns)
 
 
 def stack_up_table(result: RankingResult, output: str) -> pd.DataFrame:
@@ -362,16 +352,15 @@ def measures_table(result: RankingResult) -> pd.DataFrame:
     """Return every measure of every source side by side, in the order of the ranking."""
     sobol, unit = result.indices, unit_of(result.leading)
     ranked = [(at, own) for at in sobol.order for own in result.members[sobol.sources[at]]]
-    of_source = {
-        f"Sens [{unit}/µm]": (result.local.sources, result.local.slope),
-        f"alone at its limit [{unit}]": (result.classical.sources, result.classical.alone),
-    }
-    if result.shapley:
-        of_source["Shapley effect [-]"] = (result.shapley.sources, result.shapley.effects[0])
-    named = {header: dict(zip(names, values, strict=True)) for header, (names, values) in of_source.items()}
-    columns = {header: [own.get(source.name, np.nan) for _, source in ranked] for header, own in named.items()}
-    index = {f"total index ST of its {result.by} [-]": [sobol.total[at] for at, _ in ranked]}
-    return of_positions("measures", {"source": [own.name for _, own in ranked], **index, **columns}).frame()
+    frame = pd.DataFrame({"source": [own.name for _, own in ranked]})
+    frame[f"total index ST of its {result.by} [-]"] = [sobol.total[at] for at, _ in ranked]
+    for header, names, values in (
+        (f"Sens [{unit}/µm]", result.local.sources, result.local.slope),
+        (f"alone at its limit [{unit}]", result.classical.sources, result.classical.alone),
+        *((("Shapley effect [-]", result.shapley.sources, result.shapley.effects[0]),) if result.shapley else ()),
+    ):
+        frame[header] = frame["source"].map(dict(zip(names, values, strict=True)))
+    return frame
 
 
 def quantile_name(score: Score) -> str:
@@ -411,7 +400,7 @@ def surrogate_table(choice: Choice) -> pd.DataFrame:
         "failed [-]": [score.failed for score in scores],
         "falls short": ["; ".join(shortfalls(score)) or "nowhere" for score in scores],
     }
-    return of_positions("surrogates", columns).frame()
+    return pd.DataFrame(columns)
 
 
 def mapping_table(result: RankingResult) -> pd.DataFrame:
@@ -442,17 +431,11 @@ def measured_tables(result: RankingResult) -> tuple[tuple[str, pd.DataFrame], ..
         "Kolmogorov–Smirnov distance [-]": [fitted.distance if fitted else np.nan for _, _, fitted in rows],
         "best": ["no" if fitted and fitted is not fit.best else "yes" for _, fit, fitted in rows],
     }
-    table = of_positions("measured parts", columns)
-    return ((table.name, table.frame()),) if rows else ()
+    return (("measured parts", pd.DataFrame(columns)),) if rows else ()
 
 
 def work_table(header: Header) -> pd.DataFrame:
     """Return what each stage took, and how its units ended."""
-    names, stages = list(header.stages), list(header.stages.values())
-    columns = {
-        "stage": names,
-        "units [-]": [own["units"] for own in stages],
-        "seconds [s]": [own["seconds"] for own in stages],
-        "units per second [1/s]": [own["units per second"] for own in stages],
-    }
-    return of_positions("work", columns).frame()
+    heads = {"units": "units [-]", "seconds": "seconds [s]", "units per second": "units per second [1/s]"}
+    rows = [{"stage": stage, **{head: own[key] for key, head in heads.items()}} for stage, own in header.stages.items()]
+    return pd.DataFrame(rows, columns=["stage", *heads.values()])
