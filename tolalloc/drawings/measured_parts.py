@@ -76,11 +76,9 @@ class FittedDistribution:
 class MeasuredFit:
     """What the measured parts say about the process."""
 
-    parts: int  # Number of measured parts [-]
     # Mean and sample standard deviation of the deviations or radii [m]
     mean: float
     deviation: float
-    cp: float  # How many times the spread fits into the zone; for radii that of a normal deviation on each axis [-]
     cpk: float  # Distance of the mean from the nearer limit, for radii from the largest one, over 3σ [-]
     # Fitted distributions, the best by Akaike's criterion first; a distribution that starts at the lower limit is left
     # out where a part is at or below it
@@ -197,7 +195,7 @@ class MeasuredParts:
         which = f" ({self.characteristic})" if self.characteristic else ""
         left_out = f", {self.left_out} values that the file marks as not valid left out" if self.left_out else ""
         return (
-            f"as {fit.parts} measured parts of {self.path.name}{which} (Cp {fit.cp:.3g}, Cpk {fit.cpk:.3g}{nearest})"
+            f"as {self.parts} measured parts of {self.path.name}{which} (Cp {self.cp:.3g}, Cpk {fit.cpk:.3g}{nearest})"
             f"{left_out}, {shape}, assumed to scale with the zone from the "
             f"{self.zone / MICROMETRE:.3g} µm that they were made to"
         )
@@ -219,10 +217,8 @@ class MeasuredParts:
                 fits.append(_fitted(Distribution.LOGNORMAL, stats.lognorm, above, True))
                 fits.append(_fitted(Distribution.WEIBULL, stats.weibull_min, above, True))
         return MeasuredFit(
-            parts=self.parts,
             mean=mean,
             deviation=deviation,
-            cp=self.cp,
             cpk=(half - (mean if self.are_radii else abs(mean - self.middle))) / (3.0 * deviation),
             fits=tuple(sorted(fits, key=lambda fit: fit.aic)),
         )

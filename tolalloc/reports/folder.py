@@ -8,9 +8,9 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from secrets import token_hex
 from shutil import Error as MoveError
 from shutil import move, rmtree
-from tempfile import mkdtemp
 
 from tolalloc.exceptions import RunFolderError
 
@@ -57,15 +57,14 @@ def claimed(folder: Path) -> Iterator[Path]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         _clear_left(folder)
-        own = f".{folder.name}-{_machine()}-{os.getpid()}-"
-        beside = Path(mkdtemp(prefix=own, suffix=_UNFINISHED, dir=folder.parent))
+        beside = folder.with_name(f".{folder.name}-{_machine()}-{os.getpid()}-{token_hex(4)}{_UNFINISHED}")
+        beside.mkdir()
     except OSError as error:
         raise RunFolderError(
             f"{named}: the run folder cannot be made ({error.strerror}); name another (--out)."
         ) from None
     try:
         yield beside
-        beside.chmod(0o777 & ~_umask())  # a temporary folder is its owner's alone
         require_usable(folder)
         if new:
             with suppress(FileNotFoundError):  # an empty folder may be cleared away meanwhile
@@ -135,10 +134,3 @@ def _is_gone(process: int) -> bool:
 def _machine() -> str:
     """Return the name of this machine; several may fill one folder."""
     return re.sub(r"\W", "_", platform.node()) or "machine"
-
-
-def _umask() -> int:
-    """Return what this process takes away from the rights of new files, which can be read only by setting it."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

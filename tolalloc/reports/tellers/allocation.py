@@ -19,7 +19,7 @@ from tolalloc.reports.teller import Teller
 from tolalloc.reports.tellers import allocation_figures as figures
 from tolalloc.reports.tellers import allocation_sentences as texts
 from tolalloc.reports.tellers import allocation_tables as tables
-from tolalloc.reports.tellers.allocation_assembly import assembly_section, assembly_summary
+from tolalloc.reports.tellers.allocation_assembly import assembly_sections, assembly_summary
 from tolalloc.reports.tellers.allocation_drawing import (
     dimensions_table,
     effects_figure,
@@ -60,7 +60,7 @@ class AllocationTeller(Teller[AllocationResult]):
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """What a reader must know before acting on the answer."""
-        return texts.warnings(self.result, self.header)
+        return tuple(texts.warnings(self.result, self.header))
 
     @cached_property
     def assumptions(self) -> tuple[str, ...]:
@@ -91,7 +91,7 @@ class AllocationTeller(Teller[AllocationResult]):
             self._risks,
             self._front,
             self._dimensions,
-            lambda: assembly_section(self.result, self.header.cost_unit),
+            lambda: assembly_sections(self.result, self.header.cost_unit),
             self._sources,
             self._shares,
             self._requirements,
@@ -156,7 +156,7 @@ class AllocationTeller(Teller[AllocationResult]):
         if front:
             yield Section(
                 heading=_say("heading_front", output=short(result.leading)),
-                paragraphs=texts.front(result, front),
+                paragraphs=tuple(texts.front(result, front)),
                 figures=(figures.front_figure(result, front, unit),) if front.points else (),
                 tables=(("front", tables.front_frame(result, front, unit)),) if front.points else (),
                 first=True,
@@ -179,7 +179,7 @@ class AllocationTeller(Teller[AllocationResult]):
         shown = (tables.requirements_table(self.result), tables.designs_table(self.result))
         yield Section(
             heading=_say("heading_requirements"),
-            paragraphs=texts.quantiles(self.result),
+            paragraphs=tuple(texts.quantiles(self.result)),
             tables=tuple((own.name, own.frame(self.header.cost_unit)) for own in shown),
             folded=True,
         )

@@ -51,18 +51,17 @@ def assembly_cost_sentences(result: AllocationResult, cost_unit: str) -> tuple[s
     return (_say(key, label=best.label, cost_unit=cost_unit, against=against, **gaps),)
 
 
-def assembly_sentences(result: AllocationResult) -> tuple[str, ...]:
-    """Return what becomes of the drawing where nothing is chosen, and of parts that find no mate."""
+def assembly_sentences(result: AllocationResult) -> Iterator[str]:
+    """Yield what becomes of the drawing where nothing is chosen, and of parts that find no mate."""
     assembled = result.assembled
     if assembled is None or not assembled.best.compensators:
-        return ()
+        return
     gaps = {"simulated": portrait_of(result.model).simulated, "after": result.chosen.joint.estimate}
-    said = [_say("assembly_random", **interval_gaps(assembled.as_they_come.joint), **gaps)]
+    yield _say("assembly_random", **interval_gaps(assembled.as_they_come.joint), **gaps)
     for own in assembled.best.compensators:
         if isinstance(own, Sorting):
             left = own.leftover_of({name: _source(result, name) for name in own.named})
-            said.append(_say("assembly_left", share=left, parts=own.parts, mates=own.mates, batch=own.batch))
-    return tuple(said)
+            yield _say("assembly_left", share=left, parts=own.parts, mates=own.mates, batch=own.batch)
 
 
 def assembly_notes(result: AllocationResult) -> tuple[str, ...]:
@@ -70,20 +69,18 @@ def assembly_notes(result: AllocationResult) -> tuple[str, ...]:
     return tuple(_note(result, own) for own in _acting(result))
 
 
-def assembly_section(result: AllocationResult, cost_unit: str) -> tuple[Section, ...]:
-    """Return the section on parts chosen at assembly; nothing where nothing was to be chosen."""
+def assembly_sections(result: AllocationResult, cost_unit: str) -> Iterator[Section]:
+    """Yield the section on parts chosen at assembly; nothing where nothing was to be chosen."""
     if result.assembled is None:
-        return ()
+        return
     compared, bins = choices_table(result), bins_table(result)
     further = () if bins is None else (("classes and sizes", bins),)
-    return (
-        Section(
-            heading=_say("heading_assembly"),
-            paragraphs=(*assembly_sentences(result), *assembly_notes(result), *_methods(result)),
-            figures=choices_figure(result, cost_unit),
-            tables=((compared.name, compared.frame(cost_unit)), *further),
-            unfolded=True,
-        ),
+    yield Section(
+        heading=_say("heading_assembly"),
+        paragraphs=(*assembly_sentences(result), *assembly_notes(result), *_methods(result)),
+        figures=choices_figure(result, cost_unit),
+        tables=((compared.name, compared.frame(cost_unit)), *further),
+        unfolded=True,
     )
 
 

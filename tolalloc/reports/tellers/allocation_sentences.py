@@ -399,16 +399,14 @@ def _modification(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     return (_say("saves", word=word, cost_unit=cost_unit, **gaps),)
 
 
-def _prices(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
-    """Return what the limits that the drawing touches cost, to first order."""
-    said = []
+def _prices(result: AllocationResult, cost_unit: str) -> Iterator[str]:
+    """Yield what the limits that the drawing touches cost, to first order."""
     for check, side in result.chosen.limited_sides if result.free.chosen.met else ():
         if price := result.price_of(check, side):
             cost, _ = limit_price(side, price)
             limit, step = (with_unit(f"{own:g}", side.stack.name) for own in (side.limit, limit_step(side)))
             gaps = {"output": quantity(side.stack.name), "limit": limit, "step": step}
-            said.append(_say("price", price=cost, cost_unit=cost_unit, **gaps))
-    return tuple(said)
+            yield _say("price", price=cost, cost_unit=cost_unit, **gaps)
 
 
 def _good_unit(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
@@ -424,30 +422,30 @@ def _good_unit(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     return (_say("good", yield_=said, price=price, cost_unit=cost_unit, output=short(result.leading)),)
 
 
-def _settled(result: AllocationResult) -> tuple[str, ...]:
-    """Return which zones do not depend on what was assumed."""
+def _settled(result: AllocationResult) -> Iterator[str]:
+    """Yield which zones do not depend on what was assumed."""
     found = result.robustness
     if found is None:
-        return ()
+        return
     same = [group for group, settled in zip(found.groups, found.same, strict=True) if settled]
     names = f": {', '.join(same)}" if same else ""
     key = "same_one" if len(same) == 1 else "same_many"
-    said = [_say(key, same=len(same), count=len(found.groups), most=SAME, change=COST_CHANGE, names=names)]
+    yield _say(key, same=len(same), count=len(found.groups), most=SAME, change=COST_CHANGE, names=names)
     worst, cost = found.worst, result.free.chosen.cost
-    gaps = {"change": COST_CHANGE, "most": worst.most, "share": worst.most / cost, "lost": worst.lost}
-    said.append(_say("worst_prices", **gaps))
+    yield _say("worst_prices", change=COST_CHANGE, most=worst.most, share=worst.most / cost, lost=worst.lost)
     ranges = zip(found.groups, found.prices, strict=True)
     ending = [one for one in ranges if one[1].low > _LEAST_PRICE or one[1].high < np.inf]
     if ending:
         group, own = min(ending, key=lambda one: one[1].nearest)
         both = "price_range" if own.low > _LEAST_PRICE else "price_range_below"
         key = "price_range_above" if own.high == np.inf else both
-        said.append(_say(key, group=group, low=own.low, high=own.high, same=SAME))
+        yield _say(key, group=group, low=own.low, high=own.high, same=SAME)
     if found.graded:
         steady = [group for group, one in zip(found.groups, found.graded, strict=True) if one.holds_change]
         gaps = {"same": len(steady), "count": len(found.groups), "change": COST_CHANGE}
-        said.append(_say("graded_prices", names=f": {', '.join(steady)}" if steady else "", **gaps))
-    return (*said, *(_region(found.uncertain) if found.uncertain and result.free.chosen.met else ()))
+        yield _say("graded_prices", names=f": {', '.join(steady)}" if steady else "", **gaps)
+    if found.uncertain and result.free.chosen.met:
+        yield from _region(found.uncertain)
 
 
 def _region(found: UncertainRegion) -> Iterator[str]:
@@ -471,39 +469,37 @@ def _region(found: UncertainRegion) -> Iterator[str]:
         yield _say("region_breaks", column=own.column, low=low, high=high)
 
 
-def warnings(result: AllocationResult, header: Header) -> tuple[str, ...]:
-    """Return what a reader must know before acting on the answer."""
-    chosen, found = result.chosen, []
+def warnings(result: AllocationResult, header: Header) -> Iterator[str]:
+    """Yield what a reader must know before acting on the answer."""
     if header.quick:
-        found.append(QUICK_RUN)
+        yield QUICK_RUN
     if result.error >= _EVEN_ODDS:
-        found.append(_say("even_odds"))
+        yield _say("even_odds")
     if not result.met:
-        found.append(_say("not_verified", missed=missed(chosen)))
+        yield _say("not_verified", missed=missed(result.chosen))
     if not result.free.proportional.met:
-        found.append(_say("alike_missed"))
+        yield _say("alike_missed")
     region = result.robustness.uncertain if result.robustness else None
     worst = region.least_favourable if region else None
     if region and worst and not worst.kept and result.free.chosen.met:
-        found.append(_say("uncertain", what=region.name, covered=COVERED))
-    found += [f"{own.sentence}." for own in result.space.settings if own.out_of_bounds]
-    fault = examined(result).fault or ""
-    found += [own for own in portrait_of(result.model).cautions(chosen.settings) if own not in fault]
+        yield _say("uncertain", what=region.name, covered=COVERED)
+    yield from (f"{own.sentence}." for own in result.space.settings if own.out_of_bounds)
+    fault, cautions = examined(result).fault, portrait_of(result.model).cautions(result.chosen.settings)
+    yield from (own for own in cautions if own not in fault)
     if failed := header.failed:
-        found.append(_say("failed_one" if failed == 1 else "failed_many", count=failed))
-    return tuple(found)
+        yield _say("failed_one" if failed == 1 else "failed_many", count=failed)
 
 
-def front(result: AllocationResult, found: CostFront) -> tuple[str, ...]:
-    """Return how the costs of other limits were found."""
+def front(result: AllocationResult, found: CostFront) -> Iterator[str]:
+    """Yield how the costs of other limits were found."""
     units = next((own.design.joint.units for own in found.points if own.design is not result.chosen), 0)
-    said = [_say("front", units=units, simulated=portrait_of(result.model).simulated)] if units else []
+    if units:
+        yield _say("front", units=units, simulated=portrait_of(result.model).simulated)
     if units and found.drawn:
-        said.append(_say("front_drawn"))
+        yield _say("front_drawn")
     if found.missed:
         missed = ", ".join(with_unit(f"{own:.4g}", result.leading) for own in found.missed)
-        said.append(_say("front_missed", limits=missed))
-    return tuple(said)
+        yield _say("front_missed", limits=missed)
 
 
 def assumptions(result: AllocationResult, header: Header) -> tuple[str, ...]:
@@ -520,9 +516,9 @@ def assumptions(result: AllocationResult, header: Header) -> tuple[str, ...]:
     return (*header.assumptions, *map(_say, keys), *callout_assumptions(drawn, portrait_of(result.model).kind_of))
 
 
-def quantiles(result: AllocationResult) -> tuple[str, ...]:
-    """Return how much safer than asked the drawing is, since its units are few."""
-    chosen, said = result.chosen, []
+def quantiles(result: AllocationResult) -> Iterator[str]:
+    """Yield how much safer than asked the drawing is, since its units are few."""
+    chosen, simulated = result.chosen, portrait_of(result.model).simulated
     for check in chosen.checks:
         side, asked = check.constraints[0], check.requirement
         kept = unit_quantile(chosen, check, side) if asked.limits.width is None else np.nan
@@ -530,9 +526,7 @@ def quantiles(result: AllocationResult) -> tuple[str, ...]:
             key = "quantile_upper" if side.sign > 0 else "quantile_lower"
             safer, value = (with_unit(f"{own:.4g}", asked.output) for own in (kept, side.value))
             gaps = {"target": asked.guarantee.target, "kept": safer, "value": value, "confidence": chosen.confidence}
-            simulated = portrait_of(result.model).simulated
-            said.append(_say(key, output=quantity(asked.output), simulated=simulated, **gaps))
-    return tuple(said)
+            yield _say(key, output=quantity(asked.output), simulated=simulated, **gaps)
 
 
 def cheapest_settings(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:

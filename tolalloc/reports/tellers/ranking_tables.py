@@ -413,23 +413,23 @@ def mapping_table(result: RankingResult) -> pd.DataFrame:
 def measured_tables(result: RankingResult) -> tuple[tuple[str, pd.DataFrame], ...]:
     """Return how the measured parts of each source were fitted, one table for all; none if no parts were measured."""
     rows = [
-        (source.name, source.measured.fit, fitted)
+        (source.name, source.measured, fitted)
         for source in result.errors.active
         if source.measured
         for fitted in source.measured.fit.fits or (None,)
     ]
     columns = {
         "source": [name for name, _, _ in rows],
-        "parts [-]": [fit.parts for _, fit, _ in rows],
-        "mean [µm]": [fit.mean / MICROMETRE for _, fit, _ in rows],
-        "sigma [µm]": [fit.deviation / MICROMETRE for _, fit, _ in rows],
-        "Cp [-]": [fit.cp for _, fit, _ in rows],
-        "Cpk [-]": [fit.cpk for _, fit, _ in rows],
+        "parts [-]": [own.parts for _, own, _ in rows],
+        "mean [µm]": [own.fit.mean / MICROMETRE for _, own, _ in rows],
+        "sigma [µm]": [own.fit.deviation / MICROMETRE for _, own, _ in rows],
+        "Cp [-]": [own.cp for _, own, _ in rows],
+        "Cpk [-]": [own.fit.cpk for _, own, _ in rows],
         # Of parts whose mean and σ alone are stated nothing can be fitted.
         "distribution": [fitted.distribution.value if fitted else "normal" for _, _, fitted in rows],
         "AIC [-]": [fitted.aic if fitted else np.nan for _, _, fitted in rows],
         "Kolmogorov–Smirnov distance [-]": [fitted.distance if fitted else np.nan for _, _, fitted in rows],
-        "best": ["no" if fitted and fitted is not fit.best else "yes" for _, fit, fitted in rows],
+        "best": ["no" if fitted and fitted is not own.fit.best else "yes" for _, own, fitted in rows],
     }
     return (("measured parts", pd.DataFrame(columns)),) if rows else ()
 
