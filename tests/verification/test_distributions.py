@@ -109,7 +109,7 @@ def test_every_distribution_is_among_the_cases():
 def test_a_distribution_that_ends_is_bounded_and_fills_its_zone(kind):
     own = source(kind.value, Feature.SIZE)
     ends = own.zone_mapping.base.quantile(np.array([0.0, 1.0]))
-    assert (kind.form.support is not None) == np.isfinite(ends).all() == (kind in BOUNDED)
+    assert kind.form.is_bounded == np.isfinite(ends).all() == (kind in BOUNDED)
     if kind.form.support:
         np.testing.assert_allclose(np.ptp(own.standard_values(np.array([[0.0], [1.0]]))), 1.0, atol=1e-6)
         shapes = kind.form.to_scipy(own.shapes)

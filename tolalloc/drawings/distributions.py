@@ -84,7 +84,7 @@ class Form:
     """What is known of a distribution, in one place: a new one is a member of `Distribution` and its form."""
 
     scipy: str = ""  # Its name in scipy.stats; none of what has a class of its own here, or is made of others
-    support: tuple[float, float] | None = None  # Where the standard one of scipy begins and ends, if it is bounded [-]
+    is_bounded: bool = False  # Whether it has an end on either side, as the standard one of scipy has at 0 and 1
     shapes: Shapes | None = None  # The shapes that a row states, if any
     # Returns, of these shapes, those that scipy takes
     to_scipy: Callable[[tuple[float, ...]], tuple[float, ...]] = tuple
@@ -96,30 +96,26 @@ class Form:
     def of(self, shapes: tuple[float, ...], start: float) -> Marginal:
         """Return the distribution of these shapes; a bounded one from a start to 1."""
         shapes = self.to_scipy(shapes)
-        if self.support is None:
-            return Family(self.scipy, shapes)
-        low, high = self.support
-        width = (1.0 - start) / (high - low)
-        return Family(self.scipy, (*shapes, start - low * width, width), 1.0)
+        return Family(self.scipy, (*shapes, start, 1.0 - start), 1.0) if self.is_bounded else Family(self.scipy, shapes)
 
 
 FORMS = {
     Distribution.NORMAL: Form(is_symmetric=lambda _: True),
-    Distribution.UNIFORM: Form(scipy="uniform", support=(0.0, 1.0), is_symmetric=lambda _: True),
+    Distribution.UNIFORM: Form(scipy="uniform", is_bounded=True, is_symmetric=lambda _: True),
     Distribution.TRIANGULAR: Form(
-        scipy="triang", support=(0.0, 1.0), to_scipy=lambda _: (0.5,), is_symmetric=lambda _: True
+        scipy="triang", is_bounded=True, to_scipy=lambda _: (0.5,), is_symmetric=lambda _: True
     ),
     # Without a plateau a trapezoid is triangular, without sides uniform.
     Distribution.TRAPEZOID: Form(
         scipy="trapezoid",
-        support=(0.0, 1.0),
+        is_bounded=True,
         shapes=Shapes(1, 0.01, 0.99),
         to_scipy=lambda shapes: tuple((1.0 + sign * own) / 2.0 for own in shapes for sign in (-1, 1)),
         is_symmetric=lambda _: True,
     ),
     # With a shape below 1 a beta density has no end at a limit.
     Distribution.BETA: Form(
-        scipy="beta", support=(0.0, 1.0), shapes=Shapes(2, 1.0, 50.0), is_symmetric=lambda shapes: len({*shapes}) == 1
+        scipy="beta", is_bounded=True, shapes=Shapes(2, 1.0, 50.0), is_symmetric=lambda shapes: len({*shapes}) == 1
     ),
     Distribution.LOGNORMAL: Form(scipy="lognorm", shapes=Shapes(1, 0.02, 1.5), is_one_sided=True),
     Distribution.WEIBULL: Form(scipy="weibull_min", shapes=Shapes(1, 0.3, 20.0), is_one_sided=True),

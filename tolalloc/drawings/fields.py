@@ -357,15 +357,20 @@ class ToleranceRow(Record):
         return round(self.plus - self.minus, _DECIMALS)
 
     @model_validator(mode="after")
-    def _unit_makes_sense(self) -> ToleranceRow:
+    def _makes_sense(self) -> ToleranceRow:
+        self._require_unit()
+        self._require_zone()
+        self._require_distribution()
+        self._require_systematic_waves()
+        return self
+
+    def _require_unit(self) -> None:
         if self.unit == PERCENT and not self.nominal:
             raise ValueError("unit is %, which is of the nominal size; allowed is a nominal size other than 0")
         if self.places and (named := like_places(self.source or self.id)[0]) not in (0, self.places):
             raise ValueError(f"places is {self.places}, and the name of its source says {named}; allowed is one number")
-        return self
 
-    @model_validator(mode="after")
-    def _zone_makes_sense(self) -> ToleranceRow:
+    def _require_zone(self) -> None:
         zone, factor = self.zone, self.micrometres
         if not 0 <= zone * factor <= LARGEST_ZONE:
             raise ValueError(f"the zone plus − minus is {zone * factor:.9g} µm and must be 0 to {LARGEST_ZONE:.0f} µm")
@@ -404,7 +409,6 @@ class ToleranceRow(Record):
             )
         if needs_spectrum and self.each > 1:
             raise ValueError("each must be 1 for a feature with a spectrum; single teeth are sources of feature size")
-        return self
 
     def _require_deviations(self) -> None:
         """Raise if plus and minus are limits of size, or far from any deviation of a zone of this width."""
@@ -426,8 +430,7 @@ class ToleranceRow(Record):
                 f"{abs(middle) / self.zone:.0f} times their zone; allowed are deviations, up to {_FARTHEST:g} times it"
             )
 
-    @model_validator(mode="after")
-    def _distribution_makes_sense(self) -> ToleranceRow:
+    def _require_distribution(self) -> None:
         kind, batches = self.distribution, parsed_batches(self.batches)
         require_shapes(kind, parsed_shapes(self.shape))
         if kind is Distribution.RAYLEIGH and self.feature is not Feature.SIZE:
@@ -444,15 +447,13 @@ class ToleranceRow(Record):
         if kind is Distribution.EMPIRICAL and (self.Cp != 1 or self.shift != 0 or self.plus == self.minus):
             raise ValueError("measured parts show spread and mean, so Cp must be 1, shift 0 and the zone above 0")
         if self.feature is Feature.SIZE:
-            return self
+            return
         if any(batch.shift for batch in batches):
             raise ValueError(f"the shift of a batch must be 0 for feature {self.feature.value}, which has no direction")
         if self.feature is not Feature.POSITION:
             self._require_sensible_waves()
-        return self
 
-    @model_validator(mode="after")
-    def _systematic_makes_sense(self) -> ToleranceRow:
+    def _require_systematic_waves(self) -> None:
         orders = {order for order, _ in parsed_spectrum(self.spectrum)[0]}
         for order, amplitude, _ in parsed_systematic(self.systematic):
             if order not in orders:
@@ -461,7 +462,6 @@ class ToleranceRow(Record):
             if amplitude * self.micrometres > LARGEST_WAVE:
                 allowed = f"0 to {LARGEST_WAVE / 1e3:g} mm"
                 raise ValueError(f"systematic has an amplitude of {amplitude:g} {self.unit}; allowed is {allowed}")
-        return self
 
     def _require_sensible_waves(self) -> None:
         """Raise unless the distribution says something about waves over a turn."""

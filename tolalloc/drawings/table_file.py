@@ -557,11 +557,9 @@ def _typed(annotation: object, header: str, value: str, place: str) -> object:
             raise InputError.at(place, header, value, "a whole number, 1 or more")
         return int(number)
     if annotation is bool:
-        answers = {"yes": True, "no": False, "true": True, "false": False, "ja": True, "nein": False}
-        answers |= {"wahr": True, "falsch": False}
-        if value.lower() not in answers:
+        if value.lower() not in ("yes", "no", "true", "false", "ja", "nein", "wahr", "falsch"):
             raise InputError.at(place, header, value, "yes or no")
-        return answers[value.lower()]
+        return value.lower() in ("yes", "true", "ja", "wahr")
     if annotation is float or float in get_args(annotation):
         return number_at(place, header, value)
     words: tuple[str, ...] = get_args(annotation) if get_origin(annotation) is Literal else ()

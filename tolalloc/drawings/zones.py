@@ -247,7 +247,7 @@ class ZoneMapping:
     @cached_property
     def extent(self) -> float:
         """Diameter or range that is as large as the zone at Cp = 1 [unit of the base]."""
-        if self.distribution.form.support or not self.spectrum:
+        if self.distribution.form.is_bounded or not self.spectrum:
             return 2.0 * float(self.amplitudes.sum()) * self.base.reach
         return harmonic_range_quantile(self.spectrum, self.teeth, self.base)
 

@@ -46,11 +46,6 @@ class Section:
     first: bool = False
     folded: bool = False
 
-    @property
-    def behind_heading(self) -> Section:
-        """The same, folded."""
-        return replace(self, folded=True)
-
 
 @dataclass(frozen=True, kw_only=True)
 class Document:

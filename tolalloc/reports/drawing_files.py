@@ -14,7 +14,6 @@ from tolalloc.reducers.cycloid.clearance import removed
 from tolalloc.reducers.cycloid.tooth_profile import ProfilePoints, ToothProfile, profile_points, require_points
 
 if TYPE_CHECKING:
-    import pandas as pd
     from ezdxf.document import Drawing
 
 
@@ -33,12 +32,12 @@ def centre(text: Any, place: tuple[float, float]) -> None:
     text.set_placement(place, align=TextEntityAlignment.MIDDLE_CENTER)
 
 
-def points_frame(profile: ToothProfile, points: ProfilePoints) -> pd.DataFrame:
-    """Return the points with angle, curvature and material removed."""
+def _write_csv(profile: ToothProfile, points: ProfilePoints, path: Path) -> None:
+    """Write the points with angle, curvature and material removed."""
     import pandas as pd
 
     angle = points.angle
-    return pd.DataFrame(
+    frame = pd.DataFrame(
         {
             "x [mm]": points.place[:, 0] / MILLIMETRE,
             "y [mm]": points.place[:, 1] / MILLIMETRE,
@@ -47,10 +46,7 @@ def points_frame(profile: ToothProfile, points: ProfilePoints) -> pd.DataFrame:
             "removed along the normal [µm]": removed(profile, angle) / MICROMETRE,
         }
     )
-
-
-def _write_csv(profile: ToothProfile, points: ProfilePoints, path: Path) -> None:
-    points_frame(profile, points).to_csv(path, index=False, float_format="%.9g")
+    frame.to_csv(path, index=False, float_format="%.9g")
 
 
 def _write_dxf(profile: ToothProfile, points: ProfilePoints, path: Path) -> None:

@@ -242,13 +242,12 @@ def _sketches(pen: _Pen, sketches: Sequence[SignSketch], left: float, top: float
 def _sketch(pen: _Pen, own: SignSketch, x: float, y: float) -> None:
     """Draw both wheels about a place, the part below them, and the way from one to the other."""
     (height, radius), (new_height, new_radius), surface = own.nominal, own.changed, 4.0
-    dashed = {"layer": "SIGN_PICTURE", "linetype": "DASHED"}
-    pen.space.add_circle((x, y + height), radius, dxfattribs=dashed)
-    pen.space.add_circle((x, y + new_height), new_radius, dxfattribs={"layer": "SIGN_PICTURE"})
+    own_layer: dict[str, Any] = {"layer": "SIGN_PICTURE"}
+    pen.space.add_circle((x, y + height), radius, dxfattribs={**own_layer, "linetype": "DASHED"})
+    pen.space.add_circle((x, y + new_height), new_radius, dxfattribs=own_layer)
     rise = degrees(asin((surface - new_height) / new_radius))
-    pen.space.add_arc(
-        (x, y + new_height), new_radius, 180.0 - rise, rise, dxfattribs={"layer": "SIGN_PICTURE", "lineweight": 50}
-    )
+    thick = {**own_layer, "lineweight": 50}
+    pen.space.add_arc((x, y + new_height), new_radius, 180.0 - rise, rise, dxfattribs=thick)
     edge = (new_radius**2 - (surface - new_height) ** 2) ** 0.5
     for side in (-1.0, 1.0):
         pen.lines([(x + side * edge, y + surface), (x + side * 26.0, y + surface)], lineweight=50)

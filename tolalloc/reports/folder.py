@@ -120,14 +120,11 @@ def _unfinished(folder: Path) -> list[tuple[Path, int]]:
 
 def _is_gone(process: int) -> bool:
     """Return whether a process has ended; where that cannot be asked nothing is said to have."""
-    if os.name != "posix":
-        return False
     try:
-        os.kill(process, 0)  # asks and does no more
-    except ProcessLookupError:
-        return True
-    except OSError:  # somebody else's
-        return False
+        if os.name == "posix":
+            os.kill(process, 0)  # asks and does no more
+    except OSError as error:  # it has ended, or is somebody else's
+        return isinstance(error, ProcessLookupError)
     return False
 
 

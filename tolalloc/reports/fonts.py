@@ -36,11 +36,9 @@ def with_letters(canvas: Canvas) -> Canvas:
 @cache
 def font_with(letters: frozenset[str]) -> font_manager.FontEntry | None:
     """Return the installed font that has most of some letters, none where no font has any."""
-    found, most = None, 0
-    for entry in font_manager.fontManager.ttflist:
-        if not entry.name.startswith(_BOXES) and (has := len(letters & _letters_of(entry.fname))) > most:
-            found, most = entry, has
-    return found
+    known = [entry for entry in font_manager.fontManager.ttflist if not entry.name.startswith(_BOXES)]
+    most = max(known, key=lambda entry: len(letters & _letters_of(entry.fname)), default=None)
+    return most if most and letters & _letters_of(most.fname) else None
 
 
 @cache

@@ -73,6 +73,8 @@ class Portrait(Generic[Own]):
     """What a summary calls what is uncertain of the model."""
     curve_height: ClassVar[str] = ""
     """Output that is the height of the first picture's curve; empty unless a model has one."""
+    sign_sketches: ClassVar[tuple[SignSketch, ...]] = ()
+    """Which way negative amounts are ground, as small pictures; none unless a model has any."""
 
     def __init__(self, model: Own) -> None:
         self.model = model
@@ -144,11 +146,6 @@ class Portrait(Generic[Own]):
     def effects(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, str]:
         """Return what an amount of these settings does to the part, or a setting means; nothing unless a model says."""
         return {}
-
-    @property
-    def sign_sketches(self) -> tuple[SignSketch, ...]:
-        """Which way negative amounts are ground, as small pictures; none unless a model has any."""
-        return ()
 
     def cautions(self, values: Float[np.ndarray, " setting"]) -> tuple[str, ...]:
         """Return what a reader must know of these settings."""

@@ -81,6 +81,27 @@ _CARRIED = (
 )
 
 
+_SIGN_SKETCHES = (
+    SignSketch(
+        part="disc",
+        caption="Δr_rp negative (drawn): the wheel, of radius r_rp + Δr_rp, is smaller than the pin and leaves "
+        "material on the teeth. Positive: it is larger and removes material.",
+        nominal=(0.0, 9.0),
+        changed=(0.0, 7.0),
+        arrow=(-9.0, -7.0),
+    ),
+    SignSketch(
+        part="disc",
+        caption="Δr_p negative (drawn): the wheel runs on the circle R_p + Δr_p, smaller than the pin circle, and "
+        "removes material from the teeth. Positive: on a larger circle it leaves material.",
+        nominal=(0.0, 9.0),
+        changed=(-2.0, 9.0),
+        arrow=(0.0, -2.0),
+    ),
+)
+"""The grinding wheel smaller, and on a smaller circle."""
+
+
 class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
     """What is said and shown of a reducer at the sources of a drawing."""
 
@@ -89,6 +110,7 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
     settings_word = "modification"
     uncertain_name = "identified stiffness"
     curve_height = PEAK_TO_PEAK
+    sign_sketches = _SIGN_SKETCHES
 
     @property
     def outcomes(self) -> Mapping[int, str]:
@@ -161,11 +183,6 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
             TURNED: "target: what turned flanks leave of the flank clearance",
         }
 
-    @property
-    def sign_sketches(self) -> tuple[SignSketch, ...]:
-        """The grinding wheel smaller, and on a smaller circle."""
-        return _SIGN_SKETCHES
-
     def cautions(self, values: Float[np.ndarray, " setting"]) -> tuple[str, ...]:
         """Return what a reader must know of a large modification, and of a stiffness far from any catalogue."""
         model = self.model
@@ -200,26 +217,6 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
     ) -> tuple[Section, ...]:
         """Return the moving picture of a unit, coloured by its sources' shares."""
         return sections_of("The reducer", lambda: _moving(self.model, errors, x, shares, unit))
-
-
-_SIGN_SKETCHES = (
-    SignSketch(
-        part="disc",
-        caption="Δr_rp negative (drawn): the wheel, of radius r_rp + Δr_rp, is smaller than the pin and leaves "
-        "material on the teeth. Positive: it is larger and removes material.",
-        nominal=(0.0, 9.0),
-        changed=(0.0, 7.0),
-        arrow=(-9.0, -7.0),
-    ),
-    SignSketch(
-        part="disc",
-        caption="Δr_p negative (drawn): the wheel runs on the circle R_p + Δr_p, smaller than the pin circle, and "
-        "removes material from the teeth. Positive: on a larger circle it leaves material.",
-        nominal=(0.0, 9.0),
-        changed=(-2.0, 9.0),
-        arrow=(0.0, -2.0),
-    ),
-)
 
 
 def _effect(removed: float, more: str, less: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -191,7 +192,7 @@ class AllocationTeller(Teller[AllocationResult]):
             "median unit before": (before.settings, before.sample.unit_at(0.5)[0]),
             "median unit after": (after.settings, after.sample.unit_at(0.5)[0]),
         }
-        yield from (own.behind_heading for own in portrait_of(self.result.model).illustrated(units))
+        yield from (replace(own, folded=True) for own in portrait_of(self.result.model).illustrated(units))
 
     def _optimality(self) -> Iterator[Section]:
         """Yield how far from optimal the drawing can be."""

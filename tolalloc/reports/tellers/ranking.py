@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -326,7 +327,7 @@ class RankingTeller(Teller[RankingResult]):
     def sections(self) -> tuple[Section, ...]:
         """Drivers, limits, and what the answer rests on."""
         behind = self.standing(self._limit_sections, self._trust_sections)
-        return (*self.standing(self._driver_sections), *(own.behind_heading for own in behind))
+        return (*self.standing(self._driver_sections), *(replace(own, folded=True) for own in behind))
 
     @cached_property
     def _requirements(self) -> pd.DataFrame:
