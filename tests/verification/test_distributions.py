@@ -110,10 +110,10 @@ def test_a_distribution_that_ends_is_bounded_and_fills_its_zone(kind):
     own = source(kind.value, Feature.SIZE)
     ends = own.zone_mapping.base.quantile(np.array([0.0, 1.0]))
     assert kind.form.is_bounded == np.isfinite(ends).all() == (kind in BOUNDED)
-    if kind.form.support:
+    if kind.form.is_bounded:
         np.testing.assert_allclose(np.ptp(own.standard_values(np.array([[0.0], [1.0]]))), 1.0, atol=1e-6)
         shapes = kind.form.to_scipy(own.shapes)
-        assert kind.form.support == getattr(stats, kind.form.scipy).support(*shapes)
+        assert getattr(stats, kind.form.scipy).support(*shapes) == (0.0, 1.0)
 
 
 @pytest.mark.parametrize("kind", [own for own in Distribution if own not in MADE_OF_OTHERS])
@@ -251,34 +251,34 @@ def test_a_symmetric_size_has_its_mean_in_the_middle(more):
 
 
 def test_the_fit_finds_the_distribution_that_the_parts_came_from(generator):
-    def fitted(values, are_radii=False):
+    def measured(values, are_radii=False):
         return MeasuredParts(
             path=Path("parts.csv"),
             values=tuple(values.tolist()),
             are_radii=are_radii,
             zone=12e-6,
             middle=0.0,
-        ).fit
+        )
 
-    normal = fitted(1e-6 * generator.standard_normal(2000) + 1e-6)
-    assert normal.best.distribution is Distribution.NORMAL
+    normal = measured(1e-6 * generator.standard_normal(2000) + 1e-6)
+    assert normal.fit.best.distribution is Distribution.NORMAL
     # σ and the mean of 2000 parts, four standard errors.
     assert normal.cp == pytest.approx(2.0, abs=4 * 2.0 / np.sqrt(4000))
-    assert normal.cpk == pytest.approx(5 / 3, abs=4 * (5 / 3 / np.sqrt(4000) + 1 / 3 / np.sqrt(2000)))
-    weibull = fitted(2e-6 * generator.weibull(1.5, 2000) - 6e-6)
-    assert weibull.best.distribution is Distribution.WEIBULL
-    assert weibull.best.shape == pytest.approx(1.5, abs=4 * 0.78 * 1.5 / np.sqrt(2000))
-    lognormal = fitted(2e-6 * generator.lognormal(0.0, 0.4, 2000) - 6e-6)
-    assert lognormal.best.distribution is Distribution.LOGNORMAL
-    assert lognormal.best.shape == pytest.approx(0.4, abs=4 * 0.4 / np.sqrt(4000))
-    assert lognormal.best.scale == pytest.approx(2e-6, rel=4 * 0.4 / np.sqrt(2000))
-    assert [fit.aic for fit in lognormal.fits] == sorted(fit.aic for fit in lognormal.fits)
-    assert max(fit.fits[0].distance for fit in (normal, weibull, lognormal)) < 1.6 / np.sqrt(2000)
-    radii = fitted(np.hypot(*generator.standard_normal((2, 2000))) * 1e-6, are_radii=True)
-    assert {fit.distribution for fit in radii.fits if fit.aic < radii.best.aic + 6} >= {Distribution.NORMAL}
+    assert normal.fit.cpk == pytest.approx(5 / 3, abs=4 * (5 / 3 / np.sqrt(4000) + 1 / 3 / np.sqrt(2000)))
+    weibull = measured(2e-6 * generator.weibull(1.5, 2000) - 6e-6)
+    assert weibull.fit.best.distribution is Distribution.WEIBULL
+    assert weibull.fit.best.shape == pytest.approx(1.5, abs=4 * 0.78 * 1.5 / np.sqrt(2000))
+    lognormal = measured(2e-6 * generator.lognormal(0.0, 0.4, 2000) - 6e-6)
+    assert lognormal.fit.best.distribution is Distribution.LOGNORMAL
+    assert lognormal.fit.best.shape == pytest.approx(0.4, abs=4 * 0.4 / np.sqrt(4000))
+    assert lognormal.fit.best.scale == pytest.approx(2e-6, rel=4 * 0.4 / np.sqrt(2000))
+    assert [fit.aic for fit in lognormal.fit.fits] == sorted(fit.aic for fit in lognormal.fit.fits)
+    assert max(own.fit.best.distance for own in (normal, weibull, lognormal)) < 1.6 / np.sqrt(2000)
+    radii = measured(np.hypot(*generator.standard_normal((2, 2000))) * 1e-6, are_radii=True)
+    assert {fit.distribution for fit in radii.fit.fits if fit.aic < radii.fit.best.aic + 6} >= {Distribution.NORMAL}
     assert radii.cp == pytest.approx(6 / 3.44, rel=4 / np.sqrt(8000) + 0.001)
-    below = fitted(np.linspace(-7e-6, 3e-6, 50))
-    assert [fit.distribution for fit in below.fits] == [Distribution.NORMAL]
+    below = measured(np.linspace(-7e-6, 3e-6, 50))
+    assert [fit.distribution for fit in below.fit.fits] == [Distribution.NORMAL]
 
 
 @pytest.mark.parametrize("spectrum", KNOWN_RANGES)
