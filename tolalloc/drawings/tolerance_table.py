@@ -344,14 +344,13 @@ def load_tolerance_table(
         raise InputError(f"{path}: the table has no rows; one row per source is needed.")
     rows = [(number, dict(zip(headers, cells, strict=True)) | more) for number, cells in others]
     _require_units(path, [(name, unit) for name, unit in stated if name not in own], rows)
-    known = [
-        (number, _both_ways(_without_units({name: row[name] for name in (*kept, *more)}, place), place))
-        for number, row, place in (
-            (number, row, f"{path}, row {number} ({row['id'] or 'no id'})") for number, row in rows
-        )
-    ]
+    known = []
+    for number, row in rows:
+        place = f"{path}, row {number} ({row['id'] or 'no id'})"
+        bare = _without_units({name: row[name] for name in (*kept, *more)}, place)
+        known.append((number, _both_ways(bare, place)))
     sources = sources_of_rows(known, capabilities, str(path), path.parent)
-    full = dict(zip((split_header(header)[0] for header in first), first, strict=True))
+    full = dict(zip(headers, first, strict=True))
     return tuple(
         replace(source, own_cells=tuple((full[name], row[name]) for name in own))
         for source, (_, row) in zip(sources, rows, strict=True)

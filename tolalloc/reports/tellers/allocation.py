@@ -103,7 +103,7 @@ class AllocationTeller(Teller[AllocationResult]):
         )
 
     def _risks(self) -> Iterator[Section]:
-        yield Section(heading=_say("heading_risks"), paragraphs=risks(self.result), first=True)
+        yield Section(heading=_say("heading_risks"), paragraphs=tuple(risks(self.result)), first=True)
 
     def _sources(self) -> Iterator[Section]:
         sources = sources_table(self.result)
@@ -166,10 +166,9 @@ class AllocationTeller(Teller[AllocationResult]):
     def _dimensions(self) -> Iterator[Section]:
         """Yield, on the first page, what to write, a line per dimension."""
         result = self.result
-        made = " ".join(texts.amounts_convention(result))
         yield Section(
             heading=_say("heading_dimensions"),
-            paragraphs=(*((made,) if made else ()), _say("dimensions"), _say("files")),
+            paragraphs=(*texts.amounts_convention(result), _say("dimensions"), _say("files")),
             tables=(("dimensions", dimensions_table(result).frame(self.header.cost_unit)),),
             unfolded=True,
             first=True,

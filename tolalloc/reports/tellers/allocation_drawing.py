@@ -224,23 +224,22 @@ def effects_figure(result: AllocationResult) -> tuple[Figure, ...]:
     return (Figure("effects", _say("figure_effects"), axis, series=bars, vertical=((0.0, ""),)),)
 
 
-def risks(result: AllocationResult) -> tuple[str, ...]:
-    """Return what can go wrong with the drawing: in the shop, with its first driver, and beyond what was computed."""
-    found, driver = [], next(iter(effects(result).items()), ("", 0.0))
+def risks(result: AllocationResult) -> Iterator[str]:
+    """Yield what can go wrong with the drawing: in the shop, with its first driver, and beyond what was computed."""
+    driver, effect = next(iter(effects(result).items()), ("", 0.0))
     name, members = min(dimensions_table(result).rows, key=lambda row: _change(row[1][0]))
     before, after = members[0]
     if (change := _change(members[0])) < -_NOTICED:
         unit = zone_unit(result.space.errors.sources)
         zones = {"before": zone_in(before, unit), "after": zone_in(after, unit), "unit": unit}
-        found.append(_say("risk_tightest", name=name, change=-change / 100, **zones))
-    if result.met and driver[1] > 0:
+        yield _say("risk_tightest", name=name, change=-change / 100, **zones)
+    if result.met and effect > 0:
         left = max(-result.chosen.checks[0].tightest.excess, 0.0)
-        moved = {"effect": driver[1]} | ({"left": left} if left > _NOTHING_LEFT * driver[1] else {})
+        moved = {"effect": effect} | ({"left": left} if left > _NOTHING_LEFT * effect else {})
         said = {key: with_unit(f"{value:.2g}", result.leading) for key, value in moved.items()}
         key = "risk_driver" if "left" in said else "risk_driver_spent"
-        found.append(_say(key, name=driver[0], step=_STEP, output=short(result.leading), **said))
-    found.append(_say("risk_not_included", what=portrait_of(result.model).not_included))
-    return tuple(found)
+        yield _say(key, name=driver, step=_STEP, output=short(result.leading), **said)
+    yield _say("risk_not_included", what=portrait_of(result.model).not_included)
 
 
 def zones_figure(rows: Sequence[_Row]) -> Figure:

@@ -206,7 +206,7 @@ def drawn_amounts(result: AllocationResult) -> tuple[str, ...]:
     before, chosen = (drawn.by_setting @ design.settings for design in (result.free.baseline, result.chosen))
     amount = "amount" if np.allclose(before, chosen, rtol=1e-6, atol=_WRITTEN) else "amount_changed"
     amounts = enumerated(
-        _say(amount, name=short(name), value=with_unit(_signed(new), name), before=_signed(was))
+        _say(amount, name=short(name), value=with_unit(number(new, ".2f"), name), before=number(was, ".2f"))
         for name, was, new in zip(drawn.names, before, chosen, strict=True)
     )
     word = portrait_of(result.model).settings_word
@@ -217,11 +217,6 @@ def amounts_convention(result: AllocationResult) -> tuple[str, ...]:
     """Return what the signs of these amounts mean, if that must be said."""
     convention = result.model.drawn_amounts.convention
     return (_say("convention", convention=convention),) if convention and result.space.settings else ()
-
-
-def _signed(amount: float) -> str:
-    """Return an amount as it is written."""
-    return number(amount, ".2f")
 
 
 def _stay(result: AllocationResult) -> str:
