@@ -15,7 +15,7 @@ from tolalloc.allocation.space.effort import AllocationEffort
 from tolalloc.allocation.space.joint_yield import JointCheck, JointRequirement
 from tolalloc.allocation.verify.verification import Verifier
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.reports.tellers.allocation_tables import today_table
+from tolalloc.reports.tellers.allocation_tables import today_frame
 from tolalloc.study.prepared import Prepared
 
 GAP, PLAY = "gap [mm]", "play [mm]"
@@ -165,8 +165,8 @@ def test_a_limit_that_costs_nothing_leaves_its_failures_to_the_other(monkeypatch
     assert found.met
     prices = dict.fromkeys((own.stack.name for own in found.chosen.constraints), 1.0)
     monkeypatch.setattr(type(found.free), "prices", prices)  # a local model gives a price to what no unit misses too
-    rows = today_table(found, "cost units").rows
-    assert {row.name: row.binds for row in rows if row.limit and row.name in (GAP, PLAY)} == {GAP: "yes", PLAY: ""}
+    rows = today_frame(found, "cost units").set_index("drawing")
+    assert rows.loc[[GAP, PLAY], "binds"].to_dict() == {GAP: "yes", PLAY: ""}
 
 
 def test_the_first_sentence_says_the_yield_of_all_limits(answers):

@@ -15,7 +15,7 @@ from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier
 from tolalloc.capability.monte_carlo import proportion
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.reports.tellers.allocation_sentences import headline
-from tolalloc.reports.tellers.allocation_tables import requirements_table, today_table, tried_table
+from tolalloc.reports.tellers.allocation_tables import requirements_table, today_frame, tried_table
 from tolalloc.study.prepared import Prepared
 
 TARGET = 0.9973
@@ -175,14 +175,14 @@ def answer() -> ta.Answer:
 
 @pytest.mark.slow
 def test_the_first_page_tells_each_side(answer):
-    rows = {row.limit: row for row in today_table(answer.result, "cost units").rows if row.limit}
-    upper, lower = rows["≤ 0.7"], rows["≥ 0.3"]
-    assert lower.before == pytest.approx(0.398, abs=1e-3)
-    assert 0.4 < lower.after < 0.42, "the zones of the gap became smaller"
-    assert (upper.binds, lower.binds) == ("yes", "")
-    assert lower.kept_before == lower.kept_after == 100
-    assert upper.kept_before < 99.73
-    assert rows["≥ 99.73 %"].kept_before == upper.kept_before
+    rows = today_frame(answer.result, "cost units").set_index("limit")
+    upper, lower = rows.loc["≤ 0.7"], rows.loc["≥ 0.3"]
+    assert lower["as it is"] == pytest.approx(0.398, abs=1e-3)
+    assert 0.4 < lower["as drawn"] < 0.42, "the zones of the gap became smaller"
+    assert (upper["binds"], lower["binds"]) == ("yes", "")
+    assert lower["yield [%]"] == lower["yield as drawn [%]"] == 100
+    assert upper["yield [%]"] < 99.73
+    assert rows.loc["≥ 99.73 %", "yield [%]"] == upper["yield [%]"]
     table = requirements_table(answer.result).frame().set_index("limit")
     low, high = table.loc["at least 0.3 mm"], table.loc["at most 0.7 mm"]
     assert low["slack [mm]"] == pytest.approx(low["kept: tolerances [mm]"] - 0.3)
@@ -301,8 +301,8 @@ def test_so_it_does_beside_another_limit():
     found = centred(0.0, ta.Limit(lower=0.3, upper=0.7), {"a [mm]": ta.Limit(upper=14.0)})
     assert found.met
     assert found.cost == pytest.approx(0.4 / zone, rel=0.02)
-    rows = {row.limit: row for row in today_table(found, "cost units").rows if row.limit}
-    assert rows["≥ 0.3"].before == pytest.approx(norm.ppf(SHARE / 2, 0.56, 0.1 * np.sqrt(2) / 3), abs=2e-3)
+    rows = today_frame(found, "cost units").set_index("limit")
+    assert rows.loc["≥ 0.3", "as it is"] == pytest.approx(norm.ppf(SHARE / 2, 0.56, 0.1 * np.sqrt(2) / 3), abs=2e-3)
 
 
 @pytest.mark.slow

@@ -76,8 +76,8 @@ class AllocationTeller(Teller[AllocationResult]):
     @property
     def headline_table(self) -> tuple[pd.DataFrame, str]:
         """The drawing as it is and as drawn."""
-        table = tables.today_table(self.result, self.header.cost_unit)
-        return table.terminal(self.header.cost_unit), self.header.name
+        shown = tables.today_frame(self.result, self.header.cost_unit)
+        return shown.drop(columns=["shown for", "binds"], errors="ignore"), self.header.name
 
     @property
     def shown(self) -> tuple[str, ...]:
@@ -141,12 +141,11 @@ class AllocationTeller(Teller[AllocationResult]):
 
     def _today(self) -> Iterator[Section]:
         """Yield the first page: the drawing as it is beside the drawing as drawn."""
-        result, unit = self.result, self.header.cost_unit
-        table = tables.today_table(result, unit)
+        result = self.result
         yield Section(
             heading=_say("heading_today"),
             figures=(figures.units_figure(result), *effects_figure(result)),
-            tables=((table.name, table.frame(unit)),),
+            tables=(("today and as drawn", tables.today_frame(result, self.header.cost_unit)),),
             paragraphs=(*texts.today_values(result), *texts.capability_change(result)),
             first=True,
         )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pandas as pd
 
@@ -70,67 +68,49 @@ def _limit(row: _Limited) -> str:
     return f"{'at most' if side.sign > 0 else 'at least'} {side.limit:g} {unit_of(check.requirement.output)}"
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Compared:
-    """What is compared between the drawing as it is and as drawn."""
-
-    name: str
-    shown: str = ""  # What must be shown of the limit
-    limit: str = ""
-    before: float = float("nan")
-    after: float = float("nan")
-    kept_before: float = float("nan")  # Share of units within the limit [%]
-    kept_after: float = float("nan")
-    binds: str = ""
-
-
-def today_table(result: AllocationResult, cost_unit: str) -> Table[_Compared]:
+def today_frame(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     """Return cost, limits and amounts of the drawing as it is beside the drawing as drawn, and which limits bind.
 
     Beside a limit stands what was shown to be kept, which is compared with it, as in the workbook of the drawing.
     """
     before, after, portrait = result.free.baseline, result.chosen, portrait_of(result.model)
-    rows = [_Compared(name=f"cost [{cost_unit}]", before=before.cost, after=after.cost)]
+    rows: list[dict[str, object]] = [
+        {"drawing": f"cost [{cost_unit}]", "as it is": before.cost, "as drawn": after.cost},
+    ]
     sides = zip(before.limited_sides, after.limited_sides, strict=True)
     for (check, side), (own, drawn) in sides:
         asked = own.requirement
         if isinstance(asked, JointRequirement):
             continue
         rows.append(
-            _Compared(
-                name=f"{portrait.display_name(asked.output)} [{unit_of(asked.output)}]",
-                shown="" if after.jointly else asked.guarantee.words,
-                limit=f"{'≤' if drawn.sign > 0 else '≥'} {drawn.limit:.4g}",
-                before=side.value,
-                after=drawn.value,
-                kept_before=100 * before.yield_of(check.requirement, side.sign).estimate,
-                kept_after=100 * after.yield_of(asked, drawn.sign).estimate,
-                binds="yes" if result.price_of(own, drawn) else "",
-            )
+            {
+                "drawing": f"{portrait.display_name(asked.output)} [{unit_of(asked.output)}]",
+                "shown for": "" if after.jointly else asked.guarantee.words,
+                "limit": f"{'≤' if drawn.sign > 0 else '≥'} {drawn.limit:.4g}",
+                "as it is": side.value,
+                "as drawn": drawn.value,
+                "yield [%]": 100 * before.yield_of(check.requirement, side.sign).estimate,
+                "yield as drawn [%]": 100 * after.yield_of(asked, drawn.sign).estimate,
+                "binds": "yes" if result.price_of(own, drawn) else "",
+            }
         )
     if len(after.alone) > 1:
         together = after.jointly or len(after.checks) == 1
         asked_of_all = after.checks[-1].requirement.guarantee if together else None
         rows.append(
-            _Compared(
-                name="all limits at once",
-                limit=f"≥ {100 * asked_of_all.target:.4g} %" if isinstance(asked_of_all, AtYield) else "",
-                kept_before=100 * before.joint.estimate,
-                kept_after=100 * after.joint.estimate,
-            )
+            {
+                "drawing": "all limits at once",
+                "limit": f"≥ {100 * asked_of_all.target:.4g} %" if isinstance(asked_of_all, AtYield) else "",
+                "yield [%]": 100 * before.joint.estimate,
+                "yield as drawn [%]": 100 * after.joint.estimate,
+            }
         )
-    rows += [_Compared(name=own.name, before=own.before, after=own.value) for own in result.amounts]
-    columns: list[Column[_Compared]] = [
-        Column("drawing", lambda row: row.name, terminal=1),
-        Column("shown for", lambda row: row.shown, nothing=""),
-        Column("limit", lambda row: row.limit, nothing="", terminal=2),
-        Column("as it is", lambda row: row.before, terminal=3),
-        Column("as drawn", lambda row: row.after, terminal=4),
-        Column("yield [%]", lambda row: row.kept_before, terminal=5),
-        Column("yield as drawn [%]", lambda row: row.kept_after, terminal=6),
-        Column("binds", lambda row: row.binds, nothing=""),
-    ]
-    return Table(name="today and as drawn", columns=columns, rows=rows)
+    rows += [{"drawing": own.name, "as it is": own.before, "as drawn": own.value} for own in result.amounts]
+    words = ("shown for", "limit", "binds")
+    frame = pd.DataFrame([{**dict.fromkeys(words, ""), **row} for row in rows])
+    numbers = ("as it is", "as drawn", "yield [%]", "yield as drawn [%]")
+    blank = [name for name in words if not frame[name].any()]
+    return frame[["drawing", *words[:2], *numbers, words[2]]].drop(columns=blank)
 
 
 def designs_table(result: AllocationResult) -> Table[_Named]:
