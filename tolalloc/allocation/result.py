@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from jaxtyping import Float
 
 from tolalloc.allocation.cost.process_costs import today
 from tolalloc.allocation.cost.unit_price import QualityLoss, YieldLadder
@@ -272,6 +273,22 @@ class AllocationResult:
             missed = 1 - self.chosen.yield_of(check.requirement, side.sign).estimate
             touches = missed > _USED * jointly.joint.failures
         return price if touches else 0.0
+
+    @cached_property
+    def asked_by(self) -> dict[str, str]:
+        """Dimension whose zone is free → limited output whose price holds it most; nothing where one limit binds alone.
+
+        The largest of price·∂load/∂zone over the limited sides, by the local models of the drawing (own derivation).
+        """
+        chosen, held = self.chosen, dict[str, Float[np.ndarray, " group"]]()
+        for check, side in chosen.limited_sides:
+            if price := self.price_of(check, side):
+                output, slopes = check.requirement.output, side.stack.zone_slopes(chosen.scales)
+                held[output] = held.get(output, 0.0) + price * slopes
+        if len(held) < 2:
+            return {}
+        outputs, most = [*held], np.argmax([*held.values()], axis=0)
+        return dict(zip(chosen.space.groups, (outputs[at] for at in most), strict=True))
 
     @property
     def process_changes(self) -> dict[str, float]:

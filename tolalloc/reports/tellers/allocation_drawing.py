@@ -103,6 +103,10 @@ def dimensions_table(result: AllocationResult) -> Table[_Dimension]:
         name = row[1][0][0].name
         return before[name] if before[name] != after[name] else ""
 
+    def limit_of(row: _Dimension) -> str:
+        output = result.asked_by.get(row[1][0][0].dimension, "")
+        return portrait.display_name(output) if output else ""
+
     columns: list[Column[_Dimension]] = [
         Column("dimension", lambda row: row[0], terminal=1),
         *own_words(_after, lambda row: row[0]),
@@ -115,6 +119,7 @@ def dimensions_table(result: AllocationResult) -> Table[_Dimension]:
         Column("process before", process_before, nothing=""),
         Column("process", lambda row: after[row[1][0][0].name], nothing="as today", terminal=6),
         Column("index as drawn [%]", lambda row: parts.get(row[1][0][0].dimension, np.nan), terminal=3),
+        Column("limit that holds it", limit_of, nothing=""),
         Column("cost before [{cost}]", lambda row: np.sum([old.cost for old, _ in row[1]])),
         Column("cost [{cost}]", lambda row: np.sum([new.cost for _, new in row[1]]), terminal=4),
         Column("locked", lambda row: "yes" if row[1][0][0].locked else "no", nothing="no"),

@@ -43,7 +43,8 @@ def requirements_table(result: AllocationResult) -> Table[_Limited]:
         header = f"kept: {label} [{unit}]"
         return Column(header, lambda row: design.limited_sides[row[0]][1].value)
 
-    unit = " or ".join(dict.fromkeys(unit_of(own.output) for own in result.requirements))
+    units = {unit_of(own.output) for own in result.requirements}
+    unit = units.pop() if len(units) == 1 else "unit of the limit"
     columns: list[Column[_Limited]] = [
         Column("requirement", lambda row: row[2].requirement.output),
         Column("limit", _limit),
