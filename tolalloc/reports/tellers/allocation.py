@@ -112,7 +112,6 @@ class AllocationTeller(Teller[AllocationResult]):
             figures=(zones_figure(sources.rows),),
             tables=((sources.name, sources.frame(self.header.cost_unit)),),
             paragraphs=(_say("sources"),),
-            unfolded=True,
             folded=True,
         )
 
