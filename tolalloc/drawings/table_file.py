@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from datetime import date, time, timedelta
 from enum import StrEnum
 from io import BytesIO, StringIO
+from math import inf, isfinite, nan
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args, get_origin
 from unicodedata import normalize
@@ -542,6 +543,17 @@ def number_at(place: str, field: str, text: str, allowed: str = "a number with a
         return plain_number(text)
     except ValueError:
         raise InputError.at(place, field, text, allowed) from None
+
+
+def finite_at(place: str | Path, field: str, text: str, allowed: str, most: float = inf) -> float:
+    """Return the number that a cell shows, finite and at most so large either way, or raise with its place."""
+    try:
+        value = plain_number(text)
+    except ValueError:
+        value = nan
+    if not (isfinite(value) and abs(value) <= most):
+        raise InputError.at(place, field, text, allowed)
+    return value
 
 
 def usual_word(text: str) -> str:

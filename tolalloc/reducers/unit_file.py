@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from io import StringIO
-from math import cos, isfinite, radians, sin
+from math import cos, radians, sin
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -17,7 +17,7 @@ from pydantic import Field, StrictBool
 
 from tolalloc.drawings.heads import split_header
 from tolalloc.drawings.sources import Source, is_angular, neglected_columns
-from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table
+from tolalloc.drawings.table_file import TextTable, finite_at, read_text_table
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.files import Record, no_formula, read_toml, shipped_or_path, validated
 from tolalloc.reading.units import MICROMETRE, MICRORADIAN
@@ -276,22 +276,11 @@ def load_units(path: str | Path, neglected: tuple[str, ...] = ()) -> tuple[Built
         deviations = {}
         for place, (column, factor, largest) in columns.items():
             with faults.kept():
-                where = f"{table.path}, row {row} (unit {name})"
-                deviations[column] = factor * _deviation(cells[place], where, table.headers[place], largest)
+                where, allowed = f"{table.path}, row {row} (unit {name})", f"a number from {-largest:g} to {largest:g}"
+                deviations[column] = factor * finite_at(where, table.headers[place], cells[place], allowed, largest)
         units.append(BuiltUnit(name=name, source=table.path.name, deviations=deviations, neglected=neglected))
     faults.require_none()
     return tuple(units)
-
-
-def _deviation(cell: str, place: str, header: str, largest: float) -> float:
-    """Return the number in a cell."""
-    try:
-        value = plain_number(cell)
-    except ValueError:
-        value = float("nan")
-    if not (isfinite(value) and abs(value) <= largest):
-        raise InputError.at(place, header, cell, f"a number from {-largest:g} to {largest:g}")
-    return value
 
 
 def table_text(headers: Sequence[str], rows: Iterable[Sequence[object]], comments: Sequence[str] = ()) -> str:

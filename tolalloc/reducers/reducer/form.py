@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.drawings.heads import split_header
-from tolalloc.drawings.table_file import plain_number, read_text_table
+from tolalloc.drawings.table_file import finite_at, read_text_table
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
 
@@ -194,12 +194,7 @@ def read_profile(path: Path, columns: Sequence[str], may: Sequence[str] = ()) ->
     values = np.empty((len(table.rows), len(names)))
     for at, (row, cells) in enumerate(zip(table.rows, table.cells, strict=True)):
         for column, name in enumerate(names):
-            try:
-                values[at, column] = plain_number(cells[column])
-            except ValueError:
-                values[at, column] = np.nan
-            if not np.isfinite(values[at, column]):
-                raise InputError.at(f"{path}, row {row}", name, cells[column], "a number")
+            values[at, column] = finite_at(f"{path}, row {row}", name, cells[column], "a number")
     return dict(zip(names, (values * factors).T, strict=True))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf, isfinite
+from math import inf
 from numbers import Real
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -13,7 +13,7 @@ from jaxtyping import Float
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from tolalloc.drawings.heads import split_header
-from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table
+from tolalloc.drawings.table_file import TextTable, finite_at, read_text_table
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.files import Record, read_toml, shipped_or_path, validated
 from tolalloc.reading.units import ARCSECOND, DEGREE, MILLIMETRE
@@ -329,11 +329,5 @@ def _columns(table: TextTable) -> list[int]:
 
 def _arcseconds(cell: str, header: str, place: str) -> float:
     """Return the number in a cell."""
-    try:
-        value = plain_number(cell)
-    except ValueError:
-        value = np.nan
-    if not (isfinite(value) and abs(value) <= LARGEST):
-        allowed = f"a number with a decimal point from {-LARGEST:g} to {LARGEST:g}"
-        raise InputError.at(place, header, cell, allowed)
-    return value
+    allowed = f"a number with a decimal point from {-LARGEST:g} to {LARGEST:g}"
+    return finite_at(place, header, cell, allowed, LARGEST)

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ from jaxtyping import Float, Int
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import is_angular
-from tolalloc.drawings.table_file import plain_number, read_text_table
+from tolalloc.drawings.table_file import finite_at, read_text_table
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import ARCSECOND, MICROMETRE
 from tolalloc.reducers.equivalent.columns import source_name
@@ -227,13 +226,8 @@ def _deviation(place: str, error: str, cell: str, unit: str) -> float:
     if unit not in allowed:
         raise InputError.at(place, f"unit of {error}", unit, " or ".join(allowed))
     largest = LARGEST_ANGLE if angle else LARGEST_LENGTH
-    try:
-        value = plain_number(cell)
-    except ValueError:
-        value = float("nan")
-    if not (isfinite(value) and abs(value) <= largest):
-        raise InputError.at(place, f"value of {error}", cell, f"a number from {-largest:g} to {largest:g} {unit}")
-    return value * (ARCSECOND if angle else MICROMETRE)
+    stated = f"a number from {-largest:g} to {largest:g} {unit}"
+    return finite_at(place, f"value of {error}", cell, stated, largest) * (ARCSECOND if angle else MICROMETRE)
 
 
 def drawn_parts(errors: ErrorModel, reducer: Reducer, units: int, seeds: SeedTree) -> tuple[MeasuredPart, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from math import isfinite, pi, sqrt
+from math import pi, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from scipy.interpolate import BSpline, make_lsq_spline
 from scipy.linalg import solveh_banded
 
 from tolalloc.drawings.heads import split_header
-from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table
+from tolalloc.drawings.table_file import TextTable, finite_at, read_text_table
 from tolalloc.exceptions import Faults, InputError
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MICRORADIAN
 
@@ -153,14 +153,8 @@ def column_readings(
 
 def _reading(cell: str, place: str, header: str) -> float:
     """Return the number in a cell."""
-    try:
-        value = plain_number(cell)
-    except ValueError:
-        value = np.inf
-    if not isfinite(value):
-        allowed = "a number with a decimal point, or nothing where the instrument gave none"
-        raise InputError.at(place, header, cell, allowed)
-    return value
+    allowed = "a number with a decimal point, or nothing where the instrument gave none"
+    return finite_at(place, header, cell, allowed)
 
 
 def load_readings(path: Path, along: str, values: str) -> RawReadings:
