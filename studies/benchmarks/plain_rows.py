@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.reducers.equivalent.condensation import bilateral_groups
-from tolalloc.reducers.equivalent.interfaces import flank_terms, pin_contact, pin_terms, tooth_terms, wave_terms
+from tolalloc.reducers.equivalent.interfaces import flank_terms, pin_contact, pin_terms, tooth_columns, wave_columns
 from tolalloc.reducers.equivalent.springs import HARMONICS, Positions, SpringGroup, harmonic_waves
 from tolalloc.reducers.reducer.design import Reducer
 
@@ -42,10 +42,10 @@ def dense_rows(at: Positions) -> SpringGroup:
         first = coordinates.disc(disc)
         displacement[:, disc, :, first : first + 3] = np.swapaxes(contact.by_disc[:, disc], 1, 2)
         waves = harmonic_waves(contact.tooth_angle[:, disc], at.orders)
-        for entry, name in enumerate(wave_terms(disc, at.orders)):
+        for entry, name in enumerate(wave_columns(disc, at.orders)):
             column = columns.setdefault(name, np.zeros((angles, discs, pins)))
             column[:, disc] = contact.by_tooth[:, disc, entry // waves.shape[2]] * waves[..., entry % waves.shape[2]]
-        for entry, name in enumerate(tooth_terms(reducer, disc)):
+        for entry, name in enumerate(tooth_columns(reducer, disc)):
             column = columns.setdefault(name, np.zeros((angles, discs, pins)))
             met = contact.tooth[:, disc] == entry % stage.disc_teeth
             column[:, disc] = np.where(met, contact.by_tooth[:, disc, entry // stage.disc_teeth], 0.0)

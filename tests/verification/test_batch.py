@@ -18,8 +18,7 @@ from tolalloc.reducers.equivalent.solvers.batch import (
     ROW,
     make_batch,
     make_history,
-    nonzero_rows,
-    nonzero_waves,
+    present,
     solve_batch_at,
     start_next,
 )
@@ -118,7 +117,9 @@ def test_units_with_play_settle_in_their_register_where_the_solver_for_one_sampl
     batch = make_batch(layout, size, tables.contact_stiffness.shape[1], ROW)
     play = make_play(size, tables.play_stiffness.shape[1], ROW)
     batch.values[:, :samples] = values.T
-    rows, waves = nonzero_rows(batch.values, 0, layout.torque + 1), nonzero_waves(layout, batch.values)
+    loads = layout.torque + 1
+    rows = present(batch.values, 0, loads, loads)
+    waves = present(batch.values, layout.wave, layout.tooth, layout.waves)
     solve_batch_at(law, (0, 0), 0, tables, layout, rows, waves, True, True, samples, batch, play, careful)
     settled, memory = np.flatnonzero(~careful[:samples]), make_memory(law, tables)
     assert settled.size > 0.9 * samples
@@ -139,7 +140,9 @@ def test_nearly_all_samples_settle_in_their_register(rv20e, table4, generator):
     values_of(units, -1.0, layout, columns.map, values)
     batch = make_batch(layout, tables.load.shape[2], tables.contact_stiffness.shape[1], ROW)
     batch.values[:, :BATCH] = values.T
-    rows, waves = nonzero_rows(batch.values, 0, layout.torque + 1), nonzero_waves(layout, batch.values)
+    loads = layout.torque + 1
+    rows = present(batch.values, 0, loads, loads)
+    waves = present(batch.values, layout.wave, layout.tooth, layout.waves)
     teeth_deviate = np.any(batch.values[layout.tooth : layout.tilt] != 0.0)
     given = (tables, layout, rows, waves, teeth_deviate, np.any(batch.values[layout.flank] != 0.0))
     solve_batch_at(LINEAR, (0, 0), 0, *given, BATCH, batch, None, careful)

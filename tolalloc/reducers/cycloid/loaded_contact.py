@@ -215,6 +215,11 @@ class PressedDiscs:
         """What the modification leaves, and where the first pin touches."""
         return clearance_of(self.profile, self.exact)
 
+    @cached_property
+    def gap(self) -> Gap:
+        """Clearance of pins at their angles on a disc rotated by an angle [m]."""
+        return gap_of(self.profile, self.clearance.exact)
+
     def pin_angles(self, phase: AtPhases) -> AtPins:
         """Return φ of every pin from its disc's crank direction [rad]."""
         stage = self.reducer.cycloid_stage
@@ -253,7 +258,7 @@ def _loaded(discs: PressedDiscs, method: str, phase: AtPhases, deflection: AtPha
     """
     reducer, stage, closed = discs.reducer, discs.reducer.cycloid_stage, discs.clearance
     angles = discs.pin_angles(phase)
-    gap, lever = gap_of(discs.profile, closed.exact), normals(stage.shortening, angles).lever
+    lever = normals(stage.shortening, angles).lever
     rotations = closed.rotation + deflection / stage.disc_pitch_radius
     evenly = force  # What the even load would have to be for the pressure where it is largest
     if stage.crowning:
@@ -262,12 +267,12 @@ def _loaded(discs: PressedDiscs, method: str, phase: AtPhases, deflection: AtPha
         method=method,
         phase=phase,
         pin_angle=angles,
-        gap=gap(angles, closed.rotation),
+        gap=discs.gap(angles, closed.rotation),
         deflection=deflection,
         force=force,
         pressure=peak_pressure(stage, reducer.contact_modulus, angles, evenly),
         torque=stage.disc_pitch_radius * (lever * force).sum(axis=2),
-        zone=_zones(gap, rotations, closed.first_contact),
+        zone=_zones(discs.gap, rotations, closed.first_contact),
     )
 
 
@@ -292,8 +297,7 @@ def pressed_linear(discs: PressedDiscs, phase: AtPhases, deflection: float | Non
     (707.2, 16)
     """
     stage, angles = discs.reducer.cycloid_stage, discs.pin_angles(phase)
-    gap, closed = gap_of(discs.profile, discs.clearance.exact), discs.clearance
-    lever, distance = normals(stage.shortening, angles).lever, gap(angles, closed.rotation)
+    lever, distance = normals(stage.shortening, angles).lever, discs.gap(angles, discs.clearance.rotation)
 
     def shares(depth: AtPhases) -> AtPins:
         return np.asarray(np.maximum(lever - distance / depth[:, np.newaxis, np.newaxis], 0.0))
@@ -346,67 +350,29 @@ def _approach(reducer: Reducer, force: AtPhases) -> AtPhases:
     return np.asarray(force / scale * (np.log(scale / force) + log_length))
 
 
-@dataclass(frozen=True)
-class _Balance:
-    """Pins of all phases, pressed by a deflection of the discs."""
+def _balancing(
+    discs: PressedDiscs, torque: Callable[[AtPhases, Int[np.ndarray, " some"]], AtPhases], phases: int
+) -> AtPhases:
+    """Return the deflections at which the torques balance [m], given that of the pins under some at some phases."""
+    from scipy.optimize import elementwise
 
-    discs: PressedDiscs
-    pin_angle: Float[np.ndarray, "phase pin"]  # Angle φ of the pins of all discs [rad]
-
-    @cached_property
-    def _gap(self) -> Gap:
-        return gap_of(self.discs.profile, self.discs.clearance.exact)
-
-    @cached_property
-    def _lever(self) -> Float[np.ndarray, "phase pin"]:
-        stage = self.discs.reducer.cycloid_stage
-        return np.asarray(stage.disc_pitch_radius * normals(stage.shortening, self.pin_angle).lever)
-
-    @cached_property
-    def _contact(self) -> tuple[Float[np.ndarray, "phase pin"], Float[np.ndarray, "phase pin"]]:
-        reducer = self.discs.reducer
-        return contact_stiffness(reducer.cycloid_stage, reducer.stiffness, self.pin_angle)
-
-    def forces(
-        self, deflection: Float[np.ndarray, " some"], phase: Int[np.ndarray, " some"]
-    ) -> Float[np.ndarray, "some pin"]:
-        """Return the forces of all pins at some phases, each under its own deflection [N]."""
-        reducer, (contact, log_length) = self.discs.reducer, self._contact
-        rotation = self.discs.clearance.rotation + deflection / reducer.cycloid_stage.disc_pitch_radius
-        angles = self.pin_angle[phase]
-        compression = -self._gap(angles, np.repeat(rotation[:, np.newaxis], angles.shape[1], axis=1))
-        law, force = LAWS[reducer.stiffness.pin_contact_law], np.empty(compression.size)
-        pin_forces(law, contact[phase].ravel(), log_length[phase].ravel(), compression.ravel(), force)
-        return force.reshape(compression.shape)
-
-    def torque(
-        self, deflection: Float[np.ndarray, " some"], phase: Int[np.ndarray, " some"]
-    ) -> Float[np.ndarray, " some"]:
-        """Return the torques of the pins on the discs [N·m]."""
-        return np.asarray((self._lever[phase] * self.forces(deflection, phase)).sum(axis=1))
-
-    def deflection(self) -> AtPhases:
-        """Return the deflections at which the torques balance [m]."""
-        from scipy.optimize import elementwise
-
-        wanted, deepest = self.discs.torque, self.discs.reducer.cycloid_stage.pin_radius
-        phase = np.arange(len(self.pin_angle))
-        high, short = np.full(phase.size, MICROMETRE), phase
-        while (short := short[self.torque(high[short], short) < wanted]).size:
-            if high[short].max() >= deepest:
-                raise InputError(
-                    f"{self.discs.reducer.name}: torque {wanted:.6g} N·m on the discs is beyond any contact: pins "
-                    f"would be pressed in by more than their radius; allowed is below "
-                    f"{self.torque(high[short], short).min():.3g} N·m."
-                )
-            high[short] = np.minimum(2 * high[short], deepest)
-        found = elementwise.find_root(
-            lambda depth, at: self.torque(depth, at) - wanted,
-            (np.zeros(phase.size), high),
-            args=(phase,),
-            tolerances={"xrtol": 1e-13},
-        )
-        return np.asarray(found.x)
+    wanted, deepest = discs.torque, discs.reducer.cycloid_stage.pin_radius
+    phase = np.arange(phases)
+    high, short = np.full(phases, MICROMETRE), phase
+    while (short := short[torque(high[short], short) < wanted]).size:
+        if high[short].max() >= deepest:
+            raise InputError(
+                f"{discs.reducer.name}: torque {wanted:.6g} N·m on the discs is beyond any contact: pins would be "
+                f"pressed in by more than their radius; allowed is below {torque(high[short], short).min():.3g} N·m."
+            )
+        high[short] = np.minimum(2 * high[short], deepest)
+    found = elementwise.find_root(
+        lambda depth, at: torque(depth, at) - wanted,
+        (np.zeros(phases), high),
+        args=(phase,),
+        tolerances={"xrtol": 1e-13},
+    )
+    return np.asarray(found.x)
 
 
 def pressed(discs: PressedDiscs, phase: AtPhases) -> LoadedContact:
@@ -425,10 +391,22 @@ def pressed(discs: PressedDiscs, phase: AtPhases) -> LoadedContact:
     >>> round(float(found.force.max())), round(float(found.torque[0, 0]), 3)  # [N, N·m]
     (1144, 314.6)
     """
-    angles = discs.pin_angles(phase)
-    balance = _Balance(discs, angles.reshape(phase.size, -1))
-    deflection, law = balance.deflection(), discs.reducer.stiffness.pin_contact_law
-    force = balance.forces(deflection, np.arange(phase.size))
+    stage, stiffness, angles = discs.reducer.cycloid_stage, discs.reducer.stiffness, discs.pin_angles(phase)
+    pins, law = angles.reshape(phase.size, -1), stiffness.pin_contact_law
+    lever = stage.disc_pitch_radius * normals(stage.shortening, pins).lever
+    contact, log_length = contact_stiffness(stage, stiffness, pins)
+
+    def forces(deflection: AtPhases, at: Int[np.ndarray, " some"]) -> Float[np.ndarray, "some pin"]:
+        """Return the forces of all pins at some phases, each under its own deflection [N]."""
+        rotation = discs.clearance.rotation + deflection / stage.disc_pitch_radius
+        compression = -discs.gap(pins[at], np.repeat(rotation[:, np.newaxis], pins.shape[1], axis=1))
+        return np.asarray(pin_forces(LAWS[law], contact[at], log_length[at], compression)[0])
+
+    def torque(deflection: AtPhases, at: Int[np.ndarray, " some"]) -> AtPhases:
+        return np.asarray((lever[at] * forces(deflection, at)).sum(axis=1))
+
+    deflection = _balancing(discs, torque, phase.size)
+    force = forces(deflection, np.arange(phase.size))
     return _loaded(discs, f"{law} law at every pin", phase, deflection, force.reshape(angles.shape))
 
 

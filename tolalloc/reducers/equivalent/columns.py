@@ -16,8 +16,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.reducers.cycloid.solvers import LAWS, LINEAR
-from tolalloc.reducers.equivalent.interfaces import flank_terms, pin_terms, tilt_terms, tooth_terms, wave_terms
-from tolalloc.reducers.equivalent.springs import SpringGroup
+from tolalloc.reducers.equivalent.interfaces import flank_terms, pin_terms, tooth_columns, wave_columns
+from tolalloc.reducers.equivalent.springs import SpringGroup, vector_columns
 from tolalloc.reducers.reducer.design import Reducer
 
 
@@ -97,19 +97,22 @@ def columns_of(reducer: Reducer, groups: Sequence[SpringGroup], orders: tuple[in
             column = names.setdefault(name, len(names))
             entries.extend((first + entry, column, factor) for entry, factor in moved)
 
+    def add_each(first: int, own: Sequence[str]) -> None:
+        add(first, {name: [(at, 1.0)] for at, name in enumerate(own)})
+
     add(pin, pin_terms(reducer, orders))
     add(flank, flank_terms(reducer))
     for disc in range(discs):
-        add(wave + disc * waves, wave_terms(disc, orders))
-        add(tooth + disc * 2 * teeth, tooth_terms(reducer, disc))
+        add_each(wave + disc * waves, wave_columns(disc, orders))
+        add_each(tooth + disc * 2 * teeth, tooth_columns(reducer, disc))
         if LAWS[reducer.stiffness.pin_contact_law] == LINEAR:
-            add(tilt + disc * 2, tilt_terms(disc))
+            add_each(tilt + disc * 2, vector_columns(f"disc{disc + 1}.tilt"))  # turns with the disc [rad]
     nominal, element = np.zeros(layout.end), clearance
     nominal[:torque] = [constants.get(name, 0.0) for name in values]
     if form:
         nominal[wave + waves - 1 : tooth : waves] = 1.0  # once on every disc, whatever the errors are
     for group in played:
-        add(element, {name: [(at, 1.0)] for at, name in enumerate(group.clearance_columns)})
+        add_each(element, group.clearance_columns)
         add(element, group.clearance_terms)
         nominal[element : element + len(group.clearance_columns)] = group.clearance
         element += len(group.clearance_columns)

@@ -461,25 +461,15 @@ def flank_terms(reducer: Reducer) -> Terms:
     return {"modification.rotation": [(0, reducer.cycloid_stage.disc_pitch_radius)]}
 
 
-def wave_terms(disc: int, orders: tuple[int, ...]) -> Terms:
+def wave_columns(disc: int, orders: tuple[int, ...]) -> tuple[str, ...]:
     """Return the harmonic deviations of a disc's teeth: ``disc{j}.pitch`` along the arc, ``disc{j}.runout`` outward."""
-    names = (*harmonic_columns(f"disc{disc + 1}.pitch", orders), *harmonic_columns(f"disc{disc + 1}.runout", orders))
-    return {name: [(entry, 1.0)] for entry, name in enumerate(names)}
+    return (*harmonic_columns(f"disc{disc + 1}.pitch", orders), *harmonic_columns(f"disc{disc + 1}.runout", orders))
 
 
-def tooth_terms(reducer: Reducer, disc: int) -> Terms:
+def tooth_columns(reducer: Reducer, disc: int) -> tuple[str, ...]:
     """Return the deviations of single teeth t: ``disc{j}.each_tooth.pitch.{t}``, ``disc{j}.each_tooth.runout.{t}``."""
-    names = (
-        f"disc{disc + 1}.each_tooth.{kind}.{tooth + 1}"
-        for kind in ("pitch", "runout")
-        for tooth in range(reducer.cycloid_stage.disc_teeth)
-    )
-    return {name: [(entry, 1.0)] for entry, name in enumerate(names)}
-
-
-def tilt_terms(disc: int) -> Terms:
-    """Return the tilt of a disc, ``disc{j}.tilt``, which turns with it [rad]."""
-    return {name: [(entry, 1.0)] for entry, name in enumerate(vector_columns(f"disc{disc + 1}.tilt"))}
+    teeth = range(1, reducer.cycloid_stage.disc_teeth + 1)
+    return tuple(f"disc{disc + 1}.each_tooth.{kind}.{tooth}" for kind in ("pitch", "runout") for tooth in teeth)
 
 
 def _of_tooth(kind: str) -> tuple[ErrorSource, ...]:

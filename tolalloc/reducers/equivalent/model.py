@@ -23,7 +23,6 @@ from tolalloc.reducers.equivalent.solvers.records import (
     AngleSearch,
     Given,
     SolvedDerivatives,
-    SolvedExtremes,
     SolverDesign,
     design_of,
 )
@@ -283,18 +282,10 @@ class EquivalentModel:
 
         At the first so many of them, or at all.
         """
-        from tolalloc.reducers.equivalent.solvers.extremes import solve_extremes
+        from tolalloc.reducers.equivalent.solvers.extremes import make_extremes, solve_extremes
 
-        samples, search = errors.shape[0], self.search
-        found = SolvedExtremes(
-            np.empty((samples, 2)),
-            np.empty((samples, 2)),
-            np.empty(samples),
-            np.empty(samples, np.int64),
-            np.empty(samples, np.uint8),
-            np.empty(samples),
-            np.empty((samples, search.coarse if angles is None else angles)),
-        )
+        search = self.search
+        found = make_extremes(errors.shape[0], search.coarse if angles is None else angles)
         solve_extremes(self._discs, self._tables, self._given(errors, torque), search, found)
         self._mark_out_of_range(np.abs(found.extreme).max(axis=1), found.status)
         found.extreme[found.status != CONVERGED] = np.nan
@@ -335,15 +326,12 @@ class EquivalentModel:
 
         They hold while the same pins touch; where one just touches or leaves, a derivative is one-sided.
         """
-        from tolalloc.reducers.equivalent.solvers.adjoint import solve_rotation_derivatives
-
-        tables, position = self._padded(carrier_angle), 1.0 + np.arange(float(carrier_angle.size))
-        samples = errors.shape[0]
-        derivative, torques = self._derivative(samples * position.size), np.broadcast_to(torque, samples)
-        solve_rotation_derivatives(tables, self._given(errors, np.ascontiguousarray(torques)), position, derivative)
+        shape, at = (errors.shape[0], carrier_angle.size), np.arange(carrier_angle.size)
+        none = np.zeros((shape[0], self.reducer.disc_count * self.reducer.cycloid_stage.pin_count))
+        derivative = self._value_derivatives(errors, torque, carrier_angle, np.tile(at, shape[0]), 1.0, none)
         self._mark_out_of_range(derivative.rotation, derivative.status)
         derivative.rotation[derivative.status != CONVERGED] = np.nan
-        return derivative.rotation.reshape(samples, position.size), self._derivatives(derivative)
+        return derivative.rotation.reshape(shape), self._derivatives(derivative)
 
     def pin_force_derivatives(
         self,
@@ -358,13 +346,28 @@ class EquivalentModel:
         They hold while the same pins touch, as those of the rotation. A sample without an equilibrium there has zeros
         and its status.
         """
-        from tolalloc.reducers.equivalent.solvers.adjoint import solve_pin_force_derivatives
+        of_pins = weights.reshape(errors.shape[0], -1)
+        return self._derivatives(self._value_derivatives(errors, torque, carrier_angle, at, 0.0, of_pins))
 
-        derivative = self._derivative(errors.shape[0])
-        of_pins = np.ascontiguousarray(weights.reshape(errors.shape[0], -1))
-        given = self._given(errors, torque)
-        solve_pin_force_derivatives(self._padded(carrier_angle), given, 1.0 + at, of_pins, derivative)
-        return self._derivatives(derivative)
+    def _value_derivatives(
+        self,
+        errors: Errors,
+        torque: float | Float[np.ndarray, " sample"],
+        carrier_angle: AtAngles,
+        at: Int[np.ndarray, " item"],
+        carrier: float,
+        of_pins: Float[np.ndarray, "sample contact"],
+    ) -> SolvedDerivatives:
+        """Return those of carrier·rotation + Σ of_pin·force at some of the carrier angles, as many for each sample."""
+        from tolalloc.reducers.equivalent.solvers.adjoint import solve_value_derivatives
+
+        # With neighbours that the interpolation weighs with nothing at a node.
+        around = carrier_angle[np.clip(np.arange(-1, carrier_angle.size + 2), 0, carrier_angle.size - 1)]
+        derivative, torques = self._derivative(at.size), np.broadcast_to(torque, errors.shape[0])
+        given = self._given(errors, np.ascontiguousarray(torques))
+        of_pins = np.ascontiguousarray(of_pins)
+        solve_value_derivatives(self.tables_at(around), given, 1.0 + at, carrier, of_pins, derivative)
+        return derivative
 
     @property
     def largest_rotation(self) -> float:
@@ -377,10 +380,6 @@ class EquivalentModel:
     def _mark_out_of_range(self, rotation: Float[np.ndarray, "..."], status: UInt8[np.ndarray, "..."]) -> None:
         """Put a status where an equilibrium was found that the model cannot mean."""
         status[(status == CONVERGED) & (np.abs(rotation) > self.largest_rotation)] = OUT_OF_RANGE
-
-    def _padded(self, carrier_angle: AtAngles) -> CondensedAngles:
-        """Return the tables at the angles, with neighbours that the interpolation weighs with nothing at a node."""
-        return self.tables_at(carrier_angle[np.clip(np.arange(-1, carrier_angle.size + 2), 0, carrier_angle.size - 1)])
 
     def _derivative(self, items: int) -> SolvedDerivatives:
         rows = max(rows.stop for rows in self.error_columns.rows_of_stiffness.values())

@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float, Int
 from tolalloc.models.unit_bounds import Least, ScaledUnits, Sign, least_by_slopes
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.cycloid.solvers import LAWS
-from tolalloc.reducers.cycloid.solvers.pins import pin_slopes
+from tolalloc.reducers.cycloid.solvers.pins import pin_forces
 from tolalloc.reducers.equivalent.condensation import CondensedAngles
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.solvers.records import CONVERGED
@@ -71,9 +71,7 @@ class _Curves:
 
     def pins(self, compression: AtPins) -> tuple[AtPins, AtPins]:
         """Return forces of pins and their derivatives [N, N/m]."""
-        force, slope, flat = np.empty(compression.size), np.empty(compression.size), compression.ravel()
-        pin_slopes(self.law, self.contact.ravel(), self.log_length.ravel(), flat, force, slope)
-        return force.reshape(compression.shape), slope.reshape(compression.shape)
+        return pin_forces(self.law, self.contact, self.log_length, compression)
 
     def tangent(self, slope: AtPins) -> Float[np.ndarray, "item coordinate coordinate"]:
         """Return the stiffness of the coordinates with contacts of some stiffness [N/m]."""

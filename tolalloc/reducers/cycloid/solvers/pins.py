@@ -74,25 +74,44 @@ def pin_force(law, stiffness, log_length, half_tilt, compression):
 
 
 @jit_in_place
-def pin_forces(law, stiffness, log_length, compression, force):
-    """Fill the forces of several pins, [pin]."""
+def _fill(law, stiffness, log_length, compression, force, slope):
     for k in range(compression.size):
-        force[k] = pin_force(law, stiffness[k], log_length[k], 0.0, compression[k])[0]
+        force[k], slope[k] = pin_force(law, stiffness[k], log_length[k], 0.0, compression[k])
+
+
+def pin_forces(law: int, stiffness: Any, log_length: Any, compression: Any) -> tuple[Any, Any]:
+    """Return forces [N] and their derivatives [N/m] of pins that stand straight, in the shape of their compressions."""
+    force, slope = np.empty(compression.size), np.empty(compression.size)
+    _fill(law, stiffness.ravel(), log_length.ravel(), compression.ravel(), force, slope)
+    return force.reshape(compression.shape), slope.reshape(compression.shape)
 
 
 @jit_in_place
-def pin_slopes(law, stiffness, log_length, compression, force, slope):
-    """Fill force and derivative of many pins that stand straight, [pin]."""
-    for k in range(compression.size):
-        force[k], slope[k] = pin_force(law, stiffness[k], log_length[k], 0.0, compression[k])
+def _shortening(design):
+    return design[ECCENTRICITY] * (design[TEETH] + 1.0) / design[GROUND_CIRCLE]
+
+
+@jit_in_place
+def _to_pole(shortening, cosine):
+    """Return the distance of the grinding pin's centre from the pole over the radius of its circle."""
+    return np.sqrt(1.0 + shortening * shortening - 2.0 * shortening * cosine)
+
+
+@jit_in_place
+def _off_path(design, t, px, py):
+    """Return P in the frame that turns with the pin at parameter t, less the path of its centre; cos t and sin t."""
+    small, c, s = t / design[TEETH], np.cos(t), np.sin(t)
+    cs, ss = np.cos(small), np.sin(small)
+    u = px * cs - py * ss - (design[GROUND_CIRCLE] - design[ECCENTRICITY] * c)
+    v = px * ss + py * cs - design[ECCENTRICITY] * s
+    return u, v, c, s
 
 
 @jit
 def _point(design, t):
     """Return x and y of the profile at parameter t, before its flanks are turned."""
-    shortening = design[ECCENTRICITY] * (design[TEETH] + 1.0) / design[GROUND_CIRCLE]
-    small, c, s = t / design[TEETH], np.cos(t), np.sin(t)
-    ratio = design[GROUND_PIN] / np.sqrt(1.0 + shortening * shortening - 2.0 * shortening * c)
+    shortening, small, c, s = _shortening(design), t / design[TEETH], np.cos(t), np.sin(t)
+    ratio = design[GROUND_PIN] / _to_pole(shortening, c)
     # In the frame that turns with the pin, then in the disc's.
     u = design[GROUND_CIRCLE] - design[ECCENTRICITY] * c + ratio * (shortening * c - 1.0)
     v = design[ECCENTRICITY] * s - ratio * shortening * s
@@ -115,11 +134,7 @@ def _slope(design, t, px, py):
     f vanishes where P lies on the normal of the path, which is the profile's normal too.
     """
     teeth, circle, eccentricity = design[TEETH], design[GROUND_CIRCLE], design[ECCENTRICITY]
-    small, c, s = t / teeth, np.cos(t), np.sin(t)
-    cs, ss = np.cos(small), np.sin(small)
-    # P in the frame that turns with the pin, then minus the path.
-    u = px * cs - py * ss - (circle - eccentricity * c)
-    v = px * ss + py * cs - eccentricity * s
+    u, v, c, s = _off_path(design, t, px, py)
     turns = (teeth + 1.0) / teeth
     du, dv = eccentricity * turns * s, eccentricity * turns * c - circle / teeth
     ddu, ddv = eccentricity * turns * turns * c - circle / (teeth * teeth), -eccentricity * turns * turns * s
@@ -148,12 +163,8 @@ def _foot(design, low, high, px, py):
 @jit
 def _distance(design, t, px, py):
     """Return the distance of P from the profile along the normal at t, negative inside the disc."""
-    shortening = design[ECCENTRICITY] * (design[TEETH] + 1.0) / design[GROUND_CIRCLE]
-    small, c, s = t / design[TEETH], np.cos(t), np.sin(t)
-    cs, ss = np.cos(small), np.sin(small)
-    u = px * cs - py * ss - (design[GROUND_CIRCLE] - design[ECCENTRICITY] * c)
-    v = px * ss + py * cs - design[ECCENTRICITY] * s
-    root = np.sqrt(1.0 + shortening * shortening - 2.0 * shortening * c)
+    shortening, (u, v, c, s) = _shortening(design), _off_path(design, t, px, py)
+    root = _to_pole(shortening, c)
     # The normal into the disc in the same frame.
     nu, nv = (shortening * c - 1.0) / root, -shortening * s / root
     return design[GROUND_PIN] - (u * nu + v * nv)
@@ -199,14 +210,9 @@ def _near(design, convex, angle, px, py):
     Around P, which is off the path by much less than the path's radius, the path has one nearest point. Newton's method
     finds it; a step below a microradian leaves an error that the distance does not feel.
     """
-    small, c, s = angle / design[TEETH], np.cos(angle), np.sin(angle)
-    cs, ss = np.cos(small), np.sin(small)
-    u = px * cs - py * ss - (design[GROUND_CIRCLE] - design[ECCENTRICITY] * c)
-    v = px * ss + py * cs - design[ECCENTRICITY] * s
+    u, v, c, _ = _off_path(design, angle, px, py)
     off = np.sqrt(u * u + v * v)
-    shortening = design[ECCENTRICITY] * (design[TEETH] + 1.0) / design[GROUND_CIRCLE]
-    root = np.sqrt(1.0 + shortening * shortening - 2.0 * shortening * c)
-    slip = off * design[TEETH] / (design[GROUND_CIRCLE] * root)
+    slip = off * design[TEETH] / (design[GROUND_CIRCLE] * _to_pole(_shortening(design), c))
     inner = max(abs(angle) - 2.0 * slip, 0.0)
     if slip > _NEAR or off * _largest_bend(design, inner, convex) > _NEAR:
         return np.nan

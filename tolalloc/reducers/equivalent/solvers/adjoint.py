@@ -14,8 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from tolalloc.reducers.cycloid.solvers.pins import pin_force
-from tolalloc.reducers.equivalent.solvers.contact_solver import assemble, compress, play_force, solve_tangent, values_of
+from tolalloc.reducers.equivalent.solvers.contact_solver import (
+    assemble,
+    compress,
+    contact_force,
+    play_force,
+    solve_tangent,
+    values_of,
+)
 from tolalloc.reducers.equivalent.solvers.records import CONVERGED, NOT_FINITE, Given
 from tolalloc.reducers.equivalent.solvers.workspace import interpolation, make_memory, solve_between
 from tolalloc.running.compiled import in_threads, jit, jit_in_place
@@ -36,9 +42,7 @@ def _adjoint(problem, work, carrier_by_retained, carrier, of_pins, q, adjoint):
         if of_pins[c] == 0.0:
             continue
         d, k = c // pins, c % pins
-        _, slope = pin_force(
-            problem.law, problem.contact[c], problem.log_length[c], problem.half_tilt[c], work.compression[c]
-        )
+        _, slope = contact_force(problem, c, work.compression[c])
         for i in range(3):
             aim[3 * d + i] -= of_pins[c] * slope * problem.by_disc[d, i, k]
     solve_tangent(work.tangent, aim, adjoint)
@@ -54,9 +58,7 @@ def _pin_adjoints(problem, work, of_pins, adjoint, tilt_by_pin, weight_of_pin):
     pins = problem.by_disc.shape[2]
     for c in range(weight_of_pin.size):
         d, k = c // pins, c % pins
-        force, slope = pin_force(
-            problem.law, problem.contact[c], problem.log_length[c], problem.half_tilt[c], work.compression[c]
-        )
+        force, slope = contact_force(problem, c, work.compression[c])
         lever = -of_pins[c]
         for i in range(3):
             lever += problem.by_disc[d, i, k] * adjoint[3 * d + i]
@@ -214,29 +216,17 @@ def _peak_to_peaks(first, last, tables, layout, mapped, design, errors, torque, 
 
 
 @jit
-def _rotations(first, last, tables, layout, mapped, design, errors, torque, position, derivative):
+def _values(first, last, tables, layout, mapped, design, errors, torque, position, carrier, of_pins, derivative):
     memory, values = make_memory(design.law, tables), np.empty((1, layout.end))
-    no_pins = np.zeros(memory[0].contact.size)
+    positions = position.size // torque.size
     for s in range(first, last):
-        sample, angle = s // position.size, s % position.size
+        sample = s // positions
         _clear(derivative, s, 0.0)
         derivative.status[s] = NOT_FINITE
         if values_of(errors[sample : sample + 1], torque[sample], layout, mapped, values)[0]:
             memory[2].first[:] = -1
             given = (tables, layout, design, values[0], memory, derivative, s)
-            derivative.status[s] = _add_derivative(position[angle], 1.0, 1.0, no_pins, *given)
-
-
-@jit
-def _pin_forces(first, last, tables, layout, mapped, design, errors, torque, position, of_pins, derivative):
-    memory, values = make_memory(design.law, tables), np.empty((1, layout.end))
-    for s in range(first, last):
-        _clear(derivative, s, 0.0)
-        derivative.status[s] = NOT_FINITE
-        if values_of(errors[s : s + 1], torque, layout, mapped, values)[0]:
-            memory[2].first[:] = -1
-            given = (tables, layout, design, values[0], memory, derivative, s)
-            derivative.status[s] = _add_derivative(position[s], 1.0, 0.0, of_pins[s], *given)
+            derivative.status[s] = _add_derivative(position[s], 1.0, carrier, of_pins[sample], *given)
 
 
 def solve_peak_to_peak_derivatives(tables: Any, given: Given, position: Any, step: Any, derivative: Any) -> None:
@@ -251,22 +241,16 @@ def solve_peak_to_peak_derivatives(tables: Any, given: Given, position: Any, ste
     in_threads(solve, len(given[3]), _AT_ONCE)
 
 
-def solve_rotation_derivatives(tables: Any, given: Given, position: Any, derivative: Any) -> None:
-    """Fill the derivatives of the carrier rotation of every sample, each at its torque, at every position.
+def solve_value_derivatives(
+    tables: Any, given: Given, position: Any, carrier: float, of_pins: Any, derivative: Any
+) -> None:
+    """Fill the derivatives of carrier·rotation + Σ of_pin·force of every sample, each at its torque.
 
-    The derivatives stand in one row, sample by sample, and position by position within a sample.
+    ``position`` has as many for each sample, one sample after another, as have the derivatives; ``of_pins`` are the
+    weights of a sample's pins, disc by disc.
     """
 
     def solve(part: slice) -> None:
-        _rotations(part.start, part.stop, tables, *given, position, derivative)
+        _values(part.start, part.stop, tables, *given, position, carrier, of_pins, derivative)
 
-    in_threads(solve, len(given[3]) * position.size, _AT_ONCE)
-
-
-def solve_pin_force_derivatives(tables: Any, given: Given, position: Any, of_pins: Any, derivative: Any) -> None:
-    """Fill the derivatives of a weighted sum of every sample's pin forces at one position, disc by disc."""
-
-    def solve(part: slice) -> None:
-        _pin_forces(part.start, part.stop, tables, *given, position, of_pins, derivative)
-
-    in_threads(solve, len(given[3]), _AT_ONCE)
+    in_threads(solve, position.size, _AT_ONCE)

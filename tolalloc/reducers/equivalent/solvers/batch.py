@@ -117,27 +117,15 @@ def make_batch(layout, size, contacts, samples):
 
 
 @jit
-def nonzero_rows(values, first, last):
-    """Return the numbers of the values from first to last that differ from zero in any sample."""
-    rows = np.empty(last - first, np.int64)
+def present(values, first, last, period):
+    """Return which of every ``period`` rows from first to last are not zero of all samples, in any of the periods."""
+    found = np.empty(period, np.int64)
     count = 0
-    for m in range(first, last):
-        if np.any(values[m] != 0.0):
-            rows[count] = m
+    for m in range(period):
+        if np.any(values[first + m : last : period] != 0.0):
+            found[count] = m
             count += 1
-    return rows[:count]
-
-
-@jit
-def nonzero_waves(layout, values):
-    """Return the harmonic amplitudes, counted from 0 on each disc, that differ from zero in any sample and disc."""
-    waves = np.empty(layout.waves, np.int64)
-    count = 0
-    for m in range(layout.waves):
-        if np.any(values[layout.wave + m : layout.tooth : layout.waves] != 0.0):
-            waves[count] = m
-            count += 1
-    return waves[:count]
+    return found[:count]
 
 
 @jit_within

@@ -147,6 +147,12 @@ def play_force(stiffness, clearance, x, y):
     return taut * x, taut * y, taut + across * x * x, across * x * y, taut + across * y * y
 
 
+@jit_in_place
+def contact_force(problem, c, compression):
+    """Return the force [N] of one contact and its derivative [N/m] at some compression of it."""
+    return pin_force(problem.law, problem.contact[c], problem.log_length[c], problem.half_tilt[c], compression)
+
+
 @jit_within
 def assemble(problem, compression, play, q, gradient, tangent):
     """Set gradient and lower tangent at q; return largest force, largest sum of cancelling terms, pins in contact.
@@ -169,9 +175,7 @@ def assemble(problem, compression, play, q, gradient, tangent):
             c = d * pins + k
             if not compression[c] + problem.half_tilt[c] > 0.0:
                 continue
-            force, slope = pin_force(
-                problem.law, problem.contact[c], problem.log_length[c], problem.half_tilt[c], compression[c]
-            )
+            force, slope = contact_force(problem, c, compression[c])
             touching += 1
             largest = max(largest, force)
             for i in range(3):
@@ -245,9 +249,7 @@ def _slope_at(problem, work, length, slope, curvature):
     for c in range(work.compression.size):
         if problem.law != LINEAR or problem.half_tilt[c] > 0.0:
             compression = work.compression[c] + length * work.rate[c]
-            force, stiff = pin_force(
-                problem.law, problem.contact[c], problem.log_length[c], problem.half_tilt[c], compression
-            )
+            force, stiff = contact_force(problem, c, compression)
             first += force * work.rate[c]
             second += stiff * work.rate[c] * work.rate[c]
     for e in range(work.play.shape[0]):

@@ -302,6 +302,19 @@ def _prepare(layout, mapped, errors, torque, turn, values, found):
     return alone
 
 
+def make_extremes(samples: int, angles: int) -> SolvedExtremes:
+    """Return room for the extremes of some samples, and their curves at the first coarse angles."""
+    return SolvedExtremes(
+        np.empty((samples, 2)),
+        np.empty((samples, 2)),
+        np.empty(samples),
+        np.empty(samples, np.int64),
+        np.empty(samples, np.uint8),
+        np.empty(samples),
+        np.empty((samples, angles)),
+    )
+
+
 def refine(discs: Any, tables: Any, given: Given, search: Any, turn: Any, found: Any) -> None:
     """Fill the extremes of some samples whose coarse turn is solved.
 

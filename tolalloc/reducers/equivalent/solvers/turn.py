@@ -10,20 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from tolalloc.reducers.cycloid.solvers.pins import pin_force
 from tolalloc.reducers.equivalent.solvers.batch import (
     BATCH,
     FOUR,
     ROW,
     make_batch,
     make_history,
-    nonzero_rows,
-    nonzero_waves,
+    present,
     solve_batch_at,
     start_next,
 )
 from tolalloc.reducers.equivalent.solvers.contact_solver import (
     compress,
+    contact_force,
     play_force,
     problem_at_node,
     solve_at_node,
@@ -117,7 +116,9 @@ def _side_by_side(
     )
     play = None if elements is None else make_play(size, elements, ROW)
     _fill_batch(layout, values, finite, used, batch, tilted)
-    rows, waves = nonzero_rows(batch.values, 0, layout.torque + 1), nonzero_waves(layout, batch.values)
+    loads = layout.torque + 1
+    rows = present(batch.values, 0, loads, loads)
+    waves = present(batch.values, layout.wave, layout.tooth, layout.waves)
     teeth_deviate = np.any(batch.values[layout.tooth : layout.tilt] != 0.0)
     flanks_turned = np.any(batch.values[layout.flank] != 0.0)
     start, history = np.empty(size), make_history(turn_of_crank, size)
@@ -188,9 +189,7 @@ def _forces_of_sample(
         for d in range(discs):
             for k in range(count):
                 c = d * count + k
-                pins[at, d, k], _ = pin_force(
-                    problem.law, problem.contact[c], problem.log_length[c], problem.half_tilt[c], work.compression[c]
-                )
+                pins[at, d, k], _ = contact_force(problem, c, work.compression[c])
         for e in range(elements.shape[1]):
             elements[at, e, 0], elements[at, e, 1], _, _, _ = play_force(
                 problem.play_stiffness[e], problem.clearance[e], work.play[e, 0], work.play[e, 1]

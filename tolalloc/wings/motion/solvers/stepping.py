@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float, Int, UInt8, UInt16
 
-from tolalloc.reducers.cycloid.solvers.pins import pin_force
 from tolalloc.reducers.equivalent.solvers.contact_solver import (
     along,
     compress,
+    contact_force,
     equilibrium,
     fill_loads,
     make_problem,
@@ -150,9 +150,7 @@ def _observe(s, slot, problem, compression, x, v, acceleration, record):
     record.coordinate[s, slot], record.velocity[s, slot], record.second[s, slot] = x, v, acceleration
     discs, pins = record.pin_force.shape[2:]
     for c in range(discs * pins):
-        record.pin_force[s, slot, c // pins, c % pins], _ = pin_force(
-            problem.law, problem.contact[c], problem.log_length[c], problem.half_tilt[c], compression[c]
-        )
+        record.pin_force[s, slot, c // pins, c % pins], _ = contact_force(problem, c, compression[c])
 
 
 @jit
