@@ -270,8 +270,7 @@ def random_study(number: int) -> ta.Study:
     name = f"random reducer {number}"
     choice = ReducerChoice(
         reducer=replace(reducer, name=name, modification=modification),
-        flank_clearance=_FLANK,
-        radial_clearance=_RADIAL,
+        ranges=(None, _FLANK, _RADIAL),
     )
     sources = random_sources(generator, reducer)
     costs = random_processes(generator, sources) if generator.random() < 0.5 else ""

@@ -23,7 +23,7 @@ from tolalloc.reducers.cycloid.solvers.pins import pin_force
 from tolalloc.reducers.cycloid.tooth_profile import normals, path_curvature
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import Solved, contact_pattern, line_contact, peak_line_load, unit_pressure
+from tolalloc.reducers.equivalent.outputs import Solved, contact_pattern, line_contact, unit_pressure
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.reducers.response.outputs import OutputsResponse, requirements_of
@@ -119,7 +119,7 @@ def test_pressure_of_an_even_load_is_hertz_s(rv20e):
     solved = Solved.of(rv20e.equilibria(np.zeros((1, len(rv20e.columns))), TORQUE, np.array([0.1])))
     stage = rv20e.reducer.cycloid_stage
     pins = solved.forces.pins[0, 0, 0]
-    found = unit_pressure(solved.equilibria)[0, 0] * np.sqrt(peak_line_load(solved.equilibria, solved.forces)[0, 0, 0])
+    found = unit_pressure(solved.equilibria)[0, 0] * np.sqrt(solved.line_load[0, 0, 0])
     pin_angle = 2 * np.pi * np.arange(stage.pin_count) / stage.pin_count + stage.disc_teeth * 0.1
     expected = peak_pressure(stage, rv20e.reducer.contact_modulus, pin_angle, pins)
     np.testing.assert_allclose(found, expected, rtol=1e-12)
@@ -144,7 +144,7 @@ def test_a_tilted_disc_loads_one_end_more_and_a_level_one_evenly(rv20e, table4):
     assert tilted[load] > 1.1 * tilted[force] / width
     rated = -abs(rv20e.reducer.load.rated_torque)
     solved = Solved.of(rv20e.equilibria(errors[np.newaxis], rated, TURN_ANGLES))
-    own = peak_line_load(solved.equilibria, solved.forces)
+    own = solved.line_load
     assert tilted[load] == pytest.approx(own.max() * MILLIMETRE, rel=1e-12)
     pressure, even = (unit_pressure(solved.equilibria) * np.sqrt(q) for q in (own, solved.forces.pins / width * 1e3))
     assert tilted["peak pressure, rated torque [MPa]"] == pytest.approx(pressure.max() / MEGAPASCAL, rel=1e-12)
@@ -156,14 +156,14 @@ def test_the_logarithmic_law_spreads_every_force_evenly(rv20e):
     model = EquivalentModel(linear(rv20e.reducer, "logarithmic", np.inf))
     solved = Solved.of(model.equilibria(np.zeros((1, len(model.columns))), TORQUE, np.array([0.1, 0.2])))
     width = rv20e.reducer.cycloid_stage.face_width
-    np.testing.assert_array_equal(peak_line_load(solved.equilibria, solved.forces), solved.forces.pins / width)
+    np.testing.assert_array_equal(solved.line_load, solved.forces.pins / width)
 
 
 def test_a_contact_pattern_lies_where_the_line_load_is_largest(rv20e, generator):
     errors = tilted(rv20e, generator)[1]
     pattern = contact_pattern(rv20e, errors, TORQUE, disc=2)
     solved = Solved.of(rv20e.equilibria(errors[np.newaxis], TORQUE))
-    peak = peak_line_load(solved.equilibria, solved.forces)[0, :, 1].max()
+    peak = solved.line_load[0, :, 1].max()
     assert pattern.line_load.max() == pytest.approx(peak, rel=1e-12)
     again = contact_pattern(rv20e, errors, TORQUE, disc=2, carrier_angle=pattern.carrier_angle, positions=401)
     np.testing.assert_allclose(again.force, pattern.force, rtol=1e-6, atol=1e-6)
@@ -291,7 +291,7 @@ def test_a_crowned_model_keeps_its_forces_and_balances_them_along_the_width(law,
         position, slice_width = whole_width(contact.of(place))
         load = contact.of(place).line_load(position)
         np.testing.assert_allclose(load.sum(axis=1) * slice_width, contact.force[place], rtol=1e-5, atol=1e-3)
-    peak = peak_line_load(solved.equilibria, solved.forces)
+    peak = solved.line_load
     np.testing.assert_array_equal(peak, contact.peak)
     carries = contact.force > 0
     assert (peak[carries] > contact.force[carries] / contact.face_width).all() and not peak[~carries].any()

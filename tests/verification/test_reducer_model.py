@@ -40,7 +40,7 @@ def model(rv20e: EquivalentModel) -> ReducerModel:
         },
     )
     kernel = kernel_of(rv20e, errors, -167.0)
-    return ReducerModel(kernel=kernel, flank=(1e-6, 5e-6), radial=(5e-6, 20e-6), identified=known)
+    return ReducerModel(kernel=kernel, ranges=(None, (1e-6, 5e-6), (5e-6, 20e-6)), identified=known)
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +71,7 @@ def test_settings_are_the_clearances_of_the_modification(model, x):
     other = model.kernel.with_modification(Modification.from_clearances(3.0 * 1e-6, 12.0 * 1e-6, stage))
     np.testing.assert_array_equal(moved.reading((PEAK_TO_PEAK,))(x).values, other(x).values)
     assert portrait_of(moved).amounts(np.array([3.0, 12.0]))[flank.name] == 3.0
-    locked = replace(model, flank=None).settings[0]
+    locked = replace(model, ranges=(None, None, (5e-6, 20e-6))).settings[0]
     assert locked.lower == locked.upper == locked.value
 
 

@@ -156,7 +156,7 @@ from tolalloc.reducers import LOST_MOTION
 drawing = ta.drawing("rv20e_table4")
 model = ta.reducer("rv20e", neglected=("*",)).bound(drawing.errors, "digest")
 alone, chunk = model.kernel.alone, np.zeros((2, 3))
-for solve in (alone._extremes, alone._derivatives, model.reading((LOST_MOTION,)).alone.read):
+for solve in (alone._peak_to_peak, alone._derivatives, model.reading((LOST_MOTION,)).alone.read):
     print(_digest(solve, chunk))
 """
 

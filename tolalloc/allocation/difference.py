@@ -11,7 +11,8 @@ from jaxtyping import Bool, Float
 
 from tolalloc.allocation.space.design_space import DesignSpace, named_zones, repriced
 from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, Requirement
-from tolalloc.capability.monte_carlo import Change, quantile_change, share_change
+from tolalloc.capability.indices import Interval
+from tolalloc.capability.monte_carlo import quantile_change, share_change
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import CHUNK, SeedTree
 from tolalloc.drawings.sources import Source
@@ -47,7 +48,7 @@ class DifferenceResult:
         return float(self._kept(0).mean()), float(self._kept(1).mean())
 
     @cached_property
-    def yield_change(self) -> Change:
+    def yield_change(self) -> Interval:
         """Change of the share of units that keep all limits [-]."""
         return share_change(self._kept(0), self._kept(1))
 
@@ -63,7 +64,7 @@ class DifferenceResult:
         return tuple((before, after) for before, after in found)
 
     @cached_property
-    def quantile_changes(self) -> tuple[Change, ...]:
+    def quantile_changes(self) -> tuple[Interval, ...]:
         """Change of every limited quantile, in the order of `limited` [unit of the output]."""
         return tuple(
             quantile_change(before, after, share, self.seeds.child(own.output).generator())
@@ -138,7 +139,7 @@ def _solved(
         standard = errors.standard_values(uniform[: units - first])
         for own, zones in zip(values, drawings, strict=True):
             found = response(errors.deviations(standard, zones))
-            own[first : first + len(standard)] = np.where(found.good[:, np.newaxis], found.values, np.nan)
+            own[first : first + len(standard)] = found.known
     return values
 
 

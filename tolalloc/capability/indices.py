@@ -13,8 +13,6 @@ from jaxtyping import Bool, Float
 from tolalloc.exceptions import InputError
 
 MILLION = 1e6
-_MOVING_RANGE = 2 / np.sqrt(np.pi)
-"""d₂ of two units: the mean range of two normal values over their standard deviation."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,10 +86,7 @@ class Capability:
 
     mean: float  # Mean of the sample [unit of the characteristic]
     deviation_overall: float  # Standard deviation of the whole sample [unit of the characteristic]
-    # (U − L) / 6σ and min(U − μ, μ − L) / 3σ with the deviation within subgroups; ``cp`` is none if a side is open [-]
-    cp: float | None
-    cpk: float
-    # The same with the deviation of the whole sample [-]
+    # (U − L) / 6σ and min(U − μ, μ − L) / 3σ; ``pp`` is none if a side is open [-]
     pp: float | None
     ppk: float
     # Units beyond the limits per million if the characteristic is normal with the sample's mean and overall deviation;
@@ -110,30 +105,25 @@ class Interval:
 
 
 def capability(sample: Float[np.ndarray, " unit"], limits: Limits) -> Capability:
-    """Return the capability of a sample in the order of its making.
+    """Return the capability of a sample.
 
     Notes
     -----
-    The deviation within subgroups is the mean moving range of neighbours over d₂ = 2/√π; that of the whole sample has
-    the divisor n − 1. All indices read as yields only for a normal distribution. For independent random units both
-    deviations estimate the same.
+    The deviation of the whole sample has the divisor n − 1. The indices read as yields only for a normal distribution.
 
     References
     ----------
-    ISO 22514-2, indices Cp, Cpk (within) and Pp, Ppk (overall); Montgomery 2012, Statistical Quality Control, ch. 8.
+    ISO 22514-2, indices Pp and Ppk; Montgomery 2012, Statistical Quality Control, ch. 8.
     """
     if sample.size < 2 or not np.isfinite(sample).all():
         raise InputError.at("capability", "sample", f"{sample.size} values", "at least 2 values, all finite")
     mean, overall = float(sample.mean()), float(sample.std(ddof=1))
-    within = float(np.abs(np.diff(sample)).mean() / _MOVING_RANGE)
-    if min(within, overall) <= 0:
+    if not np.ptp(sample):
         raise InputError("Capability: the sample does not vary, so no index can be given.")
     width, distance = limits.width, limits.distance(mean)
     return Capability(
         mean=mean,
         deviation_overall=overall,
-        cp=None if width is None else width / (6 * within),
-        cpk=distance / (3 * within),
         pp=None if width is None else width / (6 * overall),
         ppk=distance / (3 * overall),
         normal_ppm=MILLION * limits.normal_share_outside(mean, overall),

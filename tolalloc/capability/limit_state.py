@@ -111,9 +111,8 @@ class ResponseLimit:
 
     def __call__(self, u: Float[np.ndarray, "sample variable"]) -> Float[np.ndarray, " sample"]:
         """Return the distance of every sample from the limit, NaN where it failed [output]."""
-        evaluation = self.experiment.response(self.deviations(u))
         # Another output of a sample may have failed, and then the sample is lost as a whole.
-        return np.where(evaluation.good, self.limit - evaluation.values[:, 0], np.nan)
+        return np.asarray(self.limit - self.experiment.response(self.deviations(u)).known[:, 0])
 
 
 LENGTH = 10

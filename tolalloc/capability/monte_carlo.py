@@ -14,29 +14,25 @@ from jaxtyping import Bool, Float
 
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE, Experiment
 from tolalloc.capability.halving import halved
-from tolalloc.capability.indices import Limits
+from tolalloc.capability.indices import Interval, Limits
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.measured_parts import MeasuredParts
 from tolalloc.drawings.seeds import CHUNK, SamplingDesign
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import FailedUnitsError
-from tolalloc.models.model import Evaluation, Response
+from tolalloc.models.model import Evaluation, Passing, Response
 
 CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True, kw_only=True)
-class Yield:
+class Yield(Interval):
     """Share of units within the limit, with an exact two-sided interval (Clopper–Pearson).
 
     The interval and the bound hold for independent units alone, those of the Monte Carlo design; for a Latin hypercube
     or a Sobol' sequence only the estimate may be used.
     """
 
-    # Yield and its 95 % interval [-]
-    estimate: float
-    low: float
-    high: float
     bound: float  # One-sided 95 % lower bound, the one that decides whether a target is met [-]
     # Numbers of units [-]
     units: int
@@ -385,7 +381,7 @@ def require_few_failures(result: AnsweredUnits, name: str, largest_failed_share:
 
 
 @dataclass(frozen=True, kw_only=True)
-class OneSided:
+class OneSided(Passing):
     """The first output of a response, turned so that only its large values are bad.
 
     Notes
@@ -394,18 +390,7 @@ class OneSided:
     beyond either, to which the distance between them is added, so that a tolerance relative to the limit has a scale.
     """
 
-    response: Response  # What answers
-    limits: Limits  # Limits of its first output
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The response's columns."""
-        return self.response.columns
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """The response's outputs."""
-        return self.response.outputs
+    limits: Limits  # Limits of the response's first output
 
     @property
     def limit(self) -> float:
@@ -446,16 +431,7 @@ _BATCH, _UNITS_AT_ONCE = 50, 2**20
 """Resamples at a time, and units of all of them unless one alone has more, for the sake of memory [-]."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Change:
-    """A change with its two-sided 95 % interval."""
-
-    estimate: float
-    low: float
-    high: float
-
-
-def share_change(before: Bool[np.ndarray, " unit"], after: Bool[np.ndarray, " unit"]) -> Change:
+def share_change(before: Bool[np.ndarray, " unit"], after: Bool[np.ndarray, " unit"]) -> Interval:
     """Return how the share of good units changes [-].
 
     Only units that are good once and bad once count. The interval takes the exact one of either kind at half the error
@@ -468,12 +444,12 @@ def share_change(before: Bool[np.ndarray, " unit"], after: Bool[np.ndarray, " un
     units = before.size
     gained, lost = int(np.count_nonzero(after & ~before)), int(np.count_nonzero(before & ~after))
     up, down = proportion(units, units - gained), proportion(units, units - lost)
-    return Change(estimate=(gained - lost) / units, low=up.low - down.high, high=up.high - down.low)
+    return Interval(estimate=(gained - lost) / units, low=up.low - down.high, high=up.high - down.low)
 
 
 def quantile_change(
     before: Float[np.ndarray, " unit"], after: Float[np.ndarray, " unit"], share: float, generator: np.random.Generator
-) -> Change:
+) -> Interval:
     """Return how a quantile of the units with both answers changes [unit of the output].
 
     The interval is that of the bootstrap over units, each with both its values; with fewer than some ten units beyond
@@ -492,7 +468,7 @@ def quantile_change(
     pair = (before[both], after[both])
     estimate = float(change(*pair))
     if np.array_equal(*pair):
-        return Change(estimate=estimate, low=estimate, high=estimate)
+        return Interval(estimate=estimate, low=estimate, high=estimate)
     found = bootstrap(
         pair,
         change,
@@ -504,7 +480,7 @@ def quantile_change(
         method="percentile",
         rng=generator,
     ).confidence_interval
-    return Change(estimate=estimate, low=float(found.low), high=float(found.high))
+    return Interval(estimate=estimate, low=float(found.low), high=float(found.high))
 
 
 UncertaintyOf = Callable[[Float[np.ndarray, " sample"]], ProcessUncertainty | None]
@@ -538,8 +514,11 @@ def kept_at_once(
     kept = [own.kept_by(evaluation.values[:, outputs.index(name)]) for name, own in limits.items()]
     good = evaluation.good & np.all(kept, axis=0)
     found = proportion(good.size, good.size - int(np.count_nonzero(good)))
-    known = {name: np.where(evaluation.good, evaluation.values[:, outputs.index(name)], np.nan) for name in limits}
-    return found.widened_by(uncertain(largest_excess(known, limits)), ANY_LIMIT) if uncertain else found
+    if uncertain is None:
+        return found
+    values = evaluation.known
+    known = {name: values[:, outputs.index(name)] for name in limits}
+    return found.widened_by(uncertain(largest_excess(known, limits)), ANY_LIMIT)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -291,16 +291,13 @@ def yield_at_limit(
             f"{within.rejected:,} of {within.units:,} random units lie there; rarer ones are a full run's question."
         )
         found = Agreement(estimate=plain, estimates=(plain,), verdict=verdict)
-    counted = Interval(estimate=within.estimate, low=within.low, high=within.high)
-    interval = counted if found.estimate.method == _RANDOM_UNITS else log_normal_interval(found.estimate, runs)
+    interval = within if found.estimate.method == _RANDOM_UNITS else log_normal_interval(found.estimate, runs)
     return YieldAtLimit(**vars(found), interval=_widened_by(interval, limit_state, sample))
 
 
 def _widened_by(interval: Interval, limit_state: ResponseLimit, sample: MonteCarlo) -> Interval:
     """Return the interval of a yield that also holds what measured parts leave open of their processes."""
-    evaluation = sample.evaluation
-    values = np.where(evaluation.good, evaluation.values[:, 0], np.nan)
-    uncertainty = ProcessUncertainty.of(limit_state.experiment.errors, sample.x, values)
+    uncertainty = ProcessUncertainty.of(limit_state.experiment.errors, sample.x, sample.evaluation.known[:, 0])
     if uncertainty is None:
         return interval
     limits, tail = Limits(upper=limit_state.limit), (1 - CONFIDENCE) / 2

@@ -59,6 +59,11 @@ class Evaluation:
         """Which samples may be used."""
         return np.asarray((self.status == 0) & np.isfinite(self.values).all(axis=1))
 
+    @property
+    def known(self) -> Float[np.ndarray, "sample output"]:
+        """The values, NaN in samples that failed."""
+        return np.where(self.good[:, np.newaxis], self.values, np.nan)
+
     @classmethod
     def joined(cls, parts: Sequence[Evaluation]) -> Evaluation:
         """Return the answers of several parts, one after the other."""
@@ -81,6 +86,23 @@ class Response(Protocol):
 
     def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
         """Return the outputs of every sample."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Passing:
+    """A response that asks another one, and has its columns and outputs."""
+
+    response: Response  # What answers
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The response's columns."""
+        return self.response.columns
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """The response's outputs."""
+        return self.response.outputs
 
 
 @runtime_checkable

@@ -26,7 +26,7 @@ from tolalloc.reducers.reducer.design import Modification, Reducer, at_torque
 from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.reducers.response.kernel import KernelResponse
-from tolalloc.reducers.settings import TEMPERATURE, clearance_settings, is_range
+from tolalloc.reducers.settings import TEMPERATURE, Ranges, clearance_settings, is_range
 from tolalloc.reducers.unit_file import BuiltUnit, load_unit
 
 if TYPE_CHECKING:
@@ -147,12 +147,9 @@ class ReducerChoice:
 
     reducer: Reducer  # The reducer with the stiffness in use
     identified: IdentifiedStiffness | None = None  # Identified stiffnesses that replaced its own, if any
-    # As in `tolalloc.reducer` [N·m, µm, µm, µm]
+    ranges: Ranges = (None, None, None)  # Of the clearances [µm]
+    # As in `tolalloc.reducer` [N·m, K]
     torque: float | None = None
-    flank_clearance: tuple[float, float] | None = None
-    radial_clearance: tuple[float, float] | None = None
-    rotation_clearance: tuple[float, float] | None = None
-    # As there [K]
     disc_temperature: float = 0.0
     load_cases: tuple[LoadCase, ...] = ()
     neglected: tuple[str, ...] = ()  # Beside `NEGLECTED`
@@ -177,10 +174,6 @@ class ReducerChoice:
         """Return the reducer with other sources that a drawing may leave out, patterns of them, beside its own."""
         return replace(self, neglected=(*self.neglected, *patterns))
 
-    @property
-    def _ranges(self) -> tuple[tuple[float, float] | None, ...]:
-        return self.rotation_clearance, self.flank_clearance, self.radial_clearance
-
     def set_to(self, settings: Mapping[str, float]) -> ReducerChoice:
         """Return the reducer with a modification that leaves other clearances [µm], or other conditions [N·m, K]."""
         place, torque = f"reducer {self.name}", settings.get(TORQUE, self.torque)
@@ -191,7 +184,7 @@ class ReducerChoice:
         stage = self.reducer.cycloid_stage
         present = [own / MICROMETRE for own in self.reducer.modification.clearances(stage)]
         # Without a range a clearance is not chosen by an allocation; whoever states one may state any.
-        known = clearance_settings(present, (own or (-_FARTHEST, _FARTHEST) for own in self._ranges))
+        known = clearance_settings(present, (own or (-_FARTHEST, _FARTHEST) for own in self.ranges))
         require_settings(place, known, clearances)
         changed = replace(self, torque=torque, disc_temperature=warmer)
         if not clearances:
@@ -209,14 +202,11 @@ class ReducerChoice:
         from tolalloc.reducers.model import ReducerModel
 
         kernel, assumptions = bind(self.reducer, errors, self.torque, place, self.neglected, self.unit)
-        turned, flank, radial = ((own[0] * MICROMETRE, own[1] * MICROMETRE) if own else None for own in self._ranges)
         return ReducerModel(
             kernel=replace(kernel, disc_temperature=self.disc_temperature),
             middles=tuple(errors.middles.tolist()),
             load_cases=self.load_cases,
-            flank=flank,
-            radial=radial,
-            turned=turned,
+            ranges=tuple((own[0] * MICROMETRE, own[1] * MICROMETRE) if own else None for own in self.ranges),
             identified=self.identified,
             unit=self.unit,
             left_out=assumptions,
@@ -298,10 +288,8 @@ def reducer(
     return ReducerChoice(
         reducer=with_stiffness(chosen, identified) if identified else chosen,
         identified=identified,
+        ranges=(rotation_clearance, flank_clearance, radial_clearance),
         torque=torque,
-        flank_clearance=flank_clearance,
-        radial_clearance=radial_clearance,
-        rotation_clearance=rotation_clearance,
         disc_temperature=float(disc_temperature),
         load_cases=cases,
         neglected=tuple(neglected),

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-
 from tolalloc.reducers.cycloid.loaded_contact import Assessment, assess, pin_moment
 from tolalloc.reducers.equivalent.hysteresis import HysteresisLoop
-from tolalloc.reducers.equivalent.outputs import Solved, load_share, peak_line_load, unit_pressure
+from tolalloc.reducers.equivalent.outputs import Solved, load_share
 from tolalloc.reducers.equivalent.perfect import exact_loop, perfect_reducer
 from tolalloc.reducers.reducer.design import Reducer
 
@@ -58,13 +56,12 @@ def contact_of(
 
 
 def _yielding(solved: Solved) -> YieldingContact:
-    pins, found = solved.forces.pins[0], solved.equilibria
+    pins = solved.forces.pins[0]
     carry = (pins > 0).sum(axis=2)
-    pressure = unit_pressure(found) * np.sqrt(peak_line_load(found, solved.forces))
     return YieldingContact(
         pins_in_contact=(int(carry.min()), int(carry.max())),
         largest_force=float(pins.max()),
-        pressure=float(pressure.max()),
-        moment=pin_moment(found.reducer, abs(found.torque)),
+        pressure=float(solved.pressure.max()),
+        moment=pin_moment(solved.equilibria.reducer, abs(solved.equilibria.torque)),
         share=float(load_share(solved.forces.pins).max()),
     )

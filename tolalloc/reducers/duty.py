@@ -13,7 +13,7 @@ from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import MEGAPASCAL, MILLIMETRE
 from tolalloc.reducers.equivalent.friction import FrictionAtTorque
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import Solved, peak_line_load, unit_pressure
+from tolalloc.reducers.equivalent.outputs import Solved
 from tolalloc.reducers.equivalent.perfect import exact_unit
 from tolalloc.reducers.load_case import LoadCase
 from tolalloc.reducers.reducer.bearings import RollingBearing
@@ -195,8 +195,6 @@ def _loads_of(reducer: Reducer, case: LoadCase, share: float, warmer: float, idl
     solved = Solved.of(model.equilibria(exact_unit(model), torque, _ANGLES))
     if solved.equilibria.status.any():
         raise SolveError(f"load case {case.name} of {reducer.name}: no equilibrium under {torque:g} N·m.")
-    line_load = peak_line_load(solved.equilibria, solved.forces)
-    pressure = unit_pressure(solved.equilibria) * np.sqrt(line_load)
     loads = {
         kind: float(_over_turn(bearing, solved.forces.of(kind)[0]).max()) for kind, bearing in _known(reducer).items()
     }
@@ -207,8 +205,8 @@ def _loads_of(reducer: Reducer, case: LoadCase, share: float, warmer: float, idl
         share=share,
         disc_temperature=warmer,
         pin_force=float(solved.forces.pins.max()),
-        line_load=float(line_load.max()) * MILLIMETRE,
-        pressure=float(pressure.max()) / MEGAPASCAL,
+        line_load=float(solved.line_load.max()) * MILLIMETRE,
+        pressure=float(solved.pressure.max()) / MEGAPASCAL,
         bearing_load=loads,
         friction_torque=float(FrictionAtTorque.of(solved).friction_torque[0]) + idle,
     )

@@ -47,7 +47,7 @@ from tolalloc.reducers.response.outputs import (
     wave_outputs,
     with_orders,
 )
-from tolalloc.reducers.settings import clearance_settings
+from tolalloc.reducers.settings import Ranges, clearance_settings
 from tolalloc.reducers.unit_file import BuiltUnit
 from tolalloc.running.chunks import Mapper
 
@@ -71,11 +71,7 @@ class ReducerModel(Model):
     """The equivalent model of a reducer at the sources of a drawing."""
 
     kernel: KernelResponse  # Its peak-to-peak at the modification in force
-    # Smallest and largest clearance that the modification may leave on the flank, at tip and root, and by turned flanks
-    # alone; none locks it [m]
-    flank: tuple[float, float] | None = None
-    radial: tuple[float, float] | None = None
-    turned: tuple[float, float] | None = None
+    ranges: Ranges = (None, None, None)  # Of the clearances that the modification may leave [m]
     identified: IdentifiedStiffness | None = None  # Stiffnesses that replaced the reducer's own, if any
     load_cases: tuple[LoadCase, ...] = ()  # Under which outputs may be limited beside the conditions in force
     # Values of the settings in force; those of the reducer's own modification unless given [µm]
@@ -216,7 +212,7 @@ class ReducerModel(Model):
     def settings(self) -> tuple[Setting, ...]:
         """Flank and radial clearance, before them the rotation clearance where flanks are turned or may be."""
         present = self.present_clearances
-        ranges = (self.turned, self.flank, self.radial)[-len(present) :]
+        ranges = self.ranges[-len(present) :]
         bounds = ((own[0] / MICROMETRE, own[1] / MICROMETRE) if own else None for own in ranges)
         return clearance_settings(present, bounds)
 
@@ -224,7 +220,7 @@ class ReducerModel(Model):
     def present_clearances(self) -> tuple[float, ...]:
         """Values of the settings in force [µm]."""
         own = self.reducer.modification
-        count = 3 if self.turned or own.rotation else 2
+        count = 3 if self.ranges[0] or own.rotation else 2
         present = own.clearances(self.reducer.cycloid_stage)[-count:]
         return self.clearances or tuple(clearance / MICROMETRE for clearance in present)
 

@@ -21,6 +21,10 @@ TEMPERATURE = number(
 """Rule of a difference of temperature between discs and ring."""
 
 
+Ranges = tuple[tuple[float, float] | None, ...]
+"""Smallest and largest clearance by turned flanks, on the flank, and at tip and root; none locks it."""
+
+
 def is_range(value: Any, farthest: float) -> bool:
     """Return whether a value is two numbers, neither beyond the farthest to either side, the smaller one first."""
     pair = isinstance(value, Sequence) and len(value) == 2 and all(map(is_number, value))

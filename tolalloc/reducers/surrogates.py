@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.polynomial import polynomial
 
-from tolalloc.models.model import Evaluation, KeepsTables, Response
+from tolalloc.models.model import Evaluation, KeepsTables, Passing, Response
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
@@ -19,22 +19,11 @@ from tolalloc.running.chunks import map_chunks
 
 
 @dataclass(frozen=True, kw_only=True)
-class Corrected:
+class Corrected(Passing):
     """A response with one output, brought by a straight line to that of a better one."""
 
-    response: Response  # What answers
     offset: float  # Added to its answers [output]
     factor: float  # What its answers are multiplied by before [-]
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The columns of the response."""
-        return self.response.columns
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """The output of the response."""
-        return self.response.outputs
 
     def __call__(self, x: Samples) -> Evaluation:
         """Return the corrected answers; a sample that fails stays a failed one."""

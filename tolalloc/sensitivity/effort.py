@@ -16,17 +16,10 @@ WORST_SHARE = 0.05
 """Share of the units, largest output first, that is looked at where too few are beyond the limit [-]."""
 FEWEST_OUTSIDE = 50
 """Units needed on either side of the threshold [-]."""
-
-
 FAST_SECONDS = {True: 0.25, False: 1.0}
 """Whether a run is quick → what the Sobol analysis of such a model may take at that rate [s]."""
-
-
-def fewest_units() -> int:
-    """Return the fewest units whose worst share is as many as are needed, whatever the limit [-]."""
-    return ceil(FEWEST_OUTSIDE / WORST_SHARE)
-
-
+FEWEST_UNITS = ceil(FEWEST_OUTSIDE / WORST_SHARE)
+"""Fewest units whose worst share is as many as are needed, whatever the limit [-]."""
 _FEWEST_BLOCKS = 16
 """Blocks of a Sobol analysis that is given too little time for more [-]."""
 _MOST_UNITS, _MOST_SAMPLES = 2**17, 2**26
@@ -140,7 +133,7 @@ class RankingEffort(NamedFields):
     called: ClassVar[str] = "effort of a ranking"
     written_in: ClassVar[tuple[str, str]] = ("study", "effort.ranking.")
 
-    units: Annotated[int, _least(fewest_units())] = 16_384
+    units: Annotated[int, _least(FEWEST_UNITS)] = 16_384
     design: Annotated[SamplingDesign, a(SamplingDesign)] = SamplingDesign.MONTE_CARLO
     sobol: Annotated[SobolEffort, a(SobolEffort)] = field(default_factory=lambda: SobolEffort(start=256, limit=2048))
     derivative_units: Annotated[int, _least(10)] = 1024
@@ -192,7 +185,7 @@ class RankingEffort(NamedFields):
 
         return replace(
             self,
-            units=min(max(round(share * self.units), fewest_units()), max(_MOST_UNITS, self.units)),
+            units=min(max(round(share * self.units), FEWEST_UNITS), max(_MOST_UNITS, self.units)),
             sobol=replace(self.sobol, start=start, limit=limit),
             derivative_units=scaled(self.derivative_units, 10),
             inverse_units=scaled(self.inverse_units, 100),

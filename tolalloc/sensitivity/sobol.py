@@ -175,19 +175,9 @@ def _indices_of(
     """Return the indices at one place, of an output from so many blocks."""
     if not found.varies[at]:
         raise ConstantOutputError(f"Sobol indices: {output} is the same for all samples; no source can be ranked.")
-    return SourceIndices(
-        sources=sources,
-        first=found.first[at],
-        total=found.total[at],
-        first_resamples=found.first_resamples[at],
-        total_resamples=found.total_resamples[at],
-        pairs=found.pairs,
-        second=found.second[at],
-        second_resamples=found.second_resamples[at],
-        blocks=blocks,
-        unseen=found.unseen[at],
-        few=few,
-    )
+    kinds = ("first", "total", "second")
+    own = {name: getattr(found, name)[at] for name in (*kinds, *(f"{kind}_resamples" for kind in kinds), "unseen")}
+    return SourceIndices(sources=sources, pairs=found.pairs, blocks=blocks, few=few, **own)
 
 
 @dataclass(frozen=True, kw_only=True)

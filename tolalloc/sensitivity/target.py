@@ -13,7 +13,7 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import limited_measure
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.sensitivity.effort import FEWEST_OUTSIDE, WORST_SHARE, fewest_units
+from tolalloc.sensitivity.effort import FEWEST_OUTSIDE, FEWEST_UNITS, WORST_SHARE
 from tolalloc.sensitivity.ranking import percentile_interval, share_interval
 
 _CLASSES_PER_ROOT = 2
@@ -171,9 +171,8 @@ def _threshold(values: Float[np.ndarray, " good_unit"], limit: float, *, units: 
     outside = int(np.count_nonzero(values > limit))
     if FEWEST_OUTSIDE <= outside <= values.size - FEWEST_OUTSIDE:
         return limit, True
-    needed = fewest_units()
-    if units < needed:
-        raise InputError.at("target sensitivity", "units", units, f"{needed} or more for {outside} outside")
+    if units < FEWEST_UNITS:
+        raise InputError.at("target sensitivity", "units", units, f"{FEWEST_UNITS} or more for {outside} outside")
     cut, most = float(np.quantile(values, 1.0 - WORST_SHARE)), values.max()
     # Of an output with steps the worst units may all be alike: then they are those on the highest step.
     return cut if cut < most else float(values[values < most].max(initial=-np.inf)), False

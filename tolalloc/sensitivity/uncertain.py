@@ -94,13 +94,10 @@ def first_order_error(
     >>> round(found.effect, 6), found.root_mean_square < 1e-12
     (0.2, True)
     """
-    before = model.reading((output,))(x)
+    before = model.reading((output,))(x).known
     predicted = _gradient(model, output, x) @ changes.T
-    after = [model.changed(change).reading((output,))(x) for change in changes]
-    effect = np.stack(
-        [np.where(found.good & before.good, found.values[:, 0] - before.values[:, 0], np.nan) for found in after],
-        axis=1,
-    )
+    after = [model.changed(change).reading((output,))(x).known for change in changes]
+    effect = np.hstack(after) - before
     error = predicted - effect
     good = np.isfinite(error)
     if not good.any():
@@ -123,6 +120,5 @@ def _gradient(model: Model, output: str, x: Float[np.ndarray, "unit column"]) ->
     columns = sum(len(source.columns) for source in model.uncertain)
     shifts = np.concatenate([np.zeros((1, columns)), np.eye(columns)])
     rows = np.concatenate([np.repeat(x, len(shifts), axis=0), np.tile(shifts, (len(x), 1))], axis=1)
-    found = model.with_uncertain((output,))(rows)
-    values = np.where(found.good, found.values[:, 0], np.nan).reshape(len(x), -1)
-    return values[:, 1:] - values[:, :1]
+    values = model.with_uncertain((output,))(rows).known.reshape(len(x), -1)
+    return np.asarray(values[:, 1:] - values[:, :1])

@@ -12,7 +12,7 @@ from tolalloc.exceptions import InputError
 from tolalloc.models.model import Response
 from tolalloc.reading.units import ARCSECOND, MEGAPASCAL, MILLIMETRE
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import Solved, peak_line_load
+from tolalloc.reducers.equivalent.outputs import Solved
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.wings.assembly.chain import ChainPart, DatumFlowChain
@@ -77,7 +77,7 @@ def test_its_outputs_are_those_of_the_model(response, x):
     np.testing.assert_array_equal(values["largest pin force, rated torque [N]"], pins.max(axis=(1, 2, 3)))
     of_disc = pins.sum(axis=3).max(axis=(1, 2))
     np.testing.assert_allclose(values["largest sum of pin forces of a disc, rated torque [N]"], of_disc, rtol=1e-14)
-    load = peak_line_load(solved.equilibria, solved.forces).max(axis=(1, 2, 3)) * MILLIMETRE
+    load = solved.line_load.max(axis=(1, 2, 3)) * MILLIMETRE
     np.testing.assert_allclose(values[LOAD], load, rtol=1e-14)
     touching = (pins > 0).sum(axis=(2, 3)).mean(axis=1)
     np.testing.assert_allclose(values["pins in contact, mean, rated torque [-]"], touching, rtol=1e-3)

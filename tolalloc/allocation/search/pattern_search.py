@@ -67,7 +67,7 @@ class CommonUnits:
         space, model = self.verifier.space, self.verifier.model.at(self.verifier.space.settings_of(design))
         names = tuple(dict.fromkeys(name for own in self.verifier.requirements for name in own.outputs))
         found = model.reading(names)(space.errors.deviations(self.standard, space.zones(design)))
-        return dict(zip(names, np.where(found.good[:, np.newaxis], found.values, np.nan).T, strict=True))
+        return dict(zip(names, found.known.T, strict=True))
 
     def keep(self, design: Design) -> bool:
         """Return whether as many of them as must keep the limits."""

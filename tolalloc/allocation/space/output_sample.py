@@ -362,8 +362,7 @@ class DesignSample:
 
     def values(self, output: str) -> Float[np.ndarray, " unit"]:
         """Return one output of every unit, NaN where it has none [unit of the output]."""
-        evaluation = self.evaluation(output)
-        return np.where(evaluation.good, evaluation.values[:, 0], np.nan)
+        return self.evaluation(output).known[:, 0]
 
     @cached_property
     def laws(self) -> dict[str, LinearLaw]:
@@ -520,7 +519,7 @@ class DesignSample:
         }
         if rest := tuple(output for output in self._others if output not in slopes):
             slopes |= dict(zip(rest, self._differences(rest, standard), strict=True))
-        values = np.where(self.others.good[:, np.newaxis], self.others.values, np.nan)[: len(standard)]
+        values = self.others.known[: len(standard)]
         return values, np.stack([slopes[output] for output in self._others], axis=1)
 
     def _differences(
@@ -534,8 +533,7 @@ class DesignSample:
             ends = []
             for design in (self.design + step, self.design - step):
                 deviations = self.space.errors.deviations(standard, self.space.zones(design))
-                found = self.at(design).reading(outputs)(deviations)
-                ends.append(np.where(found.good[:, np.newaxis], found.values, np.nan))
+                ends.append(self.at(design).reading(outputs)(deviations).known)
             slopes[..., at] = (ends[0] - ends[1]).T / (2 * steps[at])
         return slopes
 

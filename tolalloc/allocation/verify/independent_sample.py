@@ -158,7 +158,7 @@ class SolvedPart:
     @property
     def known(self) -> Float[np.ndarray, "solved output"]:
         """The outputs, not a number where a unit has none [units of their names]."""
-        return _known(self.evaluation)
+        return self.evaluation.known
 
     @classmethod
     def joined(cls, parts: list[SolvedPart]) -> SolvedPart:
@@ -218,10 +218,6 @@ class UnitSolver:
     ) -> tuple[Evaluation, dict[str, Bool[np.ndarray, " unit"]], dict[str, Float[np.ndarray, " unit"]]]:
         """Return what the model says of units, which of them leave the laws of linear outputs, and what planes say."""
         evaluation = self.response(x)
-        values = dict(zip(self.response.outputs, _known(evaluation).T, strict=True))
+        values = dict(zip(self.response.outputs, evaluation.known.T, strict=True))
         off_the_law = {output: law.function.leaves(x, values[output]) for output, law in self.laws.items()}
         return evaluation, off_the_law, {output: near(x) for output, near in self.nearest.items()}
-
-
-def _known(evaluation: Evaluation) -> Float[np.ndarray, "solved output"]:
-    return np.where(evaluation.good[:, np.newaxis], evaluation.values, np.nan)

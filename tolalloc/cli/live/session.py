@@ -248,8 +248,7 @@ class Session:
         response = self.model(design).reading(self.outputs)
         while len(values) < count and wanted():
             evaluation = response(self.deviations(design, slice(len(values), min(len(values) + _LOOK, count))))
-            good = np.where(evaluation.good[:, np.newaxis], evaluation.values, np.nan)
-            values = np.concatenate([values, good])
+            values = np.concatenate([values, evaluation.known])
         with self._lock:  # the units of the oldest designs are forgotten
             known = self._known.pop(design, values)
             self._known[design] = max(values, known, key=len)
@@ -417,8 +416,7 @@ class Session:
         return np.asarray(centred * half / measure)
 
     def _values(self, design: LiveDesign, x: Float[np.ndarray, "unit column"]) -> Float[np.ndarray, "unit output"]:
-        evaluation = self.model(design).reading(self.outputs)(x)
-        return np.where(evaluation.good[:, np.newaxis], evaluation.values, np.nan)
+        return self.model(design).reading(self.outputs)(x).known
 
 
 def _label(number: int) -> str:

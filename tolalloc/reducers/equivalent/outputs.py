@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from math import gcd
 
 import numpy as np
@@ -178,6 +179,23 @@ class Solved:
         """Number of pins of every disc that carry load [-]."""
         return np.asarray((self.forces.pins > 0.0).sum(axis=3))
 
+    @cached_property
+    def line_load(self) -> Float[np.ndarray, "sample angle disc pin"]:
+        """Largest line load of every pin and disc, the even one where nothing is tilted or crowned [N/m].
+
+        F/b + C|γ|/2, own derivation; without tilt F/b; of crowned teeth that of `LineContact`.
+        """
+        columns, stage = self.equilibria.columns, self.equilibria.reducer.cycloid_stage
+        tilts = columns.matrix[columns.layout.tilt : columns.layout.end]
+        if not (stage.crowning or np.any(tilts @ self.equilibria.errors.T)):
+            return np.asarray(self.forces.pins / stage.face_width)
+        return line_contact(self.equilibria, self.forces).peak
+
+    @property
+    def pressure(self) -> Float[np.ndarray, "sample angle disc pin"]:
+        """Hertz's peak pressure of every pin and disc under that line load [Pa]."""
+        return np.asarray(unit_pressure(self.equilibria) * np.sqrt(self.line_load))
+
 
 def load_share(pins: Float[np.ndarray, "sample angle disc pin"]) -> Float[np.ndarray, "sample disc"]:
     """Return the share of all pin force that each disc carries over the turn, Σ_disc F/Σ F, own derivation [-]."""
@@ -323,17 +341,6 @@ def line_contact(equilibria: Equilibria, forces: Forces) -> LineContact:
         slope=slope,
         face_width=equilibria.reducer.cycloid_stage.face_width,
     )
-
-
-def peak_line_load(equilibria: Equilibria, forces: Forces) -> Float[np.ndarray, "sample angle disc pin"]:
-    """Return the largest line load of every pin and disc, the even one where nothing is tilted or crowned [N/m].
-
-    F/b + C|γ|/2, own derivation; without tilt F/b; of crowned teeth that of `LineContact`.
-    """
-    layout, stage = equilibria.columns.layout, equilibria.reducer.cycloid_stage
-    if not (stage.crowning or np.any(equilibria.columns.matrix[layout.tilt : layout.end] @ equilibria.errors.T)):
-        return np.asarray(forces.pins / stage.face_width)
-    return line_contact(equilibria, forces).peak
 
 
 def unit_pressure(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]:

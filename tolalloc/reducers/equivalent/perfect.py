@@ -94,12 +94,12 @@ def _without_torque(model: EquivalentModel, errors: Errors) -> Solved:
     return Solved.of(model.at_torque(torque).equilibria(errors, torque, TURN_ANGLES))
 
 
-Derived = tuple[Preload, Float[np.ndarray, "sample column"]]
-"""What presses in every unit, and the derivatives of one of its two outputs by every error column."""
+Derived = tuple[Float[np.ndarray, " sample"], Float[np.ndarray, "sample column"], UInt8[np.ndarray, " sample"]]
+"""A number of every unit, its derivatives by every error column, and the worst status of the turn."""
 
 
 def pin_force_derivatives(model: EquivalentModel, errors: Errors) -> Derived:
-    """Return what presses in every unit without torque, and the derivatives of the largest pin force [N/m].
+    """Return the largest pin force without torque [N] and its derivatives [N/m].
 
     Those of that pin's force at that angle, own derivation, theory page (23): the adjoint of the equilibrium with the
     force in place of the rotation. They hold while the same pins touch and the same one is pressed most.
@@ -109,11 +109,13 @@ def pin_force_derivatives(model: EquivalentModel, errors: Errors) -> Derived:
     at, largest = _largest(pins.max(axis=(2, 3))), pins.reshape(*pins.shape[:2], -1).argmax(axis=2)
     weights = np.zeros((len(errors), pins[0, 0].size))
     weights[np.arange(len(errors)), largest[np.arange(len(errors)), at]] = 1.0
-    return _derived(model, solved, at, weights.reshape(-1, *pins.shape[2:]))
+    slopes = _slopes(model, solved, at, weights.reshape(-1, *pins.shape[2:]))
+    found = _preload_of(solved)
+    return found.pin_force, slopes, found.status
 
 
 def friction_torque_derivatives(model: EquivalentModel, errors: Errors) -> Derived:
-    """Return what presses in every unit without torque, and the derivatives of the friction torque [N·m/m].
+    """Return the friction torque without load [N·m] and its derivatives [N·m/m].
 
     As `pin_force_derivatives`, own derivation, of the sum of forces times sliding ways at the angle where it is
     largest.
@@ -121,7 +123,8 @@ def friction_torque_derivatives(model: EquivalentModel, errors: Errors) -> Deriv
     solved = _without_torque(model, errors)
     by_force = model.reducer.friction.pins * sliding_ways(model.reducer, TURN_ANGLES)
     at = _largest(np.einsum("sadp,adp->sa", solved.forces.pins, by_force))
-    return _derived(model, solved, at, by_force[at])
+    found = _preload_of(solved)
+    return found.friction_torque, _slopes(model, solved, at, by_force[at]), found.status
 
 
 def _largest(over_turn: Curves) -> Integer[np.ndarray, " sample"]:
@@ -129,16 +132,15 @@ def _largest(over_turn: Curves) -> Integer[np.ndarray, " sample"]:
     return np.asarray(np.nan_to_num(over_turn, nan=-inf).argmax(axis=1))
 
 
-def _derived(
+def _slopes(
     model: EquivalentModel,
     solved: Solved,
     at: Integer[np.ndarray, " sample"],
     weights: Float[np.ndarray, "sample disc pin"],
-) -> Derived:
-    """Return what presses, and the derivatives of the weighted sum of the forces at one angle of every sample."""
+) -> Errors:
+    """Return the derivatives of the weighted sum of the forces at one angle of every sample."""
     errors, torque = solved.equilibria.errors, solved.equilibria.torque
-    found = model.at_torque(torque).pin_force_derivatives(errors, torque, TURN_ANGLES, at, weights)
-    return _preload_of(solved), found.by_error
+    return model.at_torque(torque).pin_force_derivatives(errors, torque, TURN_ANGLES, at, weights).by_error
 
 
 @lru_cache(maxsize=256)

@@ -5,21 +5,20 @@ Stiffness may be columns of it: its exact derivative by ln K, and how far that f
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from math import exp, inf
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Shaped, UInt8
 
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.model import Evaluation, Observer, Response, unobserved
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers import PEAK_TO_PEAK
-from tolalloc.reducers.equivalent.model import Derivatives, EquivalentModel, TurnExtremes, cached_model
+from tolalloc.reducers.equivalent.model import EquivalentModel, TurnExtremes, cached_model
 from tolalloc.reducers.equivalent.wear import Wear
 from tolalloc.reducers.load_case import LoadCase
 from tolalloc.reducers.reducer.design import Modification, Reducer, at_torque, thermal_shift
@@ -28,6 +27,8 @@ from tolalloc.running.chunks import Mapper, map_chunks
 
 Samples = Float[np.ndarray, "sample column"]
 """Deviations of units in the columns that vary, or what has their shape [m, angles rad]."""
+Answer = tuple[Float[np.ndarray, "chunk output"], UInt8[np.ndarray, " chunk"]]
+"""Outputs of a chunk and the status of every sample."""
 NAME = "stiffness (identified)"
 PREFIX = "stiffness."
 SEEN = 0.05
@@ -115,10 +116,7 @@ class KernelResponse:
     def __call__(self, x: Samples) -> Evaluation:
         """Return the peak-to-peak of every sample [arcsec]."""
         values, status = np.empty((x.shape[0], 1)), np.empty(x.shape[0], np.uint8)
-        for rows, extremes in map_chunks(self.alone._extremes, x, self.mapper):
-            values[rows, 0] = extremes.peak_to_peak / ARCSECOND
-            status[rows] = extremes.status
-            self.observe(extremes.status)
+        self.fill(self.alone._peak_to_peak, x, values, status)
         return Evaluation(values=values, status=status)
 
     def with_derivatives(self, x: Samples) -> WithDerivatives:
@@ -126,21 +124,27 @@ class KernelResponse:
         values, status = np.empty((x.shape[0], 1)), np.empty(x.shape[0], np.uint8)
         by_column = np.empty(x.shape)
         by_modification = np.empty((x.shape[0], len(self.model.reducer.modification.deviations)))
-        by_stiffness: dict[str, Float[np.ndarray, " sample"]] = defaultdict(lambda: np.empty(x.shape[0]))
-        for rows, (extremes, derivatives) in map_chunks(self.alone._derivatives, x, self.mapper):
-            values[rows, 0] = extremes.peak_to_peak / ARCSECOND
-            status[rows] = extremes.status
-            by_column[rows] = derivatives.by_error[:, : len(self.columns)] / ARCSECOND
-            by_modification[rows] = derivatives.by_error[:, len(self.columns) :] / ARCSECOND
-            for name, derivative in derivatives.by_stiffness.items():
-                by_stiffness[name][rows] = derivative / ARCSECOND
-            self.observe(extremes.status)
+        names = (*self.model.error_columns.rows_of_stiffness, "pin_contact")
+        by_stiffness = np.empty((x.shape[0], len(names)))
+        self.fill(self.alone._derivatives, x, values, by_column, by_modification, by_stiffness, status)
         return WithDerivatives(
             evaluation=Evaluation(values=values, status=status),
             by_column=by_column,
             by_modification=by_modification,
-            by_stiffness=dict(by_stiffness),
+            by_stiffness=dict(zip(names, by_stiffness.T, strict=True)),
         )
+
+    def fill(
+        self,
+        solve: Callable[[Float[np.ndarray, "chunk column"]], tuple[np.ndarray, ...]],
+        x: Samples,
+        *filled: Shaped[np.ndarray, "sample ..."],
+    ) -> None:
+        """Fill arrays with what a function gives of every chunk, the statuses last, which the observer is told."""
+        for rows, found in map_chunks(solve, x, self.mapper):
+            for whole, own in zip(filled, found, strict=True):
+                whole[rows] = own
+            self.observe(found[-1])
 
     @property
     def alone(self) -> KernelResponse:
@@ -157,18 +161,26 @@ class KernelResponse:
             return self.model.extremes(errors, self.torque)
         return self.model.extremes_within(errors, self.torque, self.window)
 
-    def _extremes(self, x: Float[np.ndarray, "chunk column"]) -> TurnExtremes:
-        return self.extremes(self.errors(x))
+    def peak_to_peak(self, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
+        """Return the peak-to-peak at errors in the order of the model's columns [arcsec], and the statuses."""
+        found = self.extremes(errors)
+        return found.peak_to_peak[:, np.newaxis] / ARCSECOND, found.status
 
-    def _derivatives(self, x: Float[np.ndarray, "chunk column"]) -> tuple[TurnExtremes, Derivatives]:
-        """Return the extremes of a chunk and their derivatives, of the columns those that vary and the amounts alone.
+    def _peak_to_peak(self, x: Float[np.ndarray, "chunk column"]) -> Answer:
+        return self.peak_to_peak(self.errors(x))
+
+    def _derivatives(self, x: Float[np.ndarray, "chunk column"]) -> tuple[np.ndarray, ...]:
+        """Return what `with_derivatives` fills of a chunk, of the columns those that vary and the amounts alone.
 
         What is asked for is a fraction of all columns, and a chunk's answer is kept in a file or sent by a worker.
         """
         extremes, found = self.model.peak_to_peak_derivatives(self.errors(x), self.torque)
-        names = (*self.columns, *self.model.reducer.modification.deviations)
-        asked = [self.model.columns.index(name) for name in names]
-        return extremes, replace(found, by_error=found.by_error[:, asked])
+        varied, amounts = (
+            found.by_error[:, [self.model.columns.index(name) for name in names]] / ARCSECOND
+            for names in (self.columns, self.model.reducer.modification.deviations)
+        )
+        by_stiffness = np.stack(list(found.by_stiffness.values()), axis=1) / ARCSECOND
+        return extremes.peak_to_peak[:, np.newaxis] / ARCSECOND, varied, amounts, by_stiffness, extremes.status
 
     def errors(self, x: Samples) -> Float[np.ndarray, "sample all_columns"]:
         """Return the varied columns and the fixed ones together, in the order of the model [m].
@@ -285,15 +297,6 @@ class OutputsWithStiffness:
         """The outputs without the peak-to-peak, which no difference is taken of."""
         return tuple(name for name in self.outputs if name != PEAK_TO_PEAK)
 
-    def _changed(self) -> Iterator[Response]:
-        """Yield the others with the stiffnesses changed along every axis.
-
-        One at a time, as the tables of each take tens of megabytes and are made in less time than a chunk is solved in.
-        """
-        for axis in self.axes:
-            # These solves belong to a unit that is counted already.
-            yield self.reading(replace(self.peak.changed(axis), observe=unobserved), self._others)
-
     def __call__(self, x: Samples) -> Evaluation:
         """Return the outputs of every sample."""
         if PEAK_TO_PEAK not in self.outputs:
@@ -309,8 +312,10 @@ class OutputsWithStiffness:
         sample, along = np.ascontiguousarray(x[:, :own]), x[:, own:] @ np.linalg.pinv(self.axes)
         base = self.reading(kernel, self._others)(sample)
         values, status = base.values.copy(), base.status.copy()
-        for steps, response in zip(along.T, self._changed(), strict=True):
-            found = response(sample)
+        # One at a time: the tables of each take tens of megabytes and are made in less time than a chunk is solved in.
+        for steps, axis in zip(along.T, self.axes, strict=True):
+            # These solves belong to a unit that is counted already.
+            found = self.reading(replace(self.peak.changed(axis), observe=unobserved), self._others)(sample)
             values += (found.values - base.values) * steps[:, np.newaxis]
             status = np.maximum(status, found.status)
         return Evaluation(values=values, status=status)

@@ -34,20 +34,16 @@ from tolalloc.reducers.equivalent.outputs import (
     Solved,
     fitted_waves,
     outputs_of,
-    peak_line_load,
     radial_clearance,
     radial_clearance_derivatives,
-    unit_pressure,
 )
 from tolalloc.reducers.equivalent.perfect import friction_torque_derivatives, pin_force_derivatives, preload
 from tolalloc.reducers.families.known import family_of
 from tolalloc.reducers.load_case import OverLoadCases
 from tolalloc.reducers.reducer.design import Reducer
-from tolalloc.reducers.response.kernel import KernelResponse, Samples
-from tolalloc.running.chunks import map_chunks
+from tolalloc.reducers.response.kernel import Answer, KernelResponse, Samples
 
 Errors = Float[np.ndarray, "chunk all_columns"]
-Answer = tuple[Float[np.ndarray, "chunk output"], UInt8[np.ndarray, " chunk"]]
 WITH_FRICTION = (EFFICIENCY, LOST_MOTION_WITH_FRICTION, HYSTERESIS_LOSS)
 """Outputs of the loop with friction."""
 Derived = tuple[Float[np.ndarray, " chunk"], Float[np.ndarray, "chunk all_columns"], UInt8[np.ndarray, " chunk"]]
@@ -63,11 +59,6 @@ class Reading:
     outputs: tuple[str, ...]  # Names of the outputs with their units
     # From the kernel and errors in the order of its model's columns, the outputs and the status of every sample
     read: Callable[[KernelResponse, Float[np.ndarray, "chunk all_columns"]], Answer]
-
-
-def _peak_to_peak(kernel: KernelResponse, errors: Errors) -> Answer:
-    found = kernel.extremes(errors)
-    return found.peak_to_peak[:, np.newaxis] / ARCSECOND, found.status
 
 
 def _loop(kernel: KernelResponse, errors: Errors) -> Answer:
@@ -104,9 +95,10 @@ def _load(kernel: KernelResponse, errors: Errors) -> Answer:
     every = outputs_of(model.reducer)
     own = [every[name][1](solved) for name in _under_load(model.reducer)]
     # At the deeper end of a tooth whose disc is tilted; the force spreads evenly where no disc is.
-    line_load = peak_line_load(solved.equilibria, solved.forces)
-    pressure = unit_pressure(solved.equilibria) * np.sqrt(line_load)
-    own += [line_load.max(axis=(1, 2, 3)) * MILLIMETRE, pressure.max(axis=(1, 2, 3)) / MEGAPASCAL]
+    own += [
+        solved.line_load.max(axis=(1, 2, 3)) * MILLIMETRE,
+        solved.pressure.max(axis=(1, 2, 3)) / MEGAPASCAL,
+    ]
     return np.stack(own, axis=1), np.asarray(solved.equilibria.status.max(axis=1))
 
 
@@ -121,7 +113,7 @@ def _radial_clearance(kernel: KernelResponse, errors: Errors) -> Answer:
     return clearance, status.astype(np.uint8)
 
 
-_PEAK_TO_PEAK = Reading(outputs=(PEAK_TO_PEAK,), read=_peak_to_peak)
+_PEAK_TO_PEAK = Reading(outputs=(PEAK_TO_PEAK,), read=KernelResponse.peak_to_peak)
 _LOOP = Reading(outputs=(LOST_MOTION, BACKLASH, TORSIONAL_STIFFNESS), read=_loop)
 _FRICTION_LOOP = Reading(outputs=(*_LOOP.outputs, *WITH_FRICTION), read=_friction_loop)
 
@@ -226,9 +218,7 @@ class OutputsResponse:
     def __call__(self, x: Samples) -> Evaluation:
         """Return the outputs of every sample; a sample fails where one of its readings does."""
         values, status = np.empty((x.shape[0], len(self._read))), np.empty(x.shape[0], np.uint8)
-        for rows, (answer, worst) in map_chunks(self.alone.read, x, self.kernel.mapper):
-            values[rows], status[rows] = answer, worst
-            self.kernel.observe(worst)
+        self.kernel.fill(self.alone.read, x, values, status)
         if self.chosen:
             values = values[:, [self._read.index(name) for name in self.chosen]]
         return Evaluation(values=values, status=status)
@@ -265,19 +255,15 @@ class LoadCasesResponse:
         """Return the outputs of every sample; a sample fails where one of its load cases does."""
         found = [response(x) for response in self.responses]
         values, place = np.hstack([own.values for own in found]), {name: at for at, name in enumerate(self.read)}
-        chosen = [
-            values[:, place[name]] if name in place else self._combined(self.combined[name], values, place)
-            for name in self.outputs
-        ]
-        status = np.max([own.status for own in found], axis=0)
-        return Evaluation(values=np.stack(chosen, axis=1), status=np.asarray(status))
 
-    @staticmethod
-    def _combined(
-        combined: OverLoadCases, values: Float[np.ndarray, "sample output"], place: Mapping[str, int]
-    ) -> Float[np.ndarray, " sample"]:
-        own = values[:, [place[name] for name in combined.of]]
-        return np.asarray((combined.weights(own) * own).sum(axis=1))
+        def answered(name: str) -> Float[np.ndarray, " sample"]:
+            if name in place:
+                return values[:, place[name]]
+            own = values[:, [place[part] for part in self.combined[name].of]]
+            return np.asarray((self.combined[name].weights(own) * own).sum(axis=1))
+
+        status = np.max([own.status for own in found], axis=0)
+        return Evaluation(values=np.stack([answered(name) for name in self.outputs], axis=1), status=np.asarray(status))
 
 
 def _loop_derivatives(output: str, kernel: KernelResponse, errors: Errors) -> Derived:
@@ -307,16 +293,6 @@ def _width(model: EquivalentModel, errors: Errors, share: float) -> tuple[Width,
     return (width, slope), status
 
 
-def _pin_force_derivatives(kernel: KernelResponse, errors: Errors) -> Derived:
-    found, slopes = pin_force_derivatives(kernel.model, errors)
-    return found.pin_force, slopes, found.status
-
-
-def _friction_torque_derivatives(kernel: KernelResponse, errors: Errors) -> Derived:
-    found, slopes = friction_torque_derivatives(kernel.model, errors)
-    return found.friction_torque, slopes, found.status
-
-
 def _clearance_derivatives(kernel: KernelResponse, errors: Errors) -> Derived:
     clearance, status = _radial_clearance(kernel, errors)
     return clearance[:, 0], radial_clearance_derivatives(kernel.model, errors) / MICROMETRE, status
@@ -324,8 +300,8 @@ def _clearance_derivatives(kernel: KernelResponse, errors: Errors) -> Derived:
 
 _DERIVED: dict[str, Callable[[KernelResponse, Float[np.ndarray, "chunk all_columns"]], Derived]] = {
     **{name: partial(_loop_derivatives, name) for name in (LOST_MOTION, BACKLASH, TORSIONAL_STIFFNESS)},
-    PRELOAD: _pin_force_derivatives,
-    FRICTION_TORQUE: _friction_torque_derivatives,
+    PRELOAD: lambda kernel, errors: pin_force_derivatives(kernel.model, errors),
+    FRICTION_TORQUE: lambda kernel, errors: friction_torque_derivatives(kernel.model, errors),
     RADIAL_CLEARANCE: _clearance_derivatives,
 }
 
@@ -345,11 +321,10 @@ def output_derivatives(
     adjoints'; of K = 2·0.97·T/(w₁ − w₃) [N·m/arcmin] it is −K/(w₁ − w₃)·∂(w₁ − w₃). They hold while the same pins
     carry.
     """
-    values, slopes, status = np.empty((len(x), 1)), np.empty((len(x), len(kernel.model.columns))), np.empty(len(x))
-    for rows, (value, slope, worst) in map_chunks(partial(_derived, kernel.alone, output), x, kernel.mapper):
-        values[rows, 0], slopes[rows], status[rows] = value, slope, worst
-        kernel.observe(worst)
-    return Evaluation(values=values, status=status.astype(np.uint8)), slopes
+    values, status = np.empty(len(x)), np.empty(len(x), np.uint8)
+    slopes = np.empty((len(x), len(kernel.model.columns)))
+    kernel.fill(partial(_derived, kernel.alone, output), x, values, slopes, status)
+    return Evaluation(values=values[:, np.newaxis], status=status), slopes
 
 
 def _derived(kernel: KernelResponse, output: str, x: Float[np.ndarray, "chunk column"]) -> Derived:

@@ -367,11 +367,11 @@ def _reasons(model: ReducerModel, figures: Mapping[str, float]) -> list[str]:
 
 def _advice(model: ReducerModel) -> str:
     """Return what frees preloaded units, as the end of a sentence."""
-    flank = model.present_clearances[-2]
+    flank, (_, chosen, _) = model.present_clearances[-2], model.ranges
     freely = (
         "flank_clearance of ta.reducer(...) lets the allocation open it, at present from "
-        f"{model.flank[0] / MICROMETRE:.3g} to {model.flank[1] / MICROMETRE:.3g} µm"
-        if model.flank
+        f"{chosen[0] / MICROMETRE:.3g} to {chosen[1] / MICROMETRE:.3g} µm"
+        if chosen
         else "flank_clearance=(smallest, largest) of ta.reducer(...) would let the allocation open it"
     )
     return (

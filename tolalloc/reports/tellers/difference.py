@@ -7,7 +7,7 @@ from typing import Any
 
 from tolalloc.allocation.difference import DifferenceResult
 from tolalloc.allocation.space.design_space import outside_range
-from tolalloc.capability.monte_carlo import Change
+from tolalloc.capability.indices import Interval
 from tolalloc.drawings.sources import Source, by_row, zone_in, zone_unit
 from tolalloc.reading.units import COST_UNITS, unit_of
 from tolalloc.reports.columns import Column, Table, own_words
@@ -22,7 +22,7 @@ _say = Sentences("difference")
 
 _Row = tuple[Source, tuple[Source, ...], tuple[Source, ...]]
 """What a table calls sources, these before, and after."""
-_Changed = tuple[str, str, tuple[float, float], Change]
+_Changed = tuple[str, str, tuple[float, float], Interval]
 """What changes, its unit, before and after, and the change with its interval."""
 
 _CHANGES: tuple[Column[_Changed], ...] = (
@@ -110,7 +110,7 @@ class DifferenceTeller(Teller[DifferenceResult]):
         costs = (result.whole_cost, result.whole_cost + result.cost_change)
         shares = (100 * result.yields[0], 100 * result.yields[1])
         rows: list[_Changed] = [
-            ("cost", cost_unit, costs, Change(estimate=costs[1] - costs[0], low=none, high=none)),
+            ("cost", cost_unit, costs, Interval(estimate=costs[1] - costs[0], low=none, high=none)),
             ("yield, all limits", "%", shares, _in_percent(result.yield_change)),
         ]
         found = zip(result.limited, result.quantiles, result.quantile_changes, strict=True)
@@ -128,7 +128,7 @@ class DifferenceTeller(Teller[DifferenceResult]):
         return Table(name="changed zones", columns=_zone_columns(zone_unit(self.result.before)), rows=rows)
 
 
-def _with_interval(change: Change, output: str) -> dict[str, str]:
+def _with_interval(change: Interval, output: str) -> dict[str, str]:
     """Return a change of an output and the ends of its interval, one rounding for all."""
     numbers = alike(change.estimate, change.low, change.high)
     return {
@@ -137,9 +137,9 @@ def _with_interval(change: Change, output: str) -> dict[str, str]:
     }
 
 
-def _in_percent(found: Change) -> Change:
+def _in_percent(found: Interval) -> Interval:
     """Return the change of a share in percent."""
-    return Change(estimate=100 * found.estimate, low=100 * found.low, high=100 * found.high)
+    return Interval(estimate=100 * found.estimate, low=100 * found.low, high=100 * found.high)
 
 
 def _percent(share: float) -> str:

@@ -55,11 +55,9 @@ def fit_quadratic_form(
     middle, deviation = x.mean(axis=0), x.std(axis=0)
     spread = np.where(deviation > 0, deviation, 1.0)
     u, mean = (x - middle) / spread, y.mean(axis=0)
-    first, second = np.triu_indices(u.shape[1])
-    fewer_terms = u.shape[1] + first.size <= u.shape[0]
+    fewer_terms = u.shape[1] * (u.shape[1] + 3) // 2 <= u.shape[0]
     slopes, products = (_by_terms if fewer_terms else _by_units)(u, y - mean, strength)
-    curvature = np.zeros((y.shape[1], u.shape[1], u.shape[1]))
-    curvature[:, first, second] = products[:, first, second]
+    curvature = np.triu(products)
     # The mean of a product is a moment of the columns.
     offset = mean - u.mean(axis=0) @ slopes - np.einsum("oij,ij->o", curvature, u.T @ u / u.shape[0])
     return QuadraticForm(middle=middle, spread=spread, offset=offset, slopes=slopes, curvature=curvature)

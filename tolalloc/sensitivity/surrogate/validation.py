@@ -136,8 +136,7 @@ def cross_validate(candidate: Candidate, answers: Answers, quantile: float = 0.9
     for own in range(int(answers.fold.max()) + 1):
         seen, unseen = answers.fold != own, answers.fold == own
         fitted = candidate.fit(answers.x[seen], answers.y[seen])
-        evaluation = fitted(answers.x[unseen])
-        predicted[unseen] = np.where(evaluation.good, evaluation.values[:, 0], np.nan)
+        predicted[unseen] = fitted(answers.x[unseen]).known[:, 0]
         mean[unseen] = answers.y[seen].mean()
         if len(seconds) < _CLOCKED_FOLDS:  # in turns, so that another program slows both down alike
             few = answers.x[unseen][:_CLOCKED]

@@ -17,11 +17,11 @@ from tolalloc.reducers import PEAK_TO_PEAK
 from tolalloc.reducers.cycloid.solvers import LAWS, LINEAR
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.outputs import ContactPattern, Solved, contact_pattern, peak_line_load, unit_pressure
+from tolalloc.reducers.equivalent.outputs import ContactPattern, Solved, contact_pattern
 from tolalloc.reducers.reducer.design import Reducer, at_torque
 from tolalloc.reducers.reducer.files import load_reducer
-from tolalloc.reducers.response.kernel import KernelResponse
-from tolalloc.reducers.response.outputs import Answer, OutputsResponse, Reading
+from tolalloc.reducers.response.kernel import Answer, KernelResponse
+from tolalloc.reducers.response.outputs import OutputsResponse, Reading
 from tolalloc.wings.assembly.chain import DatumFlowChain
 from tolalloc.wings.assembly.control import regulator
 from tolalloc.wings.assembly.gains import assembled, tuned_gains
@@ -58,14 +58,13 @@ def transmission_curves(
     """
     solved = Solved.of(model.equilibria(errors, torque))
     found, pins = solved.equilibria, solved.forces.pins
-    line_load = peak_line_load(found, solved.forces)
     return TransmissionCurves(
         carrier_angle=found.carrier_angle,
         transmission_error=found.transmission_error,
         pin_force=pins.max(axis=(2, 3)),
         disc_force=pins.sum(axis=3).max(axis=2),
-        line_load=line_load.max(axis=(2, 3)),
-        pressure=(unit_pressure(found) * np.sqrt(line_load)).max(axis=(2, 3)),
+        line_load=solved.line_load.max(axis=(2, 3)),
+        pressure=solved.pressure.max(axis=(2, 3)),
         pins_in_contact=found.pins_in_contact.astype(float),
         status=found.status,
     )

@@ -126,8 +126,7 @@ def reductions(problem: CurveProblem, deviations: Float[np.ndarray, "unit column
     owner, middle = np.array(problem.errors.source_of_column), problem.deviations(np.zeros((1, problem.size)))
     names = list(dict.fromkeys(problem.errors.source_of_column))
     cases = [deviations, *(np.where(owner == name, middle, deviations) for name in names)]
-    evaluation = problem.kernel(np.concatenate(cases))
-    values = np.where(evaluation.good, evaluation.values[:, 0], np.nan).reshape(len(cases), -1)
+    values = problem.kernel(np.concatenate(cases)).known.reshape(len(cases), -1)
     fall = (values[0] - values[1:]).T
     good = np.isfinite(fall).all(axis=1)
     if (~good).mean() > LARGEST_FAILED_SHARE:
