@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.models.model import Response, ResponseWithDerivatives
+from tolalloc.models.model import Response, ResponseWithDerivatives, Samples
 
 LARGEST_FAILED_SHARE = 0.01
 """Share of the units that may fail unless a study says otherwise [-]."""
@@ -45,10 +45,10 @@ class Experiment(Generic[Answering]):
         """Return the same with random numbers of its own."""
         return replace(self, seeds=self.seeds.child(*names))
 
-    def deviations(self, standard: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample column"]:
+    def deviations(self, standard: Samples) -> Samples:
         """Return the columns [m, angles rad] that the standard values give at the zones."""
         return self.errors.deviations(standard, self.zones)
 
-    def uniform(self, units: int) -> Float[np.ndarray, "sample column"]:
+    def uniform(self, units: int) -> Samples:
         """Return independent uniform numbers in (0, 1), one per unit and column [-]."""
         return np.concatenate(list(self.seeds.uniform_chunks(units, len(self.errors.columns))))

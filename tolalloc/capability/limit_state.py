@@ -20,6 +20,8 @@ from tolalloc.capability.experiment import Experiment
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Response
 
+InChains = Bool[np.ndarray, "chain state"]
+"""Whether each state of each chain is inside a bound."""
 _CALLS_TO_JUDGE = 100
 """Below so many calls one failed sample would already exceed the allowed share."""
 
@@ -224,9 +226,7 @@ class ChainedRun:
         return float(np.sqrt(max(sum(level.coefficient_of_variation**2 for level in self.levels), lineages)))
 
 
-def run_of(
-    levels: list[Level], chains: Chains, failing: Bool[np.ndarray, "chain state"], samples: int, caution: str = ""
-) -> ChainedRun:
+def run_of(levels: list[Level], chains: Chains, failing: InChains, samples: int, caution: str = "") -> ChainedRun:
     """Return the run that ends with chains of which some states fail, from so many first samples."""
     found = np.bincount(chains.ancestors, weights=failing.sum(axis=1), minlength=samples)
     some = failing.any(axis=1)
@@ -238,7 +238,7 @@ def run_of(
     )
 
 
-def level(chains: Chains, inside: Bool[np.ndarray, "chain state"], bound: float) -> Level:
+def level(chains: Chains, inside: InChains, bound: float) -> Level:
     """Return the share of a level's samples inside the next one, with the variance that the chains leave it.
 
     References

@@ -13,7 +13,14 @@ from tolalloc.drawings.distributions import NORMAL, RAYLEIGH, Marginal
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
+from tolalloc.models.model import Samples
 
+AtSamples = Float[np.ndarray, " sample"]
+"""A number of every sample."""
+AtSources = Float[np.ndarray, " source"]
+"""A number of every active source."""
+AtPoints = Float[np.ndarray, " point"]
+"""A number at every point of a grid or curve."""
 _LINEAR = 1e-9
 """Distance of a value from the plane, over the range of the values, up to which it is rounding [-]."""
 _SPARE = 64
@@ -41,9 +48,7 @@ class LinearFunction:
     rounding: float  # Distance from the plane up to which a value lies on it [unit of the output]
 
     @classmethod
-    def through(
-        cls, x: Float[np.ndarray, "sample column"], values: Float[np.ndarray, " sample"]
-    ) -> LinearFunction | None:
+    def through(cls, x: Samples, values: AtSamples) -> LinearFunction | None:
         """Return the plane that all samples lie on up to rounding, none if one does not or has no answer."""
         few = x.shape[1] + _SPARE
         if values.size <= few or not np.isfinite(values).all():
@@ -56,7 +61,7 @@ class LinearFunction:
         return None if plane.leaves(x[:few], values[:few]).any() or plane.leaves(x, values).any() else plane
 
     @classmethod
-    def near(cls, x: Float[np.ndarray, "sample column"], values: Float[np.ndarray, " sample"]) -> LinearFunction:
+    def near(cls, x: Samples, values: AtSamples) -> LinearFunction:
         """Return the plane nearest to samples by least squares."""
         centre, size = x.mean(axis=0), np.maximum(x.std(axis=0), np.finfo(float).tiny)
         standard, middle = (x - centre) / size, float(values.mean())
@@ -64,13 +69,11 @@ class LinearFunction:
         slopes = np.linalg.lstsq(standard.T @ standard, standard.T @ (values - middle), rcond=None)[0] / size
         return cls(offset=float(middle - centre @ slopes), slopes=slopes, rounding=0.0)
 
-    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, " sample"]:
+    def __call__(self, x: Samples) -> AtSamples:
         """Return the values on the plane [unit of the output]."""
         return np.asarray(self.offset + x @ self.slopes)
 
-    def leaves(
-        self, x: Float[np.ndarray, "sample column"], values: Float[np.ndarray, " sample"]
-    ) -> Bool[np.ndarray, " sample"]:
+    def leaves(self, x: Samples, values: AtSamples) -> Bool[np.ndarray, " sample"]:
         """Return which values do not lie on the plane; one that is not a number does not."""
         return np.asarray(np.logical_not(np.abs(values - self(x)) <= self.rounding))
 
@@ -83,7 +86,7 @@ class _AddedColumn:
     marginal: Marginal
     width: float  # [unit of the output per half zone]
 
-    def masses(self, step: float) -> Float[np.ndarray, " point"]:
+    def masses(self, step: float) -> AtPoints:
         """Return the probabilities of the cells around multiples of a step, those below zero at the end [-]."""
         places = (np.arange(_POINTS) - _POINTS // 2) * step
         edges = np.append(places - step / 2, places[-1] + step / 2)
@@ -111,10 +114,10 @@ class LinearLaw:
 
     function: LinearFunction
     errors: ErrorModel
-    zones: Float[np.ndarray, " source"]  # Zones of the active sources [m]
+    zones: AtSources  # Zones of the active sources [m]
 
     @classmethod
-    def of(cls, function: LinearFunction, errors: ErrorModel, zones: Float[np.ndarray, " source"]) -> LinearLaw | None:
+    def of(cls, function: LinearFunction, errors: ErrorModel, zones: AtSources) -> LinearLaw | None:
         """Return the law, none where a source has a distribution that cannot be folded, or parts are chosen."""
         if errors.compensators:
             return None
@@ -172,7 +175,7 @@ class LinearLaw:
         upper, lower = (self._at(limit + sign * by)[0] for sign, limit in limits.turned)
         return upper / max(upper + lower, np.finfo(float).tiny)
 
-    def excess_by_zone(self, limits: Limits, by: float) -> Float[np.ndarray, " source"]:
+    def excess_by_zone(self, limits: Limits, by: float) -> AtSources:
         """Return the derivative of `excess` by the zones at a share that it has [unit of the output per m].
 
         Notes
@@ -197,7 +200,7 @@ class LinearLaw:
         below = float(np.interp(at, np.arange(_POINTS + 1), self._cumulative))
         return 1.0 - below if sign > 0 else below
 
-    def _at(self, value: float) -> tuple[float, Float[np.ndarray, " source"]]:
+    def _at(self, value: float) -> tuple[float, AtSources]:
         """Return the density at a value and the density times what each source adds on average to units there."""
         distance, sources = value - self.centre, self.zones.size
         shift = np.bincount(self._source_of_column, self._zone_means * self.function.slopes, sources)
@@ -284,13 +287,13 @@ class LinearLaw:
         return sum(part.reach for part in self._parts) + _REACH * self._normal_deviation
 
     @cached_property
-    def _grid(self) -> tuple[float, Float[np.ndarray, " point"]]:
+    def _grid(self) -> tuple[float, AtPoints]:
         """Step between points [unit of the output], and their angular frequencies."""
         step = 2.05 * self.half_width / _POINTS
         return step, 2 * np.pi * np.fft.fftfreq(_POINTS, step)
 
     @cached_property
-    def _normal_spectrum(self) -> Float[np.ndarray, " point"]:
+    def _normal_spectrum(self) -> AtPoints:
         return np.asarray(np.exp(-0.5 * (self._grid[1] * self._normal_deviation) ** 2))
 
     @cached_property
@@ -317,16 +320,10 @@ class NearPlane:
 
     law: LinearLaw  # Of the plane
     # Points of the curve: values of the output [unit of the output], and of the plane; none where there is no curve
-    curve: tuple[Float[np.ndarray, " point"], Float[np.ndarray, " point"]] | None = None
+    curve: tuple[AtPoints, AtPoints] | None = None
 
     @classmethod
-    def of(
-        cls,
-        x: Float[np.ndarray, "sample column"],
-        values: Float[np.ndarray, " sample"],
-        errors: ErrorModel,
-        zones: Float[np.ndarray, " source"],
-    ) -> NearPlane | None:
+    def of(cls, x: Samples, values: AtSamples, errors: ErrorModel, zones: AtSources) -> NearPlane | None:
         """Return what lies near an output, none where its law is not known or it says too little of the output.
 
         Deviations of samples [m, angles rad], and the output, not a number where there is none.
@@ -344,11 +341,7 @@ class NearPlane:
 
     @classmethod
     def _bent(
-        cls,
-        x: Float[np.ndarray, "sample column"],
-        values: Float[np.ndarray, " sample"],
-        errors: ErrorModel,
-        zones: Float[np.ndarray, " source"],
+        cls, x: Samples, values: AtSamples, errors: ErrorModel, zones: AtSources
     ) -> tuple[NearPlane, float] | None:
         """Return a plane behind a curve, and by how much the curve of the output is off it over what it varies [-]."""
         from scipy.special import ndtri
@@ -371,7 +364,7 @@ class NearPlane:
         of_ends = np.concatenate([[of_plane[0] - slopes[0] * reach], of_plane, [of_plane[-1] + slopes[1] * reach]])
         return cls(law=law, curve=(ends, of_ends)), off
 
-    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, " sample"]:
+    def __call__(self, x: Samples) -> AtSamples:
         """Return what it says of the output [unit of the output]."""
         says = self.law.function(x)
         return says if self.curve is None else np.asarray(np.interp(says, self.curve[1], self.curve[0]))
@@ -381,7 +374,7 @@ class NearPlane:
         of_plane = value if self.curve is None else float(np.interp(value, *self.curve))
         return self.law.share_above(sign, of_plane)
 
-    def at(self, zones: Float[np.ndarray, " source"]) -> NearPlane:
+    def at(self, zones: AtSources) -> NearPlane:
         """Return it with the law of other zones [m]."""
         return replace(self, law=replace(self.law, zones=zones))
 

@@ -20,8 +20,14 @@ from tolalloc.drawings.measured_parts import MeasuredParts
 from tolalloc.drawings.seeds import CHUNK, SamplingDesign
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import FailedUnitsError
-from tolalloc.models.model import Evaluation, Passing, Response
+from tolalloc.models.model import Evaluation, Passing, Response, Samples
 
+AtUnits = Float[np.ndarray, " unit"]
+"""A number of every unit."""
+AtProcesses = Float[np.ndarray, " process"]
+"""A number of every process that measured parts leave possible."""
+Moments = tuple[np.ndarray, np.ndarray]
+"""By how much processes move the mean [output], and their standard deviations over that of the units [-]."""
 CONFIDENCE = 0.95
 
 
@@ -107,7 +113,7 @@ class AnsweredUnits:
 class MonteCarlo(AnsweredUnits):
     """Random units and what the response said of them."""
 
-    x: Float[np.ndarray, "sample column"]  # The units' deviations, in the order of the response's columns [m]
+    x: Samples  # The units' deviations, in the order of the response's columns [m]
 
     def unit_at(self, share: float) -> Float[np.ndarray, "1 column"]:
         """Return the good unit whose first output is nearest to a quantile [m]."""
@@ -118,7 +124,7 @@ class MonteCarlo(AnsweredUnits):
 class RedrawnUnits(AnsweredUnits):
     """Random units whose deviations are not kept: a search has tens of samples, and asks for the deviations of few."""
 
-    redraw: Callable[[], Float[np.ndarray, "sample column"]]  # Draws the same deviations again [m]
+    redraw: Callable[[], Samples]  # Draws the same deviations again [m]
 
     def unit_at(self, share: float) -> Float[np.ndarray, "1 column"]:
         """Return the good unit whose first output is nearest to a quantile [m]."""
@@ -193,9 +199,7 @@ class ProcessUncertainty:
     variance_by_spread: Float[np.ndarray, " source"]
 
     @classmethod
-    def of(
-        cls, errors: ErrorModel, x: Float[np.ndarray, "sample column"], values: Float[np.ndarray, " sample"]
-    ) -> ProcessUncertainty | None:
+    def of(cls, errors: ErrorModel, x: Samples, values: Float[np.ndarray, " sample"]) -> ProcessUncertainty | None:
         """Return the process uncertainty of an output, none where no part was measured or the output does not vary.
 
         Deviations of random units [m, angles rad], and their output, not a number where one has none.
@@ -229,7 +233,7 @@ class ProcessUncertainty:
         )
 
     @classmethod
-    def about(cls, errors: ErrorModel, x: Float[np.ndarray, "sample column"]) -> UncertaintyOf | None:
+    def about(cls, errors: ErrorModel, x: Samples) -> UncertaintyOf | None:
         """Return what tells of an output of random units what is left open of it, none where no part was measured."""
         return partial(cls.of, errors, x) if any(source.measured for source in errors.active) else None
 
@@ -238,16 +242,14 @@ class ProcessUncertainty:
         return replace(self, parts=tuple(max(own, least) for own in self.parts))
 
     @cached_property
-    def _moments(self) -> tuple[Float[np.ndarray, " process"], Float[np.ndarray, " process"]]:
+    def _moments(self) -> tuple[AtProcesses, AtProcesses]:
         """By how much the mean is off that of the units [output], and standard deviations over theirs [-]."""
         wider, shift = _possible_processes(self.parts, tuple(own.are_radii for own in self.measured))
         mean = shift @ self.by_mean + (wider**2 - 1.0) @ self.mean_by_spread
         variance = 1.0 + (wider**2 - 1.0) @ self.variance_by_spread / self.values.var()
         return mean, np.sqrt(np.maximum(variance, _LEAST_VARIANCE))
 
-    def _beyond(
-        self, limits: Limits, excess: Float[np.ndarray, " process"], moments: tuple[np.ndarray, np.ndarray]
-    ) -> Float[np.ndarray, " process"]:
+    def _beyond(self, limits: Limits, excess: AtProcesses, moments: Moments) -> AtProcesses:
         """Return the share of units that lie further beyond the limits than so far, process by process [-]."""
         (moved, wider), centre, beyond = moments, self.values.mean(), np.zeros(moments[0].size)
         for sign, limit in limits.turned:
@@ -256,9 +258,7 @@ class ProcessUncertainty:
             beyond += self.values.size - below if sign > 0 else below
         return beyond / self.values.size
 
-    def _excess(
-        self, limits: Limits, share: float, moments: tuple[np.ndarray, np.ndarray]
-    ) -> Float[np.ndarray, " process"]:
+    def _excess(self, limits: Limits, share: float, moments: Moments) -> AtProcesses:
         """Return how far beyond the limits a share of the units lies, process by process; by halving [output]."""
         (moved, wider), centre = moments, self.values.mean()
         ends = limits.excess(centre + moved)
@@ -280,7 +280,7 @@ class ProcessUncertainty:
         further = sign * moved + spread * self.values.std() * (wider - 1.0)
         return max(float(np.quantile(further, CONFIDENCE)), 0.0)
 
-    def shares(self, limits: Limits, share: float) -> Float[np.ndarray, " process"]:
+    def shares(self, limits: Limits, share: float) -> AtProcesses:
         """Return the share of units beyond the limits for every possible process, where it is so much of all [-].
 
         Normal scores of the shares that the units show are moved by the same, so that the units give the share asked
@@ -288,7 +288,7 @@ class ProcessUncertainty:
         """
         from scipy.special import ndtr, ndtri
 
-        scores, units = list[Float[np.ndarray, " process"]](), self.values.size
+        scores, units = list[AtProcesses](), self.values.size
         still = (np.zeros(1), np.ones(1))
         counted = self._beyond(limits, np.zeros(1), still)[0] * units
         for moments in (still, self._moments):
@@ -414,7 +414,7 @@ class OneSided(Passing):
         """Return another response of the same output, turned alike; itself for an upper limit."""
         return response if self.limits.lower is None else replace(self, response=response)
 
-    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+    def __call__(self, x: Samples) -> Evaluation:
         """Return the turned output of every sample."""
         found = self.response(x)
         return replace(found, values=self.turned(found.values))
@@ -447,9 +447,7 @@ def share_change(before: Bool[np.ndarray, " unit"], after: Bool[np.ndarray, " un
     return Interval(estimate=(gained - lost) / units, low=up.low - down.high, high=up.high - down.low)
 
 
-def quantile_change(
-    before: Float[np.ndarray, " unit"], after: Float[np.ndarray, " unit"], share: float, generator: np.random.Generator
-) -> Interval:
+def quantile_change(before: AtUnits, after: AtUnits, share: float, generator: np.random.Generator) -> Interval:
     """Return how a quantile of the units with both answers changes [unit of the output].
 
     The interval is that of the bootstrap over units, each with both its values; with fewer than some ten units beyond
@@ -490,9 +488,7 @@ ANY_LIMIT = Limits(upper=0.0)
 """Limits of `largest_excess` [-]."""
 
 
-def largest_excess(
-    values: Mapping[str, Float[np.ndarray, " unit"]], limits: Mapping[str, Limits]
-) -> Float[np.ndarray, " unit"]:
+def largest_excess(values: Mapping[str, AtUnits], limits: Mapping[str, Limits]) -> AtUnits:
     """Return how far every unit lies beyond any of its limits at most, over the standard deviation of the output [-].
 
     max over outputs and sides of sign·(y − limit)/σ, own derivation; it is above 0 where a unit fails.

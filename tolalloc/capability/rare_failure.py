@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from tolalloc.capability.limit_state import (
     LENGTH,
@@ -21,6 +21,7 @@ from tolalloc.capability.limit_state import (
     ChainedRun,
     Chains,
     CountedLimitState,
+    InChains,
     Level,
     LimitState,
     Values,
@@ -200,9 +201,7 @@ def _widths(
     return (widths if widths[-1] == 1.0 else [*widths, 1.0]), max(1.0, more)
 
 
-def _narrower(
-    counted: CountedLimitState, chains: Chains, width: float
-) -> tuple[float, Bool[np.ndarray, "chain state"]]:
+def _narrower(counted: CountedLimitState, chains: Chains, width: float) -> tuple[float, InChains]:
     """Return the smallest width at which enough of the samples still fail, and which do; 1 if the search is stuck."""
     low, high, kept = 1.0, width, None
     failing = _failing(counted, chains, 1.0)
@@ -240,7 +239,7 @@ def _scaled(counted: CountedLimitState, width: float) -> Values:
     return lambda u: counted.values(width * u)
 
 
-def _failing(counted: CountedLimitState, chains: Chains, width: float) -> Bool[np.ndarray, "chain state"]:
+def _failing(counted: CountedLimitState, chains: Chains, width: float) -> InChains:
     """Return which states fail at another width; a state that repeats the one before it is not asked again."""
     moved = np.ones(chains.values.shape, bool)
     moved[:, 1:] = (chains.u[:, 1:] != chains.u[:, :-1]).any(axis=2)
@@ -248,9 +247,7 @@ def _failing(counted: CountedLimitState, chains: Chains, width: float) -> Bool[n
     return np.asarray(answers[np.cumsum(moved.ravel()) - 1].reshape(moved.shape))
 
 
-def _starts(
-    generator: np.random.Generator, failing: Bool[np.ndarray, "chain state"], samples: int
-) -> Int[np.ndarray, " start"]:
+def _starts(generator: np.random.Generator, failing: InChains, samples: int) -> Int[np.ndarray, " start"]:
     """Return failing states to start chains from, some more than once if there are few."""
     found, wanted = np.flatnonzero(failing.ravel()), samples // LENGTH
     return generator.choice(found, wanted, replace=found.size < wanted)

@@ -14,6 +14,8 @@ from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import ResponseWithDerivatives
 
+Units = Float[np.ndarray, "unit column"]
+"""Deviations of units, or derivatives by them."""
 _WEIGHT = 0.3
 """Weight of the newest gradient in the mean of all before [-]."""
 _TURNS = 0.5 ** np.arange(2, 8)
@@ -109,12 +111,7 @@ def worst_unit(
     )
 
 
-def _moved(
-    experiment: Experiment[ResponseWithDerivatives],
-    units: Float[np.ndarray, "start column"],
-    gradients: Float[np.ndarray, "start column"],
-    part: float,
-) -> Float[np.ndarray, "start column"]:
+def _moved(experiment: Experiment[ResponseWithDerivatives], units: Units, gradients: Units, part: float) -> Units:
     """Return units a part of the way to the extremes of the zones along the gradients."""
     moved, errors = np.empty_like(units), experiment.errors
     for source, own in zip(errors.active, errors.columns_of_source, strict=True):
@@ -128,9 +125,7 @@ def _moved(
     return moved
 
 
-def _extreme_in_zone(
-    source: Source, units: Float[np.ndarray, "unit column"], gradients: Float[np.ndarray, "unit column"]
-) -> Float[np.ndarray, "unit column"]:
+def _extreme_in_zone(source: Source, units: Units, gradients: Units) -> Units:
     """Return, for every unit, the part inside the zone that goes furthest along a gradient, waves from the units' own.
 
     Exact for sizes and positions. Waves keep the relative amplitudes of the spectrum, and how large all of them may be
@@ -158,11 +153,11 @@ def _extreme_in_zone(
     return _filled(source, phases)
 
 
-def _phases(columns: Float[np.ndarray, "unit column"]) -> Float[np.ndarray, "unit vector"]:
+def _phases(columns: Units) -> Float[np.ndarray, "unit vector"]:
     """Return the direction of every vector [turn]."""
     return np.asarray(np.arctan2(columns[:, 1::2], columns[:, 0::2]) / (2 * np.pi))
 
 
-def _filled(source: Source, phases: Float[np.ndarray, "unit vector"]) -> Float[np.ndarray, "unit column"]:
+def _filled(source: Source, phases: Float[np.ndarray, "unit vector"]) -> Units:
     """Return the vectors or waves with these phases [turn] that fill the zone."""
     return np.asarray(source.at_limit(np.repeat(phases % 1.0, 2, axis=1)))

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from tolalloc.drawings.correlation import CorrelatedSource
     from tolalloc.drawings.error_model import ErrorModel
 
+Samples = Float[np.ndarray, "sample column"]
+"""Deviations of samples in the columns of a response [m, angles rad], or what has their shape."""
+
 Units = Mapping[str, tuple[Float[np.ndarray, " setting"], Float[np.ndarray, " column"]]]
 """Label → settings [units of their names] and deviations [m, angles rad] of one unit."""
 
@@ -84,7 +87,7 @@ class Response(Protocol):
     def outputs(self) -> tuple[str, ...]:
         """Names of the outputs with their units, in the order of Y."""
 
-    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+    def __call__(self, x: Samples) -> Evaluation:
         """Return the outputs of every sample."""
 
 
@@ -114,7 +117,7 @@ class Derived(Protocol):
         """Outputs and status of every sample."""
 
     @property
-    def by_column(self) -> Float[np.ndarray, "sample column"]:
+    def by_column(self) -> Samples:
         """Derivatives [output per unit of the column]."""
 
 
@@ -126,7 +129,7 @@ class ResponseWithDerivatives(Protocol):
     def columns(self) -> tuple[str, ...]:
         """Names of the inputs, in the order of X."""
 
-    def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> Derived:
+    def with_derivatives(self, x: Samples) -> Derived:
         """Return the outputs of every sample and their derivatives."""
 
 
@@ -143,7 +146,7 @@ class SettingDerivatives:
     """Answers of one output with its exact derivatives."""
 
     evaluation: Evaluation  # The output and the status of every sample
-    by_column: Float[np.ndarray, "sample column"]  # Derivative by every column [output per unit of the column]
+    by_column: Samples  # Derivative by every column [output per unit of the column]
     by_setting: Float[np.ndarray, "sample setting"]  # Derivative by every setting [output per unit of the setting]
 
 
@@ -199,7 +202,7 @@ class Model(ABC):
         """Names of the outputs whose exact derivatives cost much more than they do, and are asked of few samples."""
         return ()
 
-    def derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+    def derivatives(self, output: str, x: Samples) -> SettingDerivatives:
         """Return an output of `exact` or `differentiable` of every sample with its derivatives."""
         raise ValueError(f"{self.name} knows no exact derivatives of {output} at {x.shape[0]} samples")
 
@@ -278,7 +281,7 @@ class Model(ABC):
         """Output → largest value at which a unit works at all: a requirement of every study that does not lift it."""
         return {}
 
-    def examined(self, x: Float[np.ndarray, "sample column"]) -> Mapping[str, float]:  # noqa: ARG002
+    def examined(self, x: Samples) -> Mapping[str, float]:  # noqa: ARG002
         """Return what is counted of some random units when a study is checked, units in the names."""
         return {}
 
@@ -304,7 +307,7 @@ class _Exact:
     def columns(self) -> tuple[str, ...]:
         return self.model.columns
 
-    def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+    def with_derivatives(self, x: Samples) -> SettingDerivatives:
         return self.model.derivatives(self.output, x)
 
 
@@ -331,7 +334,7 @@ class DifferencedResponse:
         """The response's columns."""
         return self.response.columns
 
-    def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+    def with_derivatives(self, x: Samples) -> SettingDerivatives:
         """Return the output of every sample and its derivatives, NaN by neighbours that failed, all in one call."""
         columns = len(self.columns)
         shifts = np.concatenate([np.zeros((1, columns)), np.diag(self.steps), -np.diag(self.steps)])

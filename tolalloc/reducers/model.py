@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.exceptions import UnknownNameError
-from tolalloc.models.model import Evaluation, Model, Observer, Response, SettingDerivatives, unobserved
+from tolalloc.models.model import Evaluation, Model, Observer, Response, Samples, SettingDerivatives, unobserved
 from tolalloc.models.settings import DrawnAmounts, Setting
 from tolalloc.models.unit_bounds import ScaledUnits
 from tolalloc.reading.units import MICROMETRE, MILLIMETRE
@@ -31,7 +31,6 @@ from tolalloc.reducers.response.kernel import (
     SEEN,
     KernelResponse,
     OutputsWithStiffness,
-    Samples,
     StiffnessResponse,
     principal_axes,
     stiffness_source,

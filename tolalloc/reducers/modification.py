@@ -17,6 +17,8 @@ from tolalloc.reducers.cycloid.clearance import LARGE, formula_gap
 from tolalloc.reducers.cycloid.tooth_profile import Amounts, ToothProfile, nearest_angles, path_of
 from tolalloc.reducers.reducer.design import CycloidStage, Modification, Reducer
 
+OnLines = Float[np.ndarray, " n"]
+"""A number of every pair of amounts, or on every line."""
 _ROUNDING = 1e-17  # violation that counts as none [m]
 _MOST_OFF = 2 * MICROMETRE  # by which a wanted clearance may be missed by exact distances [m]
 _UNMET = 1.0  # merit from which on a constraint is violated; no objective comes near it [m]
@@ -41,17 +43,17 @@ PUBLISHED_RADIAL = 15 * MICROMETRE
 class EvaluatedAmounts:
     """Points of a problem, evaluated."""
 
-    objective: Float[np.ndarray, " n"]  # What is to be minimised [m]
+    objective: OnLines  # What is to be minimised [m]
     constraints: Float[np.ndarray, "n c"]  # What must not be negative [m]
 
     @cached_property
-    def violation(self) -> Float[np.ndarray, " n"]:
+    def violation(self) -> OnLines:
         """By how much all constraints together are missed, 0 where they are met [m]."""
         missed = np.maximum(-self.constraints, 0.0).sum(axis=-1)
         return np.where(missed > _ROUNDING, missed, 0.0)
 
     @cached_property
-    def merit(self) -> Float[np.ndarray, " n"]:
+    def merit(self) -> OnLines:
         """One number to sort by: points that meet the constraints by objective, then the others by violation [m]."""
         return np.where(self.violation > 0, _UNMET + self.violation, self.objective)
 
@@ -74,7 +76,7 @@ class ModificationProblem:
     name: str  # What reports call it
     description: str  # What the objective measures, in a sentence for reports
     stage: CycloidStage  # Cycloid stage
-    objective: Callable[[Amounts], Float[np.ndarray, " n"]]  # What is to be minimised [m]
+    objective: Callable[[Amounts], OnLines]  # What is to be minimised [m]
     # Bounds of the two amounts [m]
     lower: Float[np.ndarray, " 2"]
     upper: Float[np.ndarray, " 2"]
@@ -160,9 +162,7 @@ def reference(problem: ModificationProblem) -> Optimum:
     )
 
 
-def _smallest(
-    values: Values, lower: Float[np.ndarray, " n"], upper: Float[np.ndarray, " n"]
-) -> Float[np.ndarray, " n"]:
+def _smallest(values: Values, lower: OnLines, upper: OnLines) -> OnLines:
     """Return the smallest value on each of n lines."""
     rows = np.arange(lower.size)
     for points in (_FIRST, *[_POINTS] * (_LEVELS - 1)):
@@ -198,7 +198,7 @@ def residual_gap(
     units = (Modification(equidistant=1.0, shift=0.0), Modification(equidistant=0.0, shift=1.0))
     per_amount = np.array([formula_gap(stage, unit, angle).mean() for unit in units])  # the gap is linear in both
 
-    def mean_gap(amounts: Amounts) -> Float[np.ndarray, " n"]:
+    def mean_gap(amounts: Amounts) -> OnLines:
         return np.asarray(amounts @ per_amount)
 
     return ModificationProblem(
@@ -257,7 +257,7 @@ def rotated_profile_fit(
     place = ToothProfile(stage=stage, modification=turned).points(angles)
     rotated = place[:, 0] + 1j * place[:, 1]
 
-    def mean_distance(amounts: Amounts) -> Float[np.ndarray, " n"]:
+    def mean_distance(amounts: Amounts) -> OnLines:
         angle = nearest_angles(stage, rotated, angles, amounts) if metric == "nearest" else angles
         path, slope, _ = path_of(stage, amounts, angle)
         normal = -1j * slope / np.abs(slope)
@@ -302,7 +302,7 @@ def wanted_clearances(stage: CycloidStage, flank: float, radial: float) -> Modif
         )
     wanted = np.array([flank, radial])
 
-    def difference(amounts: Amounts) -> Float[np.ndarray, " n"]:
+    def difference(amounts: Amounts) -> OnLines:
         equidistant, shift = amounts.T
         left = np.stack([equidistant - ratio * shift, equidistant - shift], axis=-1)
         return np.asarray(np.abs(left - wanted).max(axis=-1))

@@ -10,11 +10,11 @@ import numpy as np
 from jaxtyping import Float
 from numpy.polynomial import polynomial
 
-from tolalloc.models.model import Evaluation, KeepsTables, Passing, Response
+from tolalloc.models.model import Evaluation, KeepsTables, Passing, Response, Samples
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.solvers.records import AngleSearch
-from tolalloc.reducers.response.kernel import KernelResponse, Samples
+from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.running.chunks import map_chunks
 
 

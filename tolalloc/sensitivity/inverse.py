@@ -14,6 +14,16 @@ from tolalloc.capability.indices import quantile_interval
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Response
 
+Found = Float[np.ndarray, " found"]
+"""A number of every source whose factor is found."""
+Bracket = Float[np.ndarray, "4 found"]
+"""Two factors of each, and the excess of the quantile over the limit at either [-, output]."""
+Quantiles = Float[np.ndarray, "found 3"]
+"""Quantile of each with the ends of its interval [output]."""
+Trials = Int[np.ndarray, " trial"]
+"""Position of the source that each trial opens or closes."""
+Factors = Float[np.ndarray, " trial"]
+"""Factor on its zone [-]."""
 _LEAST_OUTSIDE = 5.0
 """Units that must lie beyond the quantile on average, so that order statistics bound it from above [-]."""
 _SAME = 1e-3
@@ -135,9 +145,7 @@ class _Openings:
         self._require_few_failures(good, np.zeros(1, int), np.ones(1))
         return values[0], good[0]
 
-    def quantiles(
-        self, sources: Int[np.ndarray, " trial"], factors: Float[np.ndarray, " trial"]
-    ) -> Float[np.ndarray, "trial 3"]:
+    def quantiles(self, sources: Trials, factors: Factors) -> Float[np.ndarray, "trial 3"]:
         """Return the quantile of every trial at the target yield, and the ends of its interval [output]."""
         found = list[tuple[float, float, float]]()
         for values, good in self._solved(sources, factors):
@@ -153,7 +161,7 @@ class _Openings:
         found = quantile_interval(values[good], self.target, _CONFIDENCE)
         return found.estimate, found.low, found.high
 
-    def may_repair(self, sources: Int[np.ndarray, " trial"], limit: float) -> Bool[np.ndarray, " trial"]:
+    def may_repair(self, sources: Trials, limit: float) -> Bool[np.ndarray, " trial"]:
         """Return which zones may keep the limit if they are closed: all that the worst units alone do not refute.
 
         A quantile lies beyond the limit if as many units do as lie above it, and the unit just below it too.
@@ -166,10 +174,7 @@ class _Openings:
         return np.concatenate(beyond) < needed
 
     def _solved(
-        self,
-        sources: Int[np.ndarray, " trial"],
-        factors: Float[np.ndarray, " trial"],
-        units: slice | Int[np.ndarray, " unit"] = slice(None),
+        self, sources: Trials, factors: Factors, units: slice | Int[np.ndarray, " unit"] = slice(None)
     ) -> Iterator[tuple[Float[np.ndarray, "some_trials unit"], Bool[np.ndarray, "some_trials unit"]]]:
         """Yield the outputs of units in some trials from one call of the response, and which are good."""
         standard = self.standard[units]
@@ -181,12 +186,7 @@ class _Openings:
             evaluation = self.experiment.response(x.reshape(-1, standard.shape[1]))
             yield evaluation.values[:, 0].reshape(x.shape[:2]), evaluation.good.reshape(x.shape[:2])
 
-    def _require_few_failures(
-        self,
-        good: Bool[np.ndarray, "trial unit"],
-        sources: Int[np.ndarray, " trial"],
-        factors: Float[np.ndarray, " trial"],
-    ) -> None:
+    def _require_few_failures(self, good: Bool[np.ndarray, "trial unit"], sources: Trials, factors: Factors) -> None:
         """Raise if more units of a trial failed than allowed."""
         failed = np.count_nonzero(~good, axis=1)
         worst = int(failed.argmax())
@@ -199,9 +199,7 @@ class _Openings:
             )
 
 
-def _bracket(
-    openings: _Openings, now: float, limit: float
-) -> tuple[Int[np.ndarray, " found"], Float[np.ndarray, "4 found"]]:
+def _bracket(openings: _Openings, now: float, limit: float) -> tuple[Int[np.ndarray, " found"], Bracket]:
     """Return the sources whose quantile crosses the limit between factor 1 and the farthest, and what brackets it.
 
     These are two factors per source with the limit between their quantiles, then quantile less limit at both.
@@ -229,14 +227,14 @@ def _bracket(
     return sources[0].astype(int), bracket
 
 
-def _squared(excess: Float[np.ndarray, " found"], limit: float) -> Float[np.ndarray, " found"]:
+def _squared(excess: Found, limit: float) -> Found:
     """Return quantile² less limit² with the sign of the excess, or the excess where no limit above 0 has a square."""
     return np.maximum(limit + excess, 0.0) ** 2 - limit**2 if limit > 0.0 else excess
 
 
 def _crossings(
-    openings: _Openings, sources: Int[np.ndarray, " found"], bracket: Float[np.ndarray, "4 found"], limit: float
-) -> tuple[Float[np.ndarray, " found"], Float[np.ndarray, "found 3"]]:
+    openings: _Openings, sources: Int[np.ndarray, " found"], bracket: Bracket, limit: float
+) -> tuple[Found, Quantiles]:
     """Return the factors at which the quantile equals the limit [-], and there the quantile and its interval."""
     stale, fresh = bracket[:2].copy()
     stale_excess, fresh_excess = (_squared(excess, limit) for excess in bracket[2:])
@@ -257,12 +255,7 @@ def _crossings(
     raise SolveError(f"Inverse sensitivity: the quantile jumps over the limit at {fresh[left[0]]:.6g} of {name}.")
 
 
-def _interval(
-    factor: Float[np.ndarray, " found"],
-    quantiles: Float[np.ndarray, "found 3"],
-    bracket: Float[np.ndarray, "4 found"],
-    limit: float,
-) -> tuple[Float[np.ndarray, " found"], Float[np.ndarray, " found"]]:
+def _interval(factor: Found, quantiles: Quantiles, bracket: Bracket, limit: float) -> tuple[Found, Found]:
     """Return the ends of the factors' intervals: those of the quantile, over its slope between the brackets [-]."""
     estimate, low, high = quantiles.T
     near, far, *excesses = bracket

@@ -13,6 +13,12 @@ from scipy.stats import norm, rankdata
 from tolalloc.capability.indices import require_share
 from tolalloc.exceptions import InputError
 
+AtSources = Float[np.ndarray, " source"]
+"""A number of every source."""
+Resamples = Float[np.ndarray, "resample source"]
+"""The same from every resample."""
+Ends = Float[np.ndarray, "2 source"]
+"""Lower and upper end of the interval of each."""
 _CONFIDENCE = 0.9
 """Share of resamples that makes an order count, and that an interval holds [-]."""
 _TAILS = (1 - _CONFIDENCE) / 2, (1 + _CONFIDENCE) / 2
@@ -37,16 +43,16 @@ class SourceRanking:
 
     sources: tuple[str, ...]  # Names, in the order of all arrays
     # Total index, and draws from its error, those of a row together [-]
-    total: Float[np.ndarray, " source"]
-    total_resamples: Float[np.ndarray, "resample source"]
+    total: AtSources
+    total_resamples: Resamples
     blocks: int  # Saltelli blocks used [-]
     drives: tuple[str, ...] = ()  # Of a ranking over several outputs: the one for which each source has that index
     # Index that a source may have where too few blocks show it, else 0 [-]
-    unseen: Float[np.ndarray, " source"] | float = 0.0
+    unseen: AtSources | float = 0.0
     few: frozenset[int] = frozenset()  # Positions of sources that fewer blocks show [-]
 
     @property
-    def total_interval(self) -> Float[np.ndarray, "2 source"]:
+    def total_interval(self) -> Ends:
         """90 % interval of the total indices [-]."""
         return share_interval(self.total_resamples, self.unseen)
 
@@ -56,7 +62,7 @@ class SourceRanking:
         return [int(at) for at in np.argsort(-self.total, kind="stable")]
 
     @property
-    def rank_interval(self) -> Float[np.ndarray, "2 source"]:
+    def rank_interval(self) -> Ends:
         """90 % interval of each source's rank, `tolalloc.sensitivity.ranking.rank_interval` [-]."""
         return rank_interval(self.total_resamples).astype(float)
 
@@ -91,22 +97,18 @@ class SourceRanking:
             )
         return tuple(found)
 
-    def among_first(self, count: int) -> Float[np.ndarray, " source"]:
+    def among_first(self, count: int) -> AtSources:
         """Return the share of resamples in which each source is among the first ``count`` [-]."""
         _require_places(count, len(self.sources))
         return np.asarray((rankdata(-self.total_resamples, "ordinal", axis=1) <= count).mean(axis=0))
 
 
-def share_interval(
-    resamples: Float[np.ndarray, "resample source"], unseen: Float[np.ndarray, " source"] | float = 0.0
-) -> Float[np.ndarray, "2 source"]:
+def share_interval(resamples: Resamples, unseen: AtSources | float = 0.0) -> Ends:
     """Return the `percentile_interval` of shares of a variance, which lie within 0 and 1 [-]."""
     return np.asarray(np.clip(percentile_interval(resamples, unseen), 0.0, 1.0))
 
 
-def percentile_interval(
-    resamples: Float[np.ndarray, "resample source"], unseen: Float[np.ndarray, " source"] | float = -np.inf
-) -> Float[np.ndarray, "2 source"]:
+def percentile_interval(resamples: Resamples, unseen: AtSources | float = -np.inf) -> Ends:
     """Return the two-sided 90 % interval of every index, from 0 to what is unseen if that is given and more [-].
 
     References
@@ -123,7 +125,7 @@ def percentile_interval(
     return np.array([np.where(unseen > high, 0.0, low), np.maximum(high, unseen)])
 
 
-def rank_interval(resamples: Float[np.ndarray, "resample source"]) -> Int[np.ndarray, "2 source"]:
+def rank_interval(resamples: Resamples) -> Int[np.ndarray, "2 source"]:
     """Return the two-sided 90 % interval of every rank, of whole ranks that some resample has; equals share theirs [-].
 
     Quantiles 5 % and 95 % of the ranks of draws from the errors, inverse of their distribution: Hall & Miller 2009,
@@ -142,7 +144,7 @@ def rank_interval(resamples: Float[np.ndarray, "resample source"]) -> Int[np.nda
     )
 
 
-def indistinguishable_from_zero(resamples: Float[np.ndarray, "resample source"]) -> Bool[np.ndarray, " source"]:
+def indistinguishable_from_zero(resamples: Resamples) -> Bool[np.ndarray, " source"]:
     """Return which indices are, with one-sided 95 % confidence, indistinguishable from 0: no negative share is read.
 
     Quantile of 5 % of the draws ≤ 0: Efron & Tibshirani 1993, ch. 13; for 100 resamples or more.
@@ -156,7 +158,7 @@ def _require_places(count: int, sources: int) -> None:
         raise InputError.at("ranking", "number of first sources", count, f"1 to {sources}")
 
 
-Resampled = tuple[Float[np.ndarray, " source"], Float[np.ndarray, "resample source"]]
+Resampled = tuple[AtSources, Resamples]
 """Indices of the sources, and the same from resamples [-]."""
 
 

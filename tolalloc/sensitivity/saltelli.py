@@ -27,10 +27,18 @@ from scipy.special import gammaincinv
 from tolalloc.capability.monte_carlo import AnsweredUnits, require_few_failures
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.models.model import Evaluation
+from tolalloc.models.model import Evaluation, Samples
 from tolalloc.running.chunks import one_blas_thread
 from tolalloc.sensitivity.surrogate.control_variate import CheapAnswers, optimal_weights
 
+InBlocks = Float[np.ndarray, "block sample"]
+"""One output of the samples of every block."""
+Stacked = Float[np.ndarray, "output sample block"]
+"""Outputs of the samples of every block, block by block last."""
+Counts = Float[np.ndarray, "row block"]
+"""How often each row counts each block [-]."""
+OfIndices = Float[np.ndarray, "output row index"]
+"""Indices of every output, row by row [-]."""
 SAMPLES_AT_ONCE = 8192
 """Samples of a chunk at most, unless one block has more [-]."""
 REPLICATES = 8
@@ -90,7 +98,7 @@ class SaltelliDesign:
         """Samples of a block [-]."""
         return (1 + self.second_order) * len(self.names) + 2
 
-    def chunks(self, start: int, stop: int, only: str = "") -> Iterator[Float[np.ndarray, "sample column"]]:
+    def chunks(self, start: int, stop: int, only: str = "") -> Iterator[Samples]:
         """Yield the samples of the blocks from ``start`` up to but not ``stop``, uniform numbers in [0, 1).
 
         If a group is named, of every block only the sample AB of it.
@@ -326,11 +334,11 @@ _Rows = tuple[
 
 
 def _controlled(
-    answers: Float[np.ndarray, "block sample"],
-    cheap: Float[np.ndarray, "block sample"],
+    answers: InBlocks,
+    cheap: InBlocks,
     many: Float[np.ndarray, "cheap_block sample"],
     plain: tuple[Float[np.ndarray, "row source"], Float[np.ndarray, "row source"], Float[np.ndarray, "block source"]],
-    counts: Float[np.ndarray, "row block"],
+    counts: Counts,
     sources: int,
 ) -> tuple[Float[np.ndarray, "row source"], Float[np.ndarray, "row source"], Float[np.ndarray, "block source"]]:
     """Return first-order and total indices of one output, and what blocks show, less what a cheap model tells of it.
@@ -353,22 +361,20 @@ def _controlled(
     return found[:, :sources], np.maximum(found[:, sources:], 0.0), left
 
 
-def _shown(answers: Float[np.ndarray, "block sample"], sources: int) -> Float[np.ndarray, "block source"]:
+def _shown(answers: InBlocks, sources: int) -> Float[np.ndarray, "block source"]:
     """Return what every block shows of the total index of each source, 0 of an output that does not vary [-]."""
     changes, variance = (answers[:, :1] - answers[:, 1 : sources + 1]) ** 2 / 2, answers[:, [0, -1]].var()
     return np.asarray(changes / (variance or np.inf))
 
 
-def _contributions(
-    y: Float[np.ndarray, "output sample block"], sources: int
-) -> Float[np.ndarray, "output contribution block"]:
+def _contributions(y: Stacked, sources: int) -> Float[np.ndarray, "output contribution block"]:
     """Return what every block adds to mean, mean square, first-order and total part of every source."""
     a, ab, b = y[:, :1], y[:, 1 : sources + 1], y[:, -1:]
     return np.concatenate([(a + b) / 2, (a**2 + b**2) / 2, b * (ab - a), (a - ab) ** 2 / 2], axis=1)
 
 
 def _influences(
-    answers: Float[np.ndarray, "block sample"], indices: Float[np.ndarray, " index"], sources: int
+    answers: InBlocks, indices: Float[np.ndarray, " index"], sources: int
 ) -> Float[np.ndarray, "index block"]:
     """Return what each block adds to the error of every index, to first order and but for a constant [-].
 
@@ -385,7 +391,7 @@ def _spread(rows: Float[np.ndarray, "output row source"]) -> Float[np.ndarray, "
     return np.asarray(rows[:, 1:].std(axis=1))
 
 
-def without_each(replicate: Int[np.ndarray, " block"], replicates: int) -> Float[np.ndarray, "row block"]:
+def without_each(replicate: Int[np.ndarray, " block"], replicates: int) -> Counts:
     """Return how often each row counts each block: all in the first one, then those of all replicates but one [-].
 
     Examples
@@ -418,10 +424,7 @@ _MOST = 5.0
 
 
 def drawn(
-    rows: Float[np.ndarray, "output row index"],
-    weights: Float[np.ndarray, "resample replicate"],
-    *,
-    positive: bool = False,
+    rows: OfIndices, weights: Float[np.ndarray, "resample replicate"], *, positive: bool = False
 ) -> Float[np.ndarray, "output resample index"]:
     """Return draws from the errors of estimates.
 
@@ -515,7 +518,7 @@ def unseen(parts: Float[np.ndarray, "block *output source"]) -> Float[np.ndarray
     return np.asarray(np.where(few, gammaincinv(showing + 1, 0.95) * mean_size / len(parts), 0.0))
 
 
-def resample_counts(blocks: int, resamples: int, seeds: SeedTree) -> Float[np.ndarray, "row block"]:
+def resample_counts(blocks: int, resamples: int, seeds: SeedTree) -> Counts:
     """Return how often each bootstrap resample holds each block [-]; the first row holds each once.
 
     Efron & Tibshirani 1993, ch. 6.
@@ -527,9 +530,7 @@ def resample_counts(blocks: int, resamples: int, seeds: SeedTree) -> Float[np.nd
     return counts
 
 
-def one_pass(
-    answers: Float[np.ndarray, "output sample block"], counts: Float[np.ndarray, "row block"], sources: int
-) -> _Rows:
+def one_pass(answers: Stacked, counts: Counts, sources: int) -> _Rows:
     """Return which outputs vary, and variance [output²], first-order, total and second-order indices for every row [-].
 
     Answers are good ones in the order of the design's samples [output]; without BA samples there are no pairs.
@@ -571,9 +572,7 @@ def one_pass(
     return varies, in_units, first, total, np.concatenate([first[:, :, :0], *second], axis=2)
 
 
-def _standardised(
-    answers: Float[np.ndarray, "output sample block"],
-) -> tuple[Float[np.ndarray, "output sample block"], Float[np.ndarray, " output"], Bool[np.ndarray, " output"]]:
+def _standardised(answers: Stacked) -> tuple[Stacked, Float[np.ndarray, " output"], Bool[np.ndarray, " output"]]:
     """Return answers of mean 0 and deviation 1 [-], their deviation [output], and which vary; others are all 0."""
     flat = answers.reshape(answers.shape[0], -1)
     base = answers[:, [0, -1]].reshape(answers.shape[0], -1)
@@ -583,8 +582,6 @@ def _standardised(
     return ((flat - flat.mean(axis=1, keepdims=True)) / divisor).reshape(answers.shape), deviation, varies
 
 
-def _over_variance(
-    part: Float[np.ndarray, "output row index"], variance: Float[np.ndarray, "output row 1"]
-) -> Float[np.ndarray, "output row index"]:
+def _over_variance(part: OfIndices, variance: Float[np.ndarray, "output row 1"]) -> OfIndices:
     """Return parts of the variance over it, 0 where there is none [-]."""
     return np.asarray(np.divide(part, variance, out=np.zeros_like(part), where=variance > np.finfo(float).eps))

@@ -11,10 +11,12 @@ from jaxtyping import Float, Int
 from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.monte_carlo import AnsweredUnits, require_few_failures
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.models.model import Evaluation, Response
+from tolalloc.models.model import Evaluation, Response, Samples
 from tolalloc.sensitivity.ranking import rank_interval, share_interval
 from tolalloc.sensitivity.saltelli import resample_counts, unseen
 
+Positions = Int[np.ndarray, "order source"]
+"""Position of each source in each order."""
 _RESAMPLES = 400
 _AT_ONCE = 128
 """Permutations whose samples are in memory at a time [-]."""
@@ -99,9 +101,7 @@ def shapley_effects(experiment: Experiment[Response], permutations: int) -> Shap
     )
 
 
-def _samples(
-    experiment: Experiment[Response], permutations: int
-) -> Iterator[tuple[Int[np.ndarray, "order source"], Float[np.ndarray, "sample column"]]]:
+def _samples(experiment: Experiment[Response], permutations: int) -> Iterator[tuple[Positions, Samples]]:
     """Yield some orders as the position of each source, and their chains of samples [m], order by order."""
     errors, seeds = experiment.errors, experiment.seeds
     sources, columns = len(errors.columns_of_source), len(errors.columns)
@@ -119,7 +119,7 @@ def _samples(
 
 
 def _conditional_factor(
-    correlation: Float[np.ndarray, "source source"], position: Int[np.ndarray, "order source"]
+    correlation: Float[np.ndarray, "source source"], position: Positions
 ) -> Float[np.ndarray, "order source source"]:
     """Return roots of the correlation in which a source takes numbers of its own and of the sources behind it [-].
 
@@ -137,9 +137,7 @@ def _conditional_factor(
     return factor
 
 
-def _added(
-    evaluation: Evaluation, position: Int[np.ndarray, "order source"]
-) -> Float[np.ndarray, "good_order output source"]:
+def _added(evaluation: Evaluation, position: Positions) -> Float[np.ndarray, "good_order output source"]:
     """Return what each source adds to the worth of those before it, for orders without a failed sample [output²]."""
     orders, samples = position.shape[0], position.shape[1] + 1
     good = evaluation.good.reshape(orders, samples).all(axis=1)

@@ -17,11 +17,14 @@ from jaxtyping import Bool, Float
 
 from tolalloc.capability.experiment import Experiment
 from tolalloc.exceptions import ConstantOutputError, InputError, UnknownNameError
-from tolalloc.models.model import Evaluation, Response
+from tolalloc.models.model import Evaluation, Response, Samples
 from tolalloc.sensitivity.effort import LARGEST, SobolEffort
 from tolalloc.sensitivity.ranking import (
+    AtSources,
     Convergence,
+    Ends,
     Resampled,
+    Resamples,
     SourceRanking,
     indistinguishable_from_zero,
     share_interval,
@@ -37,8 +40,8 @@ class SourceIndices(SourceRanking):
     """Indices of every source for one output; a block of dependent sources counts as one source, named "a + b"."""
 
     # First-order index, and draws from its error [-]
-    first: Float[np.ndarray, " source"]
-    first_resamples: Float[np.ndarray, "resample source"]
+    first: AtSources
+    first_resamples: Resamples
     # Positions of the two sources of every pair, their second-order index, and the same from the resamples; no pairs
     # unless asked for [-]
     pairs: tuple[tuple[int, int], ...]
@@ -46,7 +49,7 @@ class SourceIndices(SourceRanking):
     second_resamples: Float[np.ndarray, "resample pair"]
 
     @property
-    def first_interval(self) -> Float[np.ndarray, "2 source"]:
+    def first_interval(self) -> Ends:
         """90 % interval of the first-order indices [-]."""
         return share_interval(self.first_resamples, self.unseen)
 
@@ -68,7 +71,7 @@ class SalibArrays:
     """A problem as SALib specifies it, its samples and their answers, for SALib's own analysis and plots."""
 
     problem: dict[str, Any]  # Columns as uniform numbers in [0, 1], sources as their groups
-    samples: Float[np.ndarray, "sample column"]  # These numbers, as `SALib.sample.sobol` draws them [-]
+    samples: Samples  # These numbers, as `SALib.sample.sobol` draws them [-]
     outputs: Float[np.ndarray, " sample"]  # The leading output [output]
     second_order: bool  # Whether the design has the BA samples
 
@@ -499,9 +502,7 @@ class _Blocks:
         return CheapAnswers(own=answers[0], many=answers[1])
 
 
-def solved(
-    experiment: Experiment[Response], response: Response, chunks: Iterable[Float[np.ndarray, "sample column"]]
-) -> Evaluation:
+def solved(experiment: Experiment[Response], response: Response, chunks: Iterable[Samples]) -> Evaluation:
     """Return what a response says of the samples of a design, uniform numbers chunk by chunk."""
     errors = experiment.errors
     standard = (errors.standard_values(np.maximum(uniform, _HALF_STEP)) for uniform in chunks)

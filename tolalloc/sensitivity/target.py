@@ -13,9 +13,14 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import limited_measure
 from tolalloc.exceptions import InputError, SolveError
+from tolalloc.models.model import Samples
 from tolalloc.sensitivity.effort import FEWEST_OUTSIDE, FEWEST_UNITS, WORST_SHARE
-from tolalloc.sensitivity.ranking import percentile_interval, share_interval
+from tolalloc.sensitivity.ranking import AtSources, Ends, Resamples, percentile_interval, share_interval
 
+Squares = Float[np.ndarray, "unit source"]
+"""Mean squares of the standardised columns of each source [-]."""
+IsOutside = Bool[np.ndarray, " unit"]
+"""Which units are outside."""
 _CLASSES_PER_ROOT = 2
 """Classes of a measure over √units: fewer would hide how steeply the chance rises, more would scatter [-]."""
 
@@ -31,35 +36,35 @@ class TargetSensitivity:
     units: int
     outside: int
     # First-order index of "is outside" given the measure that the drawing limits [-]
-    first: Float[np.ndarray, " source"]
-    first_resamples: Float[np.ndarray, "resample source"]  # The same from resamples [-]
+    first: AtSources
+    first_resamples: Resamples  # The same from resamples [-]
     # Mean square of the standardised columns among the units outside over that of all units; 1 means no part [-]
-    lift: Float[np.ndarray, " source"]
-    lift_resamples: Float[np.ndarray, "resample source"]  # The same from bootstrap resamples of the units [-]
+    lift: AtSources
+    lift_resamples: Resamples  # The same from bootstrap resamples of the units [-]
     columns: Int[np.ndarray, " source"]  # Columns of each source that vary [-]
     # Share of random choices of as many units whose lift is as far from 1 or farther, two-sided [-]
-    p_value: Float[np.ndarray, " source"]
+    p_value: AtSources
     # Median of the measure that the drawing limits, of all units and of those outside [m]
-    median: Float[np.ndarray, " source"]
-    median_outside: Float[np.ndarray, " source"]
+    median: AtSources
+    median_outside: AtSources
 
     @property
-    def first_interval(self) -> Float[np.ndarray, "2 source"]:
+    def first_interval(self) -> Ends:
         """90 % interval of the first-order target indices [-]."""
         return share_interval(self.first_resamples)
 
     @property
-    def lift_interval(self) -> Float[np.ndarray, "2 source"]:
+    def lift_interval(self) -> Ends:
         """90 % percentile interval of the lifts [-]."""
         return percentile_interval(self.lift_resamples)
 
     @property
-    def excess(self) -> Float[np.ndarray, " source"]:
+    def excess(self) -> AtSources:
         """Sum over a source's columns of their mean squares beyond 1, which many columns do not dilute [-]."""
         return np.asarray(self.columns * (self.lift - 1.0))
 
     @property
-    def excess_interval(self) -> Float[np.ndarray, "2 source"]:
+    def excess_interval(self) -> Ends:
         """90 % percentile interval of the excesses [-]."""
         return np.asarray(self.columns * (self.lift_interval - 1.0))
 
@@ -143,7 +148,7 @@ def target_sensitivity(
     )
 
 
-def limited_measures(errors: ErrorModel, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample source"]:
+def limited_measures(errors: ErrorModel, x: Samples) -> Float[np.ndarray, "sample source"]:
     """Return what the drawing limits, for every source, in such a way that it compares with the zone [m].
 
     A size: its deviation from the middle. A position: twice the distance from the true one. Pitch and run-out: the
@@ -158,7 +163,7 @@ def limited_measures(errors: ErrorModel, x: Float[np.ndarray, "sample column"]) 
     return np.column_stack([*zoned, np.sqrt(_mean_squares(errors, x)[:, len(zoned) :])])
 
 
-def _mean_squares(errors: ErrorModel, x: Float[np.ndarray, "sample column"]) -> Float[np.ndarray, "sample source"]:
+def _mean_squares(errors: ErrorModel, x: Samples) -> Float[np.ndarray, "sample source"]:
     """Return the mean square over each source's columns, each less its mean and over its deviation [-]."""
     deviation = x.std(axis=0)
     squares = ((x - x.mean(axis=0)) / np.where(deviation > 0.0, deviation, np.inf)) ** 2
@@ -178,7 +183,7 @@ def _threshold(values: Float[np.ndarray, " good_unit"], limit: float, *, units: 
     return cut if cut < most else float(values[values < most].max(initial=-np.inf)), False
 
 
-def _table(measure: Float[np.ndarray, " unit"], outside: Bool[np.ndarray, " unit"]) -> Int[np.ndarray, "class 2"]:
+def _table(measure: Float[np.ndarray, " unit"], outside: IsOutside) -> Int[np.ndarray, "class 2"]:
     """Return how many units of each class are inside and outside, classes of equal size by rank [-]."""
     classes = _CLASSES_PER_ROOT * int(np.sqrt(measure.size))
     own = np.argsort(np.argsort(measure, kind="stable"), kind="stable") * classes // measure.size
@@ -202,9 +207,7 @@ def _first(tables: Int[np.ndarray, "*any class 2"]) -> Float[np.ndarray, "*any"]
     return np.asarray(between - (classes - 1) * (1.0 - between) / (units - classes))
 
 
-def _first_resamples(
-    tables: Int[np.ndarray, "source class 2"], seeds: SeedTree, resamples: int
-) -> Float[np.ndarray, "resample source"]:
+def _first_resamples(tables: Int[np.ndarray, "source class 2"], seeds: SeedTree, resamples: int) -> Resamples:
     """Return first-order indices of resampled units [-].
 
     The units of a resample fall on the table as a multinomial sample. It scatters about the biased share of the
@@ -217,9 +220,7 @@ def _first_resamples(
     return np.column_stack(found)
 
 
-def _lift_resamples(
-    squares: Float[np.ndarray, "unit source"], outside: Bool[np.ndarray, " unit"], seeds: SeedTree, resamples: int
-) -> Float[np.ndarray, "resample source"]:
+def _lift_resamples(squares: Squares, outside: IsOutside, seeds: SeedTree, resamples: int) -> Resamples:
     """Return the lifts of bootstrap resamples of the units [-]."""
     generator, found, units = seeds.generator(), [], outside.size
     own = squares[outside]
@@ -230,9 +231,7 @@ def _lift_resamples(
     return np.stack(found)
 
 
-def _p_value(
-    squares: Float[np.ndarray, "unit source"], outside: Bool[np.ndarray, " unit"], seeds: SeedTree, permutations: int
-) -> Float[np.ndarray, " source"]:
+def _p_value(squares: Squares, outside: IsOutside, seeds: SeedTree, permutations: int) -> AtSources:
     """Return the two-sided permutation test of no effect, the observed choice among the random ones [-]."""
     generator, count = seeds.generator(), int(np.count_nonzero(outside))
     middle = squares.mean(axis=0)

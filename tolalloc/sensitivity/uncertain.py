@@ -13,6 +13,8 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import SolveError
 from tolalloc.models.model import Model
 
+Units = Float[np.ndarray, "unit column"]
+"""Deviations of units [m, angles rad]."""
 _UNITS = 256
 """Units over which the effect is averaged [-]."""
 _DIRECTIONS, _UNITS_PER_DIRECTION = 3, 32
@@ -49,9 +51,7 @@ class UncertainEffect:
     first_order: FirstOrderError  # First order against model
 
 
-def uncertain_effect(
-    model: Model, output: str, x: Float[np.ndarray, "unit column"], seeds: SeedTree
-) -> UncertainEffect:
+def uncertain_effect(model: Model, output: str, x: Units, seeds: SeedTree) -> UncertainEffect:
     """Return what the model's uncertain columns alone do to good units, with the first order checked at ±2σ.
 
     σ² = gᵀ·C·g to first order, g the gradient by the uncertain columns, C their covariance: JCGM 100:2008, eq. (13). It
@@ -71,7 +71,7 @@ def uncertain_effect(
 
 
 def first_order_error(
-    model: Model, output: str, x: Float[np.ndarray, "unit column"], changes: Float[np.ndarray, "change uncertain"]
+    model: Model, output: str, x: Units, changes: Float[np.ndarray, "change uncertain"]
 ) -> FirstOrderError:
     """Return how far the first order is from the model whose uncertain columns have changed.
 
@@ -115,7 +115,7 @@ def first_order_error(
     )
 
 
-def _gradient(model: Model, output: str, x: Float[np.ndarray, "unit column"]) -> Float[np.ndarray, "unit uncertain"]:
+def _gradient(model: Model, output: str, x: Units) -> Float[np.ndarray, "unit uncertain"]:
     """Return the first order itself, NaN where a unit has no answer [output per uncertain column]."""
     columns = sum(len(source.columns) for source in model.uncertain)
     shifts = np.concatenate([np.zeros((1, columns)), np.eye(columns)])

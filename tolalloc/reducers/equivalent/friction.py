@@ -14,11 +14,13 @@ from jaxtyping import Float
 from tolalloc.reducers.cycloid.tooth_profile import normals, pole_distance
 from tolalloc.reducers.equivalent.hysteresis import DRAWN, LOST_MOTION, HysteresisLoop, loop_torques
 from tolalloc.reducers.equivalent.model import Curves, EquivalentModel, Errors
-from tolalloc.reducers.equivalent.outputs import MESHES, Forces, Solved, angles_of_pins
+from tolalloc.reducers.equivalent.outputs import MESHES, AtPins, Forces, Solved, angles_of_pins
 from tolalloc.reducers.equivalent.springs import AtAngles
 from tolalloc.reducers.reducer.bearings import CRANK_BEARINGS, FrictionDimensions, loss_factor
 from tolalloc.reducers.reducer.design import Mesh, Reducer
 
+Levels = Float[np.ndarray, " level"]
+"""Torques of the levels, ascending [N·m]."""
 AtLevels = Float[np.ndarray, "sample level"]
 AtSteps = Float[np.ndarray, "sample step"]
 MESH, PINS = "gear_mesh", "pins"
@@ -28,9 +30,7 @@ _STEPS = 81
 where little torque closes the backlash [-]."""
 
 
-def _interpolated(
-    at: AtSteps, levels: Float[np.ndarray, " level"] | AtLevels, values: Float[np.ndarray, " level"] | AtLevels
-) -> AtSteps:
+def _interpolated(at: AtSteps, levels: Levels | AtLevels, values: Levels | AtLevels) -> AtSteps:
     """Return the values of every sample between its ascending levels, straight between two and constant beyond."""
     samples = at.shape[0]
     every = (np.broadcast_to(given, (samples, given.shape[-1])) for given in (levels, values))
@@ -44,12 +44,12 @@ class PlayOperator:
     The spring feels S where the torque is S + f(S) as it rises and S − f(S) as it falls; between the two nothing moves.
     """
 
-    inside: Float[np.ndarray, " level"]  # Torques S that the spring feels, ascending [N·m]
+    inside: Levels  # Torques S that the spring feels, ascending [N·m]
     rising: Float[np.ndarray, "sample level"]  # Torque at which the spring gives way upwards at S [N·m]
     falling: Float[np.ndarray, "sample level"]  # Torque at which it gives way downwards [N·m]
 
     @classmethod
-    def of(cls, inside: Float[np.ndarray, " level"], friction: AtLevels) -> PlayOperator:
+    def of(cls, inside: Levels, friction: AtLevels) -> PlayOperator:
         """Return the operator of a friction torque that belongs to the torques S [N·m].
 
         Where friction grows faster than the torque the spring is locked until the torque reaches what frees it, so the
@@ -210,9 +210,7 @@ def friction_loop(model: EquivalentModel, errors: Errors, carrier_angle: AtAngle
     )
 
 
-def _followed(
-    levels: Float[np.ndarray, " level"], twist: AtLevels, solved: list[Solved], path: Float[np.ndarray, " step"]
-) -> AtSteps:
+def _followed(levels: Levels, twist: AtLevels, solved: list[Solved], path: Float[np.ndarray, " step"]) -> AtSteps:
     """Return the twist along a path of torque that starts where the torque has just risen.
 
     The carrier bearing holds back the whole twist, the pins what the discs move, and all that turns with the cranks
@@ -287,9 +285,7 @@ def _summed(changes: list[Float[np.ndarray, " sample"]]) -> AtLevels:
     return np.cumsum(np.stack([np.zeros_like(changes[0]), *changes], axis=1), axis=1)
 
 
-def _disc_ways(
-    before: Solved, after: Solved
-) -> tuple[Float[np.ndarray, "sample angle disc pin"], Float[np.ndarray, "sample angle disc pin"]]:
+def _disc_ways(before: Solved, after: Solved) -> tuple[AtPins, AtPins]:
     """Return how far every disc moves towards every pin and along it between two equilibria [m].
 
     A disc that turns by r_d·θ about its centre slides by that times cos a − (R_p·√S − r_rp)/r_d.

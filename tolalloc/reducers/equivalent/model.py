@@ -30,6 +30,12 @@ from tolalloc.reducers.equivalent.springs import HARMONICS, AtAngles, Positions
 from tolalloc.reducers.reducer.design import Reducer, at_torque
 from tolalloc.reducers.reducer.form import PartForm
 
+OneUnit = Float[np.ndarray, "1 column"]
+"""Deviations of one unit, as `Errors`."""
+Torques = float | Float[np.ndarray, " sample"]
+"""One torque for all samples, or one for each [N·m]."""
+Weights = Float[np.ndarray, "sample disc pin"]
+"""Weights of the pin forces of every sample."""
 Errors = Float[np.ndarray, "sample column"]
 """Deviations of units in the order of the model's columns [m, angles rad], or what has their shape."""
 Curves = Float[np.ndarray, "sample angle"]
@@ -185,7 +191,7 @@ class EquivalentModel:
         for name in ("_tables", "_turn"):
             vars(self).pop(name, None)
 
-    def _given(self, errors: Errors, torque: float | Float[np.ndarray, " sample"]) -> Given:
+    def _given(self, errors: Errors, torque: Torques) -> Given:
         """Return what every solver takes next to the tables: places of the columns, reducer, errors, torque."""
         columns = self.error_columns
         return columns.layout, columns.map, self.design, np.ascontiguousarray(errors), torque
@@ -257,7 +263,7 @@ class EquivalentModel:
             residual=found.residual.max(axis=1),
         )
 
-    def exact_extremes(self, errors: Float[np.ndarray, "1 column"], torque: float) -> TurnExtremes:
+    def exact_extremes(self, errors: OneUnit, torque: float) -> TurnExtremes:
         """Return the extremes of one unit, solved again at their angles with tables of just these angles.
 
         The search interpolates its tables; what that changed of either extreme is added to what finer angles may add.
@@ -318,7 +324,7 @@ class EquivalentModel:
         return extremes, self._derivatives(derivative)
 
     def rotation_derivatives(
-        self, errors: Errors, torque: float | Float[np.ndarray, " sample"], carrier_angle: AtAngles
+        self, errors: Errors, torque: Torques, carrier_angle: AtAngles
     ) -> tuple[Curves, Derivatives]:
         """Return the transmission error at the carrier angles and its exact derivatives, sample by sample in one row.
 
@@ -334,12 +340,7 @@ class EquivalentModel:
         return derivative.rotation.reshape(shape), self._derivatives(derivative)
 
     def pin_force_derivatives(
-        self,
-        errors: Errors,
-        torque: float,
-        carrier_angle: AtAngles,
-        at: Int[np.ndarray, " sample"],
-        weights: Float[np.ndarray, "sample disc pin"],
+        self, errors: Errors, torque: float, carrier_angle: AtAngles, at: Int[np.ndarray, " sample"], weights: Weights
     ) -> Derivatives:
         """Return the exact derivatives of Σ weight·force over the pins, of every sample at one of the carrier angles.
 
@@ -352,7 +353,7 @@ class EquivalentModel:
     def _value_derivatives(
         self,
         errors: Errors,
-        torque: float | Float[np.ndarray, " sample"],
+        torque: Torques,
         carrier_angle: AtAngles,
         at: Int[np.ndarray, " item"],
         carrier: float,

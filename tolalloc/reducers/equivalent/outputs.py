@@ -21,13 +21,15 @@ from tolalloc.reducers.cycloid.solvers import LAWS, LINEAR
 from tolalloc.reducers.cycloid.tooth_profile import pin_angles
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.interfaces import pin_contact
-from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel, Errors
+from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel, Errors, OneUnit
 from tolalloc.reducers.equivalent.solvers.records import design_of
 from tolalloc.reducers.equivalent.springs import AtAngles, Positions, harmonic_waves
 from tolalloc.reducers.families.known import INTERFACES, family_of
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.form import PartForm
 
+AtPins = Float[np.ndarray, "sample angle disc pin"]
+"""A number of every pin on every disc, at every angle of every sample."""
 MESHES = tuple(own.stiffness for own in INTERFACES if own.is_mesh)
 """Interfaces that carry along one direction, named as in `Stiffness`; the others carry x and y."""
 _ROUNDING = 1e-4
@@ -44,7 +46,7 @@ FORM = "form of flanks and pins"
 class Forces:
     """Forces on the downstream part, positive where the interface is compressed; NaN where nothing converged."""
 
-    pins: Float[np.ndarray, "sample angle disc pin"]  # Normal force between every pin and every disc [N]
+    pins: AtPins  # Normal force between every pin and every disc [N]
     rows: Float[np.ndarray, "sample angle row"]  # Force of every bilateral spring [N]
     # Force x, y of every element with play; a mesh has x only [N]
     elements: Float[np.ndarray, "sample angle element 2"]
@@ -124,9 +126,7 @@ def fitted_waves(
     return np.asarray(constant_and[:, 1 : order.size + 1] - 1j * constant_and[:, order.size + 1 :])
 
 
-def turn_orders(
-    model: EquivalentModel, errors: Float[np.ndarray, "1 column"], torque: float, angles: int | None = None
-) -> Orders:
+def turn_orders(model: EquivalentModel, errors: OneUnit, torque: float, angles: int | None = None) -> Orders:
     """Return the orders of one unit [m, angles rad] that the angles hold; the amplitudes of others are 0.
 
     Waves beyond half of the angles fold back onto others, elsewhere for another number of angles: an order is told
@@ -180,7 +180,7 @@ class Solved:
         return np.asarray((self.forces.pins > 0.0).sum(axis=3))
 
     @cached_property
-    def line_load(self) -> Float[np.ndarray, "sample angle disc pin"]:
+    def line_load(self) -> AtPins:
         """Largest line load of every pin and disc, the even one where nothing is tilted or crowned [N/m].
 
         F/b + C|γ|/2, own derivation; without tilt F/b; of crowned teeth that of `LineContact`.
@@ -192,12 +192,12 @@ class Solved:
         return line_contact(self.equilibria, self.forces).peak
 
     @property
-    def pressure(self) -> Float[np.ndarray, "sample angle disc pin"]:
+    def pressure(self) -> AtPins:
         """Hertz's peak pressure of every pin and disc under that line load [Pa]."""
         return np.asarray(unit_pressure(self.equilibria) * np.sqrt(self.line_load))
 
 
-def load_share(pins: Float[np.ndarray, "sample angle disc pin"]) -> Float[np.ndarray, "sample disc"]:
+def load_share(pins: AtPins) -> Float[np.ndarray, "sample disc"]:
     """Return the share of all pin force that each disc carries over the turn, Σ_disc F/Σ F, own derivation [-]."""
     total = pins.sum(axis=(1, 3))
     return np.asarray(total / total.sum(axis=1, keepdims=True))
@@ -442,9 +442,7 @@ class Attribution:
     amplitude: Float[np.ndarray, " order"]  # Amplitude of each order of the whole curve [rad]
 
 
-def attribute(
-    model: EquivalentModel, errors: Float[np.ndarray, "1 column"], torque: float, orders: Orders | None = None
-) -> Attribution:
+def attribute(model: EquivalentModel, errors: OneUnit, torque: float, orders: Orders | None = None) -> Attribution:
     """Return what every source of one unit [m, angles rad] adds to its transmission error and to each order.
 
     Theory page, equation (32). All gaps, clearances and the torque scaled together scale the transmission error, as
@@ -488,9 +486,7 @@ def attribute(
     )
 
 
-def _contributions(
-    model: EquivalentModel, errors: Float[np.ndarray, "1 column"], torque: float, angle: AtAngles
-) -> dict[str, AtAngles]:
+def _contributions(model: EquivalentModel, errors: OneUnit, torque: float, angle: AtAngles) -> dict[str, AtAngles]:
     """Return what every source adds at the carrier angles [rad]."""
     curve, derivatives = model.rotation_derivatives(errors, torque, angle)
     parts: dict[str, Float[np.ndarray, " angle"]] = {}

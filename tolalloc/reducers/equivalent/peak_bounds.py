@@ -20,6 +20,10 @@ from tolalloc.reducers.equivalent.condensation import CondensedAngles
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.solvers.records import CONVERGED
 
+AtItems = Float[np.ndarray, " item"]
+"""A number of every item: a unit of a design at an angle."""
+AtVariables = Float[np.ndarray, " variable"]
+"""A number of every variable of a box."""
 _STEPS = 40
 """Largest number of Newton steps, and of halvings of one [-]."""
 _BALANCED = 1e-9
@@ -79,13 +83,13 @@ class _Curves:
 
     def unbalanced(
         self, q: AtCoordinates, touched: AtPins, force: AtCoordinates
-    ) -> tuple[AtCoordinates, AtPins, Float[np.ndarray, " item"]]:
+    ) -> tuple[AtCoordinates, AtPins, AtItems]:
         """Return the unbalanced force, the stiffness of the contacts and the largest force [N, N/m, N]."""
         carried, slope = self.pins(touched + _along(self.lever, q))
         pushed, elastic = _against(self.lever, carried), _against(self.stiffness, q)
         return elastic + pushed - force, slope, np.abs(np.stack([pushed, elastic, force])).max(axis=(0, 2))
 
-    def equilibrium(self, variables: Float[np.ndarray, "item variable"]) -> tuple[Float[np.ndarray, " item"], AtPins]:
+    def equilibrium(self, variables: Float[np.ndarray, "item variable"]) -> tuple[AtItems, AtPins]:
         """Return rotation [rad], NaN where none was found, and compressions [m], by Newton steps on the energy."""
         force, touched, turned = (
             field[:, 0] + (field[:, 1:] * variables.reshape(*variables.shape, *[1] * (field.ndim - 2))).sum(axis=1)
@@ -111,7 +115,7 @@ class _Curves:
         tangent += _SOFT * np.trace(tangent, axis1=1, axis2=2)[:, np.newaxis, np.newaxis] * np.eye(tangent.shape[1])
         return np.asarray(-np.linalg.solve(tangent, gradient[..., np.newaxis])[..., 0])
 
-    def slopes(self, centre: Float[np.ndarray, " variable"], half: Float[np.ndarray, " variable"]) -> Rotated:
+    def slopes(self, centre: AtVariables, half: AtVariables) -> Rotated:
         """Return the least and the largest derivative of the rotation in a box, not finite where none is known.
 
         Theory page, equation (105). While every compression stays within ρ of that at the centre, the stiffness of its
@@ -170,13 +174,13 @@ class _MovedContacts:
     rotation: Float[np.ndarray, "item variable"]  # Of the carrier [rad per variable]
     compression: Float[np.ndarray, "item variable pin"]  # Of every contact [m per variable]
     pin_yielding: Float[np.ndarray, "item pin"]  # Under a force on a pin [√(m/N)]
-    carrier_yielding: Float[np.ndarray, " item"]  # Under a torque on the carrier [√(rad/(N·m))]
+    carrier_yielding: AtItems  # Under a torque on the carrier [√(rad/(N·m))]
     sound: Bool[np.ndarray, " item"]  # Whether anything holds the unit
 
 
 def _part(
     curves: _Curves, step: AtCoordinates, gradient: AtCoordinates, place: tuple[AtCoordinates, AtPins, AtCoordinates]
-) -> Float[np.ndarray, " item"]:
+) -> AtItems:
     """Return how much of a step is gone, halved until the energy's slope along it has fallen to a half."""
     q, touched, force = place
     part, first = np.ones(len(step)), (gradient * step).sum(axis=1)
@@ -265,13 +269,7 @@ class PeakBounds:
             curves.append(_loads(model, tables, np.repeat(values, 2, axis=0), np.concatenate(start)))
         return cls(units=count, curves=_Curves.joined(curves))
 
-    def least(
-        self,
-        lower: Float[np.ndarray, " variable"],
-        upper: Float[np.ndarray, " variable"],
-        sign: Sign,
-        rows: Int[np.ndarray, " unit"],
-    ) -> Least:
+    def least(self, lower: AtVariables, upper: AtVariables, sign: Sign, rows: Int[np.ndarray, " unit"]) -> Least:
         """Return what the peak-to-peak is at least anywhere in a box [arcsec]; of its largest value nothing."""
         variables = lower.size
         if sign < 0:

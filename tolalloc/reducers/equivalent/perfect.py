@@ -15,7 +15,7 @@ from jaxtyping import Float, Integer, UInt8
 
 from tolalloc.reducers.equivalent.friction import sliding_ways
 from tolalloc.reducers.equivalent.hysteresis import BACKLASH, TURN_ANGLES, HysteresisLoop, hysteresis_loop
-from tolalloc.reducers.equivalent.model import Curves, EquivalentModel, Errors
+from tolalloc.reducers.equivalent.model import Curves, EquivalentModel, Errors, Weights
 from tolalloc.reducers.equivalent.outputs import Solved
 from tolalloc.reducers.equivalent.springs import Positions
 from tolalloc.reducers.families.known import family_of
@@ -132,12 +132,7 @@ def _largest(over_turn: Curves) -> Integer[np.ndarray, " sample"]:
     return np.asarray(np.nan_to_num(over_turn, nan=-inf).argmax(axis=1))
 
 
-def _slopes(
-    model: EquivalentModel,
-    solved: Solved,
-    at: Integer[np.ndarray, " sample"],
-    weights: Float[np.ndarray, "sample disc pin"],
-) -> Errors:
+def _slopes(model: EquivalentModel, solved: Solved, at: Integer[np.ndarray, " sample"], weights: Weights) -> Errors:
     """Return the derivatives of the weighted sum of the forces at one angle of every sample."""
     errors, torque = solved.equilibria.errors, solved.equilibria.torque
     return model.at_torque(torque).pin_force_derivatives(errors, torque, TURN_ANGLES, at, weights).by_error

@@ -21,6 +21,8 @@ from tolalloc.reading.files import times
 from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.reducer.stiffness import Material
 
+Displacement = float | Float[np.ndarray, " displacement"]
+"""How far one ring is moved across the other [m]."""
 _LINE = 35948.0
 """c_L of a steel roller of 1 mm effective length between both races, ISO/TS 16281 [N/mm^(10/9)]."""
 
@@ -146,7 +148,7 @@ class RollingBearing(ABC):
         return max(self.clearance / 2.0 - self.axial * tan(self.contact_angle), 0.0) / cos(direction)
 
     def element_loads(
-        self, displacement: float | Float[np.ndarray, " displacement"], direction: float = 0.0
+        self, displacement: Displacement, direction: float = 0.0
     ) -> Float[np.ndarray, "*displacement element"]:
         """Return the load of every element along its contact, one standing at a direction from the displacement [N]."""
         cosine = np.cos(direction + 2.0 * pi * np.arange(self.elements) / self.elements)
@@ -154,9 +156,7 @@ class RollingBearing(ABC):
         pressed = radial + self.axial * sin(self.contact_angle)
         return np.asarray(self.coefficient * np.maximum(pressed, 0.0) ** self.exponent)
 
-    def radial_force(
-        self, displacement: float | Float[np.ndarray, " displacement"], direction: float = 0.0
-    ) -> Float[np.ndarray, "*displacement"]:
+    def radial_force(self, displacement: Displacement, direction: float = 0.0) -> Float[np.ndarray, "*displacement"]:
         """Return the force along a radial displacement [m] from the middle of the play [N]."""
         cosine = np.cos(direction + 2.0 * pi * np.arange(self.elements) / self.elements)
         return np.asarray(self.rows * cos(self.contact_angle) * self.element_loads(displacement, direction) @ cosine)

@@ -15,7 +15,7 @@ from jaxtyping import Float, Shaped, UInt8
 
 from tolalloc.drawings.correlation import CorrelatedSource
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.models.model import Evaluation, Observer, Response, unobserved
+from tolalloc.models.model import Evaluation, Observer, Response, Samples, unobserved
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers import PEAK_TO_PEAK
 from tolalloc.reducers.equivalent.model import EquivalentModel, TurnExtremes, cached_model
@@ -25,8 +25,6 @@ from tolalloc.reducers.reducer.design import Modification, Reducer, at_torque, t
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.running.chunks import Mapper, map_chunks
 
-Samples = Float[np.ndarray, "sample column"]
-"""Deviations of units in the columns that vary, or what has their shape [m, angles rad]."""
 Answer = tuple[Float[np.ndarray, "chunk output"], UInt8[np.ndarray, " chunk"]]
 """Outputs of a chunk and the status of every sample."""
 NAME = "stiffness (identified)"
@@ -42,7 +40,7 @@ class WithDerivatives:
     """Answers of the kernel with the exact derivative of the peak-to-peak."""
 
     evaluation: Evaluation  # Peak-to-peak and status of every sample
-    by_column: Float[np.ndarray, "sample column"]  # Derivative by every varied column [arcsec/m]
+    by_column: Samples  # Derivative by every varied column [arcsec/m]
     # By the equidistant, the shift and the rotation amount [arcsec/m, arcsec/rad]
     by_modification: Float[np.ndarray, "sample 3"]
     # Derivative by the relative change of each stiffness of `tolalloc.reducers.reducer.stiffness.Stiffness` [arcsec]

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float, UInt8
 
-from tolalloc.models.model import Evaluation, Response
+from tolalloc.models.model import Evaluation, Response, Samples
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, MEGAPASCAL, MICROMETRE, MILLIMETRE
 from tolalloc.reducers import (
     BACKLASH,
@@ -41,7 +41,7 @@ from tolalloc.reducers.equivalent.perfect import friction_torque_derivatives, pi
 from tolalloc.reducers.families.known import family_of
 from tolalloc.reducers.load_case import OverLoadCases
 from tolalloc.reducers.reducer.design import Reducer
-from tolalloc.reducers.response.kernel import Answer, KernelResponse, Samples
+from tolalloc.reducers.response.kernel import Answer, KernelResponse
 
 Errors = Float[np.ndarray, "chunk all_columns"]
 WITH_FRICTION = (EFFICIENCY, LOST_MOTION_WITH_FRICTION, HYSTERESIS_LOSS)

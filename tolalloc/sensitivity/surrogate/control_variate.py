@@ -18,6 +18,8 @@ from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.models.model import Response
 from tolalloc.sensitivity.surrogate.regression import Regression, fitted, on_products
 
+OfBlocks = Float[np.ndarray, "number block"]
+"""What each block adds to each number."""
 MOST_CONTROLLED = 2048
 """Blocks beyond which a model needs no cheap one: it answers hardly fewer samples itself [-]."""
 _MOST_TERMS = 500
@@ -103,9 +105,7 @@ class CheapAnswers:
 
 
 def optimal_weights(
-    own: Float[np.ndarray, "number block"],
-    cheap: Float[np.ndarray, "number block"],
-    counts: Float[np.ndarray, "row block"],
+    own: OfBlocks, cheap: OfBlocks, counts: Float[np.ndarray, "row block"]
 ) -> Float[np.ndarray, "number row"]:
     """Return with which weight the error of a cheap number corrects the own one, for every row of counts [-].
 

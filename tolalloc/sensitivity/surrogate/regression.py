@@ -17,8 +17,14 @@ from scipy.linalg.blas import dsyrk
 from scipy.stats import qmc
 
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.models.model import Evaluation
+from tolalloc.models.model import Evaluation, Samples
 
+Units = Float[np.ndarray, "unit column"]
+"""Columns of every unit."""
+Outputs = Float[np.ndarray, "unit output"]
+"""Outputs of every unit."""
+Point = Float[np.ndarray, " variable"]
+"""A number of every variable of a box."""
 _UNITS_AT_ONCE = 512
 """Units whose terms are in memory at a time [-]."""
 
@@ -33,16 +39,14 @@ class QuadraticForm:
     slopes: Float[np.ndarray, "column output"]  # [output]
     curvature: Float[np.ndarray, "output column column"]  # [output]
 
-    def __call__(self, x: Float[np.ndarray, "unit column"]) -> Float[np.ndarray, "unit output"]:
+    def __call__(self, x: Units) -> Outputs:
         """Return the outputs of every unit."""
         u = (x - self.middle) / self.spread
         bent = [np.einsum("uc,uc->u", u @ own, u) for own in self.curvature]
         return np.asarray(self.offset + u @ self.slopes + np.stack(bent, axis=1))
 
 
-def fit_quadratic_form(
-    x: Float[np.ndarray, "unit column"], y: Float[np.ndarray, "unit output"], strength: float
-) -> QuadraticForm:
+def fit_quadratic_form(x: Units, y: Outputs, strength: float) -> QuadraticForm:
     """Return the ridge regression on the standardised columns and all products of two.
 
     The weights minimise Σ (y − ŷ)² + strength·Σ w²; strengths of 0 and up, 0 only with more units than terms.
@@ -67,7 +71,7 @@ Weights = tuple[Float[np.ndarray, "column output"], Float[np.ndarray, "output co
 """Weights of the columns and of their products of two, of which the upper triangle counts [output]."""
 
 
-def _by_terms(u: Float[np.ndarray, "unit column"], y: Float[np.ndarray, "unit output"], strength: float) -> Weights:
+def _by_terms(u: Units, y: Outputs, strength: float) -> Weights:
     """Return the ridge's weights from the products of all terms with each other, some units at a time."""
     first, second = np.triu_indices(u.shape[1])
     count, columns = u.shape[1] + first.size, u.shape[1]
@@ -86,7 +90,7 @@ def _by_terms(u: Float[np.ndarray, "unit column"], y: Float[np.ndarray, "unit ou
     return weights[:columns], products
 
 
-def _by_units(u: Float[np.ndarray, "unit column"], y: Float[np.ndarray, "unit output"], strength: float) -> Weights:
+def _by_units(u: Units, y: Outputs, strength: float) -> Weights:
     """Return the same from the products of all units with each other, where there are fewer units than terms.
 
     The products of two of a unit times those of another one are ½·((uᵀv)² + Σ uᵢ²·vᵢ²): no term is ever formed.
@@ -113,8 +117,8 @@ class BoxPolynomial:
     """A fitted surrogate of a function with many outputs."""
 
     # The box [variable]
-    lower: Float[np.ndarray, " variable"]
-    upper: Float[np.ndarray, " variable"]
+    lower: Point
+    upper: Point
     degrees: Int[np.ndarray, "term variable"]  # Degree of each term in each variable [-]
     coefficients: Float[np.ndarray, "term output"]  # Coefficient of each term for each output [output]
     # Root-mean-square and largest error on held-out answers, over all outputs [output]
@@ -128,7 +132,7 @@ class BoxPolynomial:
         """Return the outputs of every sample."""
         return np.asarray(terms(self._scaled(x), self.degrees) @ self.coefficients)
 
-    def derivatives(self, x: Float[np.ndarray, " variable"]) -> Float[np.ndarray, "output variable"]:
+    def derivatives(self, x: Point) -> Float[np.ndarray, "output variable"]:
         """Return the derivatives of the outputs at one point by the variables [output/variable]."""
         values = chebyshev.chebvander(self._scaled(x[np.newaxis])[0], self._top)
         by_variable = [self._slopes @ factor for factor in values]
@@ -176,13 +180,7 @@ def total_degrees(variables: int, degree: int) -> Int[np.ndarray, "term variable
     return np.array([row for row in product(range(degree + 1), repeat=variables) if sum(row) <= degree])
 
 
-def fit_box_polynomial(
-    answers: Answers,
-    lower: Float[np.ndarray, " variable"],
-    upper: Float[np.ndarray, " variable"],
-    degree: int,
-    seeds: SeedTree,
-) -> BoxPolynomial:
+def fit_box_polynomial(answers: Answers, lower: Point, upper: Point, degree: int, seeds: SeedTree) -> BoxPolynomial:
     """Return the polynomial of least squares, up to a total degree, through answers all over a box [variable].
 
     References
@@ -226,7 +224,7 @@ class Regression:
     outputs: tuple[str, ...]
     estimator: Any  # The fitted scikit-learn estimator of the outputs
 
-    def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:
+    def __call__(self, x: Samples) -> Evaluation:
         """Return the predictions."""
         own = x[:, : len(self.columns)]
         values = np.reshape(self.estimator.predict(own), (-1, len(self.outputs)))
@@ -243,12 +241,12 @@ class RegressionCandidate:
     outputs: tuple[str, ...]
     estimator: Callable[[], Any]  # Makes the unfitted scikit-learn regressor
 
-    def fit(self, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, " sample"]) -> Regression:
+    def fit(self, x: Samples, y: Float[np.ndarray, " sample"]) -> Regression:
         """Return the regression through answers."""
         return Regression(columns=self.columns, outputs=self.outputs, estimator=fitted(self.estimator(), x, y))
 
 
-def fitted(estimator: Any, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, "sample *output"]) -> Any:
+def fitted(estimator: Any, x: Samples, y: Float[np.ndarray, "sample *output"]) -> Any:
     """Return the fitted estimator."""
     from sklearn.exceptions import ConvergenceWarning
 

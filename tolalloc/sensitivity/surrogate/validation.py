@@ -17,7 +17,7 @@ from jaxtyping import Float, Int
 from tolalloc.capability.indices import require_share
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.models.model import Evaluation, Response
+from tolalloc.models.model import Evaluation, Response, Samples
 from tolalloc.sensitivity.surrogate.regression import NEEDED_Q2
 
 LARGEST_QUANTILE_ERROR = 0.02
@@ -42,7 +42,7 @@ class Candidate(Protocol):
         """What a table calls it."""
         ...
 
-    def fit(self, x: Float[np.ndarray, "sample column"], y: Float[np.ndarray, " sample"]) -> Response:
+    def fit(self, x: Samples, y: Float[np.ndarray, " sample"]) -> Response:
         """Return the surrogate through the answers."""
         ...
 
@@ -51,7 +51,7 @@ class Candidate(Protocol):
 class Answers:
     """Good answers of a response, dealt out to folds."""
 
-    x: Float[np.ndarray, "sample column"]  # Columns of every sample [m, angles rad]
+    x: Samples  # Columns of every sample [m, angles rad]
     y: Float[np.ndarray, " sample"]  # The answers [output]
     fold: Int[np.ndarray, " sample"]  # Fold of every sample [-]
     response: Response  # What gave the answers
@@ -97,7 +97,7 @@ class Score:
 
 def answers_of(
     response: Response,
-    x: Float[np.ndarray, "sample column"],
+    x: Samples,
     seeds: SeedTree,
     folds: int = FOLDS,
     largest_failed_share: float = 0.01,
@@ -163,7 +163,7 @@ def cross_validate(candidate: Candidate, answers: Answers, quantile: float = 0.9
     )
 
 
-def _seconds(response: Response, x: Float[np.ndarray, "sample column"]) -> float:
+def _seconds(response: Response, x: Samples) -> float:
     """Return the time that a response takes for one sample [s]."""
     start = perf_counter()
     response(x)
@@ -184,7 +184,7 @@ class Choice:
 def choose(
     response: Response,
     candidates: Sequence[Candidate],
-    x: Float[np.ndarray, "sample column"],
+    x: Samples,
     seeds: SeedTree,
     quantile: float = 0.9973,
     largest_failed_share: float = 0.01,
