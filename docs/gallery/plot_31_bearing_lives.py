@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import tolalloc as ta
-from tolalloc.reducers.duty import duty_of
+from tolalloc.wings.motion.duty import duty_of
 
 reducer = ta.reducer("rv20e").reducer
 torques = np.geomspace(20, 400, 12)

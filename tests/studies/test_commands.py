@@ -20,7 +20,6 @@ from tests.studies.scripts import study_script
 from tolalloc.drawings.table_file import DATA
 from tolalloc.drawings.tolerance_table import load_tolerance_table
 from tolalloc.exceptions import InputError
-from tolalloc.reducers.duty import duty_of
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.perfect import exact_unit
 from tolalloc.reducers.load_case import LoadCase
@@ -30,6 +29,7 @@ from tolalloc.reports.tellers.transmission_error import TransmissionErrorTeller
 from tolalloc.wings.bench.lot_orders import load_lot_curves
 from tolalloc.wings.bench.posterior import Noise
 from tolalloc.wings.bench.readings import clean_curve, load_readings, require_torque
+from tolalloc.wings.motion.duty import duty_of
 
 STUDY = ROOT / "studies" / "liu2020_allocation.py"
 PEAK = "peak-to-peak transmission error [arcsec]"

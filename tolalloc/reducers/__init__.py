@@ -2,8 +2,8 @@
 
 `reducer` is the nominal one with its files, `cycloid` its tooth stage, `equivalent` the spring model that is solved,
 `response` what that answers to random units, `families` what tells one kind of drive from another. `choice.reducer`
-binds one to a drawing as `model.ReducerModel`; `duty`, `contact`, `modification` and `transmission_error` answer
-questions of their own.
+binds one to a drawing as `model.ReducerModel`; `contact`, `modification` and `transmission_error` answer questions of
+their own.
 """
 
 PEAK_TO_PEAK = "peak-to-peak transmission error [arcsec]"

@@ -1,1 +1,1 @@
-"""The reducer in time: the equivalent model with masses and damping beside its springs, and the virtual prototype."""
+"""The reducer in time: the equivalent model with masses and damping, the virtual prototype, and duty cycles."""

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from tolalloc.reading.units import ARCMINUTE
-from tolalloc.reducers.duty import MAIN, BearingLife, CaseLoads, DutyResult
 from tolalloc.reports.columns import Column, Table
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.templates import Sentences
+from tolalloc.wings.motion.duty import MAIN, BearingLife, CaseLoads, DutyResult
 
-_say = Sentences("duty")
+if TYPE_CHECKING:
+    import pandas as pd
+
+_say = Sentences("duty", "tolalloc.wings.motion")
 
 
 def _called(kind: str) -> str:
@@ -156,6 +157,3 @@ class DutyTeller(Teller[DutyResult]):
         cases = [own.case.name for own in self.result.loads]
         heat = Series.bars("lost power", cases, [own.share * own.loss for own in self.result.loads])
         return Figure("heat", _say("heat_figure"), "part of the mean lost power [W]", series=(heat,))
-
-
-TELLER = DutyTeller

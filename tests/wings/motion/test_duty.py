@@ -11,12 +11,12 @@ import pytest
 import tolalloc as ta
 from tests.builders import says
 from tolalloc.exceptions import InputError, SolveError
-from tolalloc.reducers.duty import duty_of, lever
 from tolalloc.reducers.equivalent.perfect import perfect_reducer
 from tolalloc.reducers.load_case import LoadCase, load_cycle
 from tolalloc.reducers.reducer.bearings import BallBearing, RollerBearing
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.wings.motion.duty import duty_of, lever
 
 RATED = LoadCase("rated", torque=-167.0, speed=15.0)
 LIGHT = LoadCase("light", torque=-50.0, speed=30.0, share=3.0)

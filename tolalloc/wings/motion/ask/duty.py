@@ -13,9 +13,9 @@ from tolalloc.study.answer import Answer
 from tolalloc.study.inquiry import Inquiry, ReducerName, Word
 
 if TYPE_CHECKING:
-    from tolalloc.reducers.duty import DutyResult
     from tolalloc.reducers.load_case import LoadCase
     from tolalloc.reducers.reducer.design import Reducer
+    from tolalloc.wings.motion.duty import DutyResult
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,9 +37,9 @@ class Duty(Inquiry["tuple[Reducer, tuple[LoadCase, ...]]"]):
 
     def prepare(self) -> tuple[Reducer, tuple[LoadCase, ...]]:
         """Return the design and its load cases."""
-        from tolalloc.reducers.duty import require_cycle
         from tolalloc.reducers.load_case import load_cycle
         from tolalloc.reducers.reducer.files import load_reducer
+        from tolalloc.wings.motion.duty import require_cycle
 
         design, cases = load_reducer(str(self.reducer)), load_cycle(self.cycle)
         require_cycle(cases, design)
@@ -47,9 +47,10 @@ class Duty(Inquiry["tuple[Reducer, tuple[LoadCase, ...]]"]):
 
     def solve(self, prepared: tuple[Reducer, tuple[LoadCase, ...]], progress: Progress) -> Answer[DutyResult]:  # noqa: ARG002
         """Return lives, loads and temperature."""
-        from tolalloc.reducers.duty import duty_of
+        from tolalloc.wings.motion.duty import duty_of
+        from tolalloc.wings.motion.telling.duty import DutyTeller
 
         design, cases = prepared
         result = duty_of(design, cases, self.resistance)
         header = Header(name=f"{design.name}: {self.cycle.stem}", model=design.name, assumptions=design.assumptions)
-        return Answer(kind="duty", header=header, result=result)
+        return Answer(kind="duty", header=header, result=result, told_by=DutyTeller)
