@@ -12,6 +12,7 @@ from jaxtyping import Float
 from tolalloc.drawings.compensators import Compensator, Standing
 from tolalloc.drawings.correlation import CorrelatedSource, Correlation, symmetric_root
 from tolalloc.drawings.distributions import ABOVE_ZERO, BELOW_ONE, ndtr, ndtri
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.exceptions import InputError, UnknownNameError
 
@@ -242,6 +243,11 @@ class ErrorModel:
         return np.concatenate(
             [*(source.middles for source in self.active), *(np.zeros(len(source.columns)) for source in self.joint), []]
         )
+
+    def random_units(self, units: int, seeds: SeedTree) -> Columns:
+        """Return the columns of random units at the zones of the drawing [m, angles rad]."""
+        chunks = seeds.uniform_chunks(units, len(self.columns))
+        return np.concatenate([self.deviations(self.standard_values(uniform), self.zones) for uniform in chunks])
 
     def deviations_of_normal(self, numbers: Columns, zones: Zones) -> Columns:
         """Return the columns [m, angles rad] that are as probable as independent standard normal numbers.

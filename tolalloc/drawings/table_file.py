@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from datetime import date, time, timedelta
 from enum import StrEnum
 from io import BytesIO, StringIO
-from math import inf, isfinite, nan
+from math import nan
 from pathlib import Path
 from typing import Any, Literal, TypeVar, get_args, get_origin
 from unicodedata import normalize
@@ -545,14 +545,14 @@ def number_at(place: str, field: str, text: str, allowed: str = "a number with a
         raise InputError.at(place, field, text, allowed) from None
 
 
-def finite_at(place: str | Path, field: str, text: str, allowed: str, most: float = inf) -> float:
-    """Return the number that a cell shows, finite and at most so large either way, or raise with its place."""
+def believed_number(place: str, field: str, text: str, largest: float, allowed: str = "") -> float:
+    """Return the number that a cell shows, no further from 0 than is believed, or raise with its place."""
     try:
         value = plain_number(text)
     except ValueError:
         value = nan
-    if not (isfinite(value) and abs(value) <= most):
-        raise InputError.at(place, field, text, allowed)
+    if not abs(value) <= largest:
+        raise InputError.at(place, field, text, allowed or f"a number from {-largest:g} to {largest:g}")
     return value
 
 

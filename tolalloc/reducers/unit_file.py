@@ -17,7 +17,7 @@ from pydantic import Field, StrictBool
 
 from tolalloc.drawings.heads import split_header
 from tolalloc.drawings.sources import Source, is_angular, neglected_columns
-from tolalloc.drawings.table_file import TextTable, finite_at, read_text_table
+from tolalloc.drawings.table_file import TextTable, believed_number, read_text_table
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.files import Record, no_formula, read_toml, shipped_or_path, validated
 from tolalloc.reading.units import MICROMETRE, MICRORADIAN
@@ -276,8 +276,8 @@ def load_units(path: str | Path, neglected: tuple[str, ...] = ()) -> tuple[Built
         deviations = {}
         for place, (column, factor, largest) in columns.items():
             with faults.kept():
-                where, allowed = f"{table.path}, row {row} (unit {name})", f"a number from {-largest:g} to {largest:g}"
-                deviations[column] = factor * finite_at(where, table.headers[place], cells[place], allowed, largest)
+                where = f"{table.path}, row {row} (unit {name})"
+                deviations[column] = factor * believed_number(where, table.headers[place], cells[place], largest)
         units.append(BuiltUnit(name=name, source=table.path.name, deviations=deviations, neglected=neglected))
     faults.require_none()
     return tuple(units)

@@ -269,9 +269,7 @@ class Prepared:
 
     def random_units(self, units: int) -> Float[np.ndarray, "unit column"]:
         """Return the deviations of random units at the zones of the drawing [m, angles rad]."""
-        errors, seeds = self.errors, SeedTree(self.study.seed).child("check")
-        chunks = seeds.uniform_chunks(units, len(errors.columns))
-        return np.concatenate([errors.deviations(errors.standard_values(uniform), errors.zones) for uniform in chunks])
+        return self.errors.random_units(units, SeedTree(self.study.seed).child("check"))
 
     def kept_limits(self, units: int) -> KeptLimits:
         """Return the shares of random units at the zones of the drawing that keep each limit and all at once."""

@@ -38,8 +38,7 @@ class NewReducer:
 
     def units(self, count: int) -> Float[np.ndarray, "unit column"]:
         """Return the deviations of random units [m, angles rad]."""
-        uniform = next(SeedTree(1).child("samples").uniform_chunks(count, len(self.errors.columns)))
-        return self.errors.deviations(self.errors.standard_values(uniform), self.errors.zones)
+        return self.errors.random_units(count, SeedTree(1).child("samples"))
 
 
 @dataclass(frozen=True, kw_only=True)

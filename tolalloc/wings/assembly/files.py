@@ -13,7 +13,7 @@ from jaxtyping import Float
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from tolalloc.drawings.heads import split_header
-from tolalloc.drawings.table_file import TextTable, finite_at, read_text_table
+from tolalloc.drawings.table_file import TextTable, believed_number, read_text_table
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.files import Record, read_toml, shipped_or_path, validated
 from tolalloc.reading.units import ARCSECOND, DEGREE, MILLIMETRE
@@ -299,7 +299,8 @@ def load_errors(path: Path, plan: AssemblyPlan) -> Float[np.ndarray, "part 3"]:
                 raise UnknownNameError.among(place, "part", name, names)
             if name in found:
                 raise InputError.at(place, "part", name, "each part once, and this one stands further up too")
-            found[name] = [_arcseconds(cells[at], table.headers[at], f"{place} (part {name})") for at in columns[1:]]
+            where, allowed = f"{place} (part {name})", f"a number with a decimal point from {-LARGEST:g} to {LARGEST:g}"
+            found[name] = [believed_number(where, table.headers[at], cells[at], LARGEST, allowed) for at in columns[1:]]
     faults.require_none()
     for name in names:
         if name not in found:
@@ -325,9 +326,3 @@ def _columns(table: TextTable) -> list[int]:
             allowed = f"{units[name]} in square brackets" if units[name] else "none"
             raise InputError.at(table.path, f"the unit of column {header!r}", unit, allowed)
     return [[name for name, _ in stated].index(name) for name in units]
-
-
-def _arcseconds(cell: str, header: str, place: str) -> float:
-    """Return the number in a cell."""
-    allowed = f"a number with a decimal point from {-LARGEST:g} to {LARGEST:g}"
-    return finite_at(place, header, cell, allowed, LARGEST)

@@ -7,11 +7,11 @@ of different units is exchanged. A step is taken only if it lowers the mean over
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import combinations, permutations, product
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -28,16 +28,11 @@ from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.running.progress import RunRecord
 from tolalloc.wings.assembly.stock import Mountings, PartStock, load_parts
 
-_Answer = TypeVar("_Answer")
-
 _FAILED = 1e9
 """What a unit without an answer counts in an assignment, beyond every sum of good ones [arcsec]."""
 
 Peaks = Float[np.ndarray, " _unit"]
 Trial = tuple[Mountings, Peaks]
-Asking = Generator[Mountings, Peaks, _Answer]
-"""A search that asks for the peak-to-peaks of units, so that those of all starts are computed at once."""
-MountingStep = Callable[[PartStock, Mountings, Peaks], Asking[Trial]]
 
 _GAIN = 1e-9
 """Gain in the mean from which a step counts, above the rounding of a sum [arcsec]."""
@@ -114,30 +109,27 @@ def units_from(stock: PartStock, parts: Sequence[int], turns: Sequence[Sequence[
     return units.reshape(-1, len(stock.places), 2)
 
 
-def assigned(at: int) -> MountingStep:
-    """Return the step that assigns the parts at one place now to the units anew, each in its best turn."""
-
-    def step(stock: PartStock, mountings: Mountings, _peaks: Peaks) -> Asking[Trial]:
-        units, turns = len(mountings), stock.turns[at]
-        trials = np.broadcast_to(mountings[:, np.newaxis, np.newaxis], (units, units, turns, *mountings.shape[1:]))
-        trials = trials.copy()
-        trials[..., at, 0] = mountings[:, at, 0][:, np.newaxis]
-        trials[..., at, 1] = np.arange(turns)
-        values = (yield trials.reshape(-1, *mountings.shape[1:])).reshape(units, units, turns)
-        unit, part = linear_sum_assignment(np.minimum(values.min(axis=2), _FAILED))
-        turn = values.argmin(axis=2)[unit, part]
-        return trials[unit, part, turn], values[unit, part, turn]
-
-    return step
+def assigned(at: int, memory: EvaluatedUnits, mountings: Mountings, _peaks: Peaks) -> Trial:
+    """Return the parts at one place assigned to the units anew, each in its best turn."""
+    units, turns = len(mountings), memory.stock.turns[at]
+    trials = np.broadcast_to(mountings[:, np.newaxis, np.newaxis], (units, units, turns, *mountings.shape[1:]))
+    trials = trials.copy()
+    trials[..., at, 0] = mountings[:, at, 0][:, np.newaxis]
+    trials[..., at, 1] = np.arange(turns)
+    values = memory(trials.reshape(-1, *mountings.shape[1:])).reshape(units, units, turns)
+    unit, part = linear_sum_assignment(np.minimum(values.min(axis=2), _FAILED))
+    turn = values.argmin(axis=2)[unit, part]
+    return trials[unit, part, turn], values[unit, part, turn]
 
 
-def turned(stock: PartStock, mountings: Mountings, _peaks: Peaks) -> Asking[Trial]:
+def turned(memory: EvaluatedUnits, mountings: Mountings, _peaks: Peaks) -> Trial:
     """Return every unit in the best of all mountings of the parts that it has, its sun meshed as it is.
 
     A sun's teeth are tried by `assigned` alone: they would multiply all else.
     """
+    stock = memory.stock
     ways = np.array([units_from(stock, unit[:, 0].tolist(), _turns_but_the_suns(stock, unit)) for unit in mountings])
-    values = (yield ways.reshape(-1, *mountings.shape[1:])).reshape(len(mountings), -1)
+    values = memory(ways.reshape(-1, *mountings.shape[1:])).reshape(len(mountings), -1)
     best = np.arange(len(mountings)), values.argmin(axis=1)
     return ways[best], values[best]
 
@@ -148,9 +140,9 @@ def _turns_but_the_suns(stock: PartStock, unit: Int[np.ndarray, "place 2"]) -> l
     return [[now] if place.kind == "sun" else range(count) for place, count, now in counted]
 
 
-def exchanged(stock: PartStock, mountings: Mountings, peaks: Peaks) -> Asking[Trial]:
+def exchanged(memory: EvaluatedUnits, mountings: Mountings, peaks: Peaks) -> Trial:
     """Return the best exchange of two parts of one kind between two units, each then in its best turn."""
-    trials, pairs = [], []
+    stock, trials, pairs = memory.stock, [], []
     for one, other in combinations(range(len(mountings)), 2):
         for slots in stock.slots:
             for here, there in product(slots, slots):
@@ -158,7 +150,7 @@ def exchanged(stock: PartStock, mountings: Mountings, peaks: Peaks) -> Asking[Tr
                 trials.append(_with(stock, mountings[one], here, int(mountings[other, there, 0])))
                 trials.append(_with(stock, mountings[other], there, int(mountings[one, here, 0])))
     ends = np.cumsum([len(trial) for trial in trials])[:-1]
-    values = np.split((yield np.concatenate(trials)), ends)
+    values = np.split(memory(np.concatenate(trials)), ends)
     least = np.minimum([own.min() for own in values], _FAILED).reshape(-1, 2)
     best = int(np.argmin(least.sum(axis=1) - np.minimum(peaks, _FAILED)[np.array(pairs)].sum(axis=1)))
     found, after = mountings.copy(), peaks.copy()
@@ -230,7 +222,7 @@ def best_mounting(
         found: list[Trial] = [(best, memory(best))]
     else:
         others = (stock.random_mountings(seeds.generator(number)) for number in range(1, starts))
-        found = _together(memory, [_improved(stock, mountings) for mountings in (first, *others)])
+        found = [_improved(memory, mountings) for mountings in (first, *others)]
     mountings, after = min(found, key=lambda own: (float(own[1].mean()), float(own[1].max())))
     memory.require_few_failures(largest_failed_share)
     if not np.isfinite(after).all():
@@ -262,31 +254,16 @@ def random_mounting(stock: PartStock, response: Response, count: int, seeds: See
     )
 
 
-def _together(memory: EvaluatedUnits, searches: Sequence[Asking[Trial]]) -> list[Trial]:
-    """Return what the searches find, each as if it were alone; many units at a time keep all cores busy."""
-    found: dict[int, Trial] = {}
-    asked = {number: next(search) for number, search in enumerate(searches)}
-    while asked:
-        values = memory(np.concatenate(list(asked.values())))
-        ends = np.cumsum([len(trials) for trials in asked.values()])[:-1]
-        for number, own in zip(list(asked), np.split(values, ends), strict=True):
-            try:
-                asked[number] = searches[number].send(own)
-            except StopIteration as end:
-                found[number] = end.value
-                del asked[number]
-    return [found[number] for number in range(len(searches))]
-
-
-def _improved(stock: PartStock, mountings: Mountings) -> Asking[Trial]:
+def _improved(memory: EvaluatedUnits, mountings: Mountings) -> Trial:
     """Return a mounting that no step improves."""
-    peaks, gained = (yield mountings), True
+    places = range(len(memory.stock.places))
+    peaks, gained = memory(mountings), True
     while gained:
         gained = False
-        for step in (*map(assigned, range(len(stock.places))), turned, exchanged):
+        for step in (*(partial(assigned, at) for at in places), turned, exchanged):
             if step is exchanged and gained:  # the dearest step waits until nothing else helps
                 break
-            trial, values = yield from step(stock, mountings, peaks)
+            trial, values = step(memory, mountings, peaks)
             if values.mean() < peaks.mean() - _GAIN:
                 mountings, peaks, gained = trial, values, True
     return mountings, peaks

@@ -14,7 +14,7 @@ from jaxtyping import Float, Int
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import is_angular
-from tolalloc.drawings.table_file import finite_at, read_text_table
+from tolalloc.drawings.table_file import believed_number, read_text_table
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import ARCSECOND, MICROMETRE
 from tolalloc.reducers.equivalent.columns import source_name
@@ -226,8 +226,9 @@ def _deviation(place: str, error: str, cell: str, unit: str) -> float:
     if unit not in allowed:
         raise InputError.at(place, f"unit of {error}", unit, " or ".join(allowed))
     largest = LARGEST_ANGLE if angle else LARGEST_LENGTH
-    stated = f"a number from {-largest:g} to {largest:g} {unit}"
-    return finite_at(place, f"value of {error}", cell, stated, largest) * (ARCSECOND if angle else MICROMETRE)
+    believed = f"a number from {-largest:g} to {largest:g} {unit}"
+    value = believed_number(place, f"value of {error}", cell, largest, believed)
+    return value * (ARCSECOND if angle else MICROMETRE)
 
 
 def drawn_parts(errors: ErrorModel, reducer: Reducer, units: int, seeds: SeedTree) -> tuple[MeasuredPart, ...]:
@@ -238,11 +239,9 @@ def drawn_parts(errors: ErrorModel, reducer: Reducer, units: int, seeds: SeedTre
     A part keeps the zones of the place that it is drawn for, where the drawings of like parts differ. A kind of part
     without any error is left out.
     """
-    uniform = np.concatenate(list(seeds.uniform_chunks(units, len(errors.columns))))
-    rows = errors.deviations(errors.standard_values(uniform), errors.zones)
     places = tuple(place for place in places_of(reducer) if owned_columns(errors.columns, (place,)))
     parts = []
-    for unit, row in enumerate(rows, start=1):
+    for unit, row in enumerate(errors.random_units(units, seeds), start=1):
         deviations = {**errors.fixed, **dict(zip(errors.columns, map(float, row), strict=True))}
         nonzero = {column: value for column, value in deviations.items() if value != 0.0}
         for place in places:

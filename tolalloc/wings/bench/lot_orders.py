@@ -80,11 +80,6 @@ class LotCurves:
         cosine, sine = found.values.reshape(len(x), -1, 2).transpose(2, 0, 1)
         return np.where((found.status == 0)[:, np.newaxis], cosine - 1j * sine, np.nan)
 
-    def random_units(self, units: int, seeds: SeedTree) -> Float[np.ndarray, "unit column"]:
-        """Return the deviations of random units of the drawing [m, angles rad]."""
-        uniform = np.concatenate([*seeds.uniform_chunks(units, len(self.errors.columns))])
-        return self.errors.deviations(self.errors.standard_values(uniform), self.errors.zones)
-
 
 @dataclass(frozen=True, kw_only=True)
 class PredictedOrder:
@@ -159,7 +154,7 @@ def predicted_orders(curves: LotCurves, lots: int, seed: int) -> tuple[Predicted
     lot.
     """
     seeds = SeedTree(seed).child("lot", "curves")
-    made = curves.made(curves.random_units(_UNITS, seeds.child("units")))
+    made = curves.made(curves.errors.random_units(_UNITS, seeds.child("units")))
     made = made[np.isfinite(made).all(axis=1)]
     if len(made) < (1.0 - LARGEST_FAILED_SHARE) * _UNITS:
         raise SolveError(f"{_UNITS - len(made)} of {_UNITS} units of the drawing failed to solve.")
@@ -216,7 +211,7 @@ def with_sources(
     if not any(moved):
         return tuple(orders)
     seeds = SeedTree(seed).child("lot", "sources")
-    x, again = (curves.random_units(_REDRAWN, seeds.child(name)) for name in ("first", "again"))
+    x, again = (curves.errors.random_units(_REDRAWN, seeds.child(name)) for name in ("first", "again"))
     owner, made = np.array(curves.errors.block_of_column), curves.made(x)
     variance, shares = np.nanvar(made, axis=0), dict[str, np.ndarray]()
     for name in dict.fromkeys(owner.tolist()):

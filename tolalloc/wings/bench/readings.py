@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import pi, sqrt
 from pathlib import Path
+from sys import float_info
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -13,7 +14,7 @@ from scipy.interpolate import BSpline, make_lsq_spline
 from scipy.linalg import solveh_banded
 
 from tolalloc.drawings.heads import split_header
-from tolalloc.drawings.table_file import TextTable, finite_at, read_text_table
+from tolalloc.drawings.table_file import TextTable, believed_number, read_text_table
 from tolalloc.exceptions import Faults, InputError
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MICRORADIAN
 
@@ -141,20 +142,15 @@ def column_readings(
     if unit not in known:
         raise InputError.at(table.path, f"the unit of column {header!r}", unit, f"{units} in square brackets")
     position, factor = table.headers.index(header), known[unit]
-    values = np.full(len(table.rows), np.nan)
-    faults = Faults()
+    values, faults = np.full(len(table.rows), np.nan), Faults()
+    allowed = "a number with a decimal point, or nothing where the instrument gave none"
     for number, (row, cells) in enumerate(zip(table.rows, table.cells, strict=True)):
         if cells[position].lower() not in MISSING:
             with faults.kept():
-                values[number] = factor * _reading(cells[position], f"{table.path}, row {row}", header)
+                place = f"{table.path}, row {row}"
+                values[number] = factor * believed_number(place, header, cells[position], float_info.max, allowed)
     faults.require_none()
     return factor, values
-
-
-def _reading(cell: str, place: str, header: str) -> float:
-    """Return the number in a cell."""
-    allowed = "a number with a decimal point, or nothing where the instrument gave none"
-    return finite_at(place, header, cell, allowed)
 
 
 def load_readings(path: Path, along: str, values: str) -> RawReadings:
