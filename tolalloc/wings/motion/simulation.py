@@ -254,14 +254,9 @@ class AtRest:
 class SimulationResult:
     """A simulated reducer: what an engine leaves over time, and the numbers of its steady part."""
 
-    asked: SimulationRequest  # What was asked
-    reducer: Reducer  # Nominal design as simulated
-    speed: float  # Input speed that is reached [rad/s]
-    torque: float  # Torque on the carrier at the end; negative resists the rotation [N·m]
-    mass_damping: float  # Damping over mass [1/s]
+    prepared: PreparedSimulation  # What was asked
     series: TimeSeries  # Over the whole time
     steady: slice  # Time steps of the last whole crank turns under constant speed and load
-    crank_turns: int  # How many these are [-]
     at_rest: AtRest  # The static model beside it
     # Lowest natural frequency over the steady part; none where springs are not linear [Hz]
     natural_frequency: float | None
@@ -270,7 +265,7 @@ class SimulationResult:
     @property
     def engine(self) -> str:
         """Who integrated, one of `ENGINES`."""
-        return self.asked.engine
+        return self.prepared.asked.engine
 
     @property
     def step(self) -> float:
@@ -280,13 +275,18 @@ class SimulationResult:
     @property
     def pin_pass(self) -> float:
         """How often per second a disc passes a pin [Hz]."""
-        stage = self.reducer.cycloid_stage
-        return self.speed / (2 * np.pi) / self.reducer.ratio * stage.disc_teeth * stage.pin_count
+        stage = self.prepared.reducer.cycloid_stage
+        return self._output_turns * stage.disc_teeth * stage.pin_count
+
+    @property
+    def _output_turns(self) -> float:
+        """How often per second the output turns [Hz]."""
+        return self.prepared.speed / (2 * np.pi) / self.prepared.reducer.ratio
 
     @property
     def span(self) -> float:
         """Carrier angle over which the steady part goes [rad]."""
-        return self.crank_turns * 2 * np.pi / self.reducer.cycloid_stage.disc_teeth
+        return self.prepared.crank_turns * 2 * np.pi / self.prepared.reducer.cycloid_stage.disc_teeth
 
     @property
     def output_speed(self) -> float:
@@ -341,7 +341,7 @@ class SimulationResult:
     @property
     def excitations(self) -> dict[str, float]:
         """How often per second the strong orders of the output turn and of the pin pass come by [Hz]."""
-        stage, turn = self.reducer.cycloid_stage, self.speed / (2 * np.pi) / self.reducer.ratio
+        stage, turn = self.prepared.reducer.cycloid_stage, self._output_turns
         orders = {1, stage.disc_teeth, stage.pin_count, 2 * stage.disc_teeth, 2 * stage.pin_count}
         found = {f"order {order}": order * turn for order in sorted(orders)}
         return found | {f"{times} times the pin pass": times * self.pin_pass for times in (1, 2, 3)}
@@ -401,14 +401,9 @@ def simulate(prepared: PreparedSimulation, progress: Progress) -> SimulationResu
     steady = slice(motion.time.size - count, motion.time.size)
     progress.begin("at rest")
     return SimulationResult(
-        asked=asked,
-        reducer=prepared.reducer,
-        speed=prepared.speed,
-        torque=prepared.torque,
-        mass_damping=prepared.mass_damping,
+        prepared=prepared,
         series=series,
         steady=steady,
-        crank_turns=prepared.crank_turns,
         at_rest=_at_rest(prepared, motion, steady),
         natural_frequency=_natural_frequency(prepared, motion, steady),
         seconds=seconds,

@@ -260,7 +260,7 @@ def simulate(
     )
     own = (columns.layout, columns.map, model.design, given)
     for first, angles, tables in steps.parts():
-        advance(first, angles, tables, parts, integrator, motion.step, *own, state, record)
+        advance(samples, first, angles, tables, parts, integrator, motion.step, *own, state, record)
         progress((first + len(angles.stiffness)) / motion.time.size)
     return Simulated(
         time=motion.time,

@@ -212,24 +212,6 @@ def _advance_sample(s, first, angles, tables, parts, integrator, step, layout, m
             _observe(s, record.slot[time], problem, work.compression, x, v, acceleration, record)
 
 
-def advance(
-    first: Any,
-    angles: Any,
-    tables: Any,
-    parts: Any,
-    integrator: Any,
-    step: Any,
-    layout: Any,
-    mapped: Any,
-    design: Any,
-    errors: Any,
-    state: Any,
-    record: Any,
-) -> None:
-    """Take all samples through the steps of the tables, the first of which is number ``first``."""
-
-    def take(part: slice) -> None:
-        given = (first, angles, tables, parts, integrator, step, layout, mapped, design, errors)
-        _advance_sample(part.start, *given, state, record)
-
-    in_threads(take, errors.shape[0], 1)
+def advance(samples: int, *given: Any) -> None:
+    """Take all samples through the steps of some tables; given is what `_advance_sample` takes of every one."""
+    in_threads(lambda part: _advance_sample(part.start, *given), samples, 1)

@@ -48,8 +48,8 @@ class SimulationTeller(Teller[SimulationResult]):
         return _say(
             "subtitle",
             unit=self.header.name,
-            speed=found.speed / RPM,
-            torque=found.torque,
+            speed=found.prepared.speed / RPM,
+            torque=found.prepared.torque,
             engine=found.engine,
             steps=found.series.time.size - 1,
             step=found.step,
@@ -66,7 +66,9 @@ class SimulationTeller(Teller[SimulationResult]):
         return (
             _say(
                 "turns",
-                turns=_say("more_turns", count=found.crank_turns) if found.crank_turns > 1 else _say("one_turn"),
+                turns=_say("more_turns", count=found.prepared.crank_turns)
+                if found.prepared.crank_turns > 1
+                else _say("one_turn"),
                 begins=found.series.time[found.steady.start - 1],
                 output_speed=found.output_speed / RPM,
                 ratio=found.ratio,
@@ -88,7 +90,7 @@ class SimulationTeller(Teller[SimulationResult]):
     @property
     def _contact(self) -> str:
         """What the pin contacts are."""
-        stiffness, stage = self.result.reducer.stiffness, self.result.reducer.cycloid_stage
+        stiffness, stage = self.result.prepared.reducer.stiffness, self.result.prepared.reducer.cycloid_stage
         if stiffness.pin_contact_law == "logarithmic":
             return _say("steel", width=stage.face_width * 1e3)
         return _say("constant", stiffness=stiffness.pin_contact, law=stiffness.pin_contact_law)
@@ -122,12 +124,12 @@ class SimulationTeller(Teller[SimulationResult]):
     @property
     def assumptions(self) -> tuple[str, ...]:
         """What neither the files of reducer and unit print nor any source of masses, damping and load."""
-        asked, prototype = self.result.asked, self.result.engine == _PROTOTYPE
+        asked, prototype = self.result.prepared.asked, self.result.engine == _PROTOTYPE
         damping = _say(
             "damping",
             stiffness=asked.damping,
             stiffened="bearings" if prototype else "meshes and bearings",
-            mass=self.result.mass_damping,
+            mass=self.result.prepared.mass_damping,
             damped="the carrier's rotation alone" if prototype else "every part",
         )
         return (
@@ -161,11 +163,11 @@ class SimulationTeller(Teller[SimulationResult]):
         return {
             "reducer": self.header.model,
             "unit": self.header.name,
-            "input speed [rpm]": found.speed / RPM,
-            "torque on the carrier [N·m]": found.torque,
+            "input speed [rpm]": found.prepared.speed / RPM,
+            "torque on the carrier [N·m]": found.prepared.torque,
             "duration [s]": float(found.series.time[-1]),
             "step [s]": found.step,
-            "crank turns of the steady part [-]": found.crank_turns,
+            "crank turns of the steady part [-]": found.prepared.crank_turns,
             "input power [W]": found.input_power,
             "output power [W]": found.output_power,
             "pin pass [Hz]": found.pin_pass,
@@ -291,7 +293,7 @@ def run_figures(found: SimulationResult) -> tuple[Figure, ...]:
 def error_figure(found: Mapping[str, SimulationResult], passes: int | None = None) -> Figure:
     """Return the transmission error over the last pin passes of the steady part, of several engines and at rest."""
     first = next(iter(found.values()))
-    stage = first.reducer.cycloid_stage
+    stage = first.prepared.reducer.cycloid_stage
     shown = (np.inf if passes is None else passes) * 360.0 / (stage.disc_teeth * stage.pin_count)
     curves = [(label, result, result.transmission_error) for label, result in found.items()]
     curves.append(("at rest", first, first.at_rest.transmission_error))
