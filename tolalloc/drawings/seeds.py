@@ -10,19 +10,11 @@ from zlib import crc32
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.exceptions import InputError
-
 CHUNK = 1024
 """Samples per chunk; a chunk's numbers depend on its index alone, so executors and chunk order do not matter."""
 
 _SOBOL_BITS = 32
 """Bits of a Sobol' number, as many as scipy can skip chunks with [-]."""
-
-
-def require_seed(work: str, seed: int) -> None:
-    """Raise unless a seed is 0 or a positive integer."""
-    if seed < 0:
-        raise InputError.of_argument(work, "seed", seed, "0 or a positive integer")
 
 
 class SamplingDesign(StrEnum):

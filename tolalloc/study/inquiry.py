@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar, get_args, get_type_hints
 
 from tolalloc.exceptions import InputError
-from tolalloc.reading.named_fields import NamedFields, is_number
+from tolalloc.reading.named_fields import NamedFields, is_number, whole
 from tolalloc.running.progress import SILENT, Progress
 from tolalloc.study.answer import Answer
 
@@ -53,6 +53,7 @@ Neglected = Annotated[
     Word("Sources that the table may leave out, a pattern such as '*', beside those that it may anyway; repeatable."),
 ]
 
+Seed = Annotated[int, Word("Seed of every random number."), whole("0 or a positive integer", 0)]
 ProcessesName = Annotated[str, Word("Process capability library that rows of the table may name: shipped name or CSV.")]
 
 

@@ -61,11 +61,11 @@ def alarms(curves: LotCurves, x: np.ndarray, rng: np.random.Generator) -> int:
 def test_unmoved_lots_raise_no_more_alarms_and_a_housing_of_twice_the_second_wave_is_found():
     rng = np.random.default_rng(5)
     curves = curves_at(None)  # at 1 N·m all orders are far above what the bench adds
-    count = alarms(curves, curves.random_units(LOTS * UNITS, SeedTree(31)), rng)
+    count = alarms(curves, curves.errors.random_units(LOTS * UNITS, SeedTree(31)), rng)
     # Beyond this count a rate of 5 % is refuted with 99.9 % confidence; far below 10 of 200 the tests would be blunt.
     assert 1 <= count <= stats.binom.isf(0.001, LOTS, LEVEL), count
     curves = curves_at(-167.0)
-    x = curves.random_units(LOTS * UNITS, SeedTree(32))
+    x = curves.errors.random_units(LOTS * UNITS, SeedTree(32))
     x[:, [curves.errors.columns.index(f"housing.pitch.{wave}2") for wave in ("cos", "sin")]] *= 2.0
     count = alarms(curves, x, rng)
     assert count >= 0.95 * LOTS, count
@@ -93,7 +93,7 @@ def standing_in() -> LotCurves:
 
 def test_with_sources_tells_the_sources_of_a_moved_order_alone():
     curves = standing_in()
-    wide = curves.made(1.6 * curves.random_units(UNITS, SeedTree(3)))
+    wide = curves.made(1.6 * curves.errors.random_units(UNITS, SeedTree(3)))
     orders = judged_orders(replace(curves, waves=wide), predicted_orders(curves, 2**14, 1))
     # The mean square of 25 such waves is that of 50 normal numbers.
     for own, variance in zip(orders, (5.0, 1.0), strict=True):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawings.seeds import SeedTree, require_seed
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.running.progress import RunRecord
 from tolalloc.wings.assembly.control import regulator
@@ -121,7 +121,6 @@ def prepare_assembly(
 
     The precision is Q in place of the chain's own [-].
     """
-    require_seed("assembly", seed)
     if precision is not None and not 0 <= precision <= LARGEST_STATE_WEIGHT:
         raise InputError.of_argument("assembly", "precision", precision, f"0 to {LARGEST_STATE_WEIGHT:g}")
     plan = load_plan(chain)

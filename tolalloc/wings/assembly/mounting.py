@@ -7,7 +7,7 @@ of different units is exchanged. A step is taken only if it lowers the mean over
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import combinations, permutations, product
@@ -18,7 +18,7 @@ from jaxtyping import Float, Int
 from scipy.optimize import linear_sum_assignment
 
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
-from tolalloc.drawings.seeds import SeedTree, require_seed
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Response
 from tolalloc.reducers.equivalent.model import EquivalentModel
@@ -33,11 +33,10 @@ _FAILED = 1e9
 
 Peaks = Float[np.ndarray, " _unit"]
 Trial = tuple[Mountings, Peaks]
+Step = Callable[["EvaluatedUnits", Mountings, Peaks], Trial]
 
 _GAIN = 1e-9
 """Gain in the mean from which a step counts, above the rounding of a sum [arcsec]."""
-
-MOST_STARTS = 64
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -256,11 +255,11 @@ def random_mounting(stock: PartStock, response: Response, count: int, seeds: See
 
 def _improved(memory: EvaluatedUnits, mountings: Mountings) -> Trial:
     """Return a mounting that no step improves."""
-    places = range(len(memory.stock.places))
+    steps: list[Step] = [*(partial(assigned, at) for at in range(len(memory.stock.places))), turned, exchanged]
     peaks, gained = memory(mountings), True
     while gained:
         gained = False
-        for step in (*(partial(assigned, at) for at in places), turned, exchanged):
+        for step in steps:
             if step is exchanged and gained:  # the dearest step waits until nothing else helps
                 break
             trial, values = step(memory, mountings, peaks)
@@ -287,9 +286,6 @@ def prepare_mounting(
 
     The torque on the carrier is the reducer's test torque unless given, negative where it resists the rotation [N·m].
     """
-    require_seed("mounting", seed)
-    if not 1 <= starts <= MOST_STARTS:
-        raise InputError.of_argument("mounting", "starts", starts, f"1 to {MOST_STARTS}")
     design = load_reducer(reducer)
     torque = design.torque_on_carrier(torque_nm, "mounting")
     model, measured = EquivalentModel(at_torque(design, torque)), load_parts(parts, design)

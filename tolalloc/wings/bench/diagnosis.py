@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawings.error_model import ErrorModel
-from tolalloc.drawings.seeds import SeedTree, require_seed
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reading.units import ARCSECOND, DEGREE
 from tolalloc.reducers.choice import bind
@@ -219,26 +219,18 @@ class DiagnosisRequest:
         ):
             if not good:
                 raise InputError.of_argument(PLACE, name, getattr(self, name), allowed)
-        require_seed(PLACE, self.seed)
 
 
 @dataclass(frozen=True, kw_only=True)
 class DiagnosisResult:
     """A diagnosed unit."""
 
-    # Its nominal design, and the torque on the carrier at which it was measured [N·m]
-    reducer: Reducer
-    torque: float
-    errors: ErrorModel  # What the drawings say of its parts
+    request: DiagnosisRequest  # What was asked
     assumed: tuple[str, ...]  # What binding the drawings to the reducer assumes
-    curve: MeasuredCurve  # Its cleaned curve
+    curve: MeasuredCurve  # Its cleaned curve, and the torque on the carrier at which it was measured
     noise: Noise  # What separates a reading from the model
-    level: float  # Probability that the named sources must have of containing the dominant one [-]
     diagnosis: Diagnosis  # What was found
-    # What may be done with it, and what to do; None if no prices were given, the latter also if nothing explains the
-    # curve
-    repair: Repair | None = None
-    advice: Advice | None = None
+    advice: Advice | None = None  # What to do with it; None if no prices were given, or nothing explains the curve
 
 
 def diagnose_unit(request: DiagnosisRequest, record: RunRecord) -> DiagnosisResult:
@@ -268,14 +260,10 @@ def diagnose_unit(request: DiagnosisRequest, record: RunRecord) -> DiagnosisResu
             progress.begin("worth of the next reading")
             advice = advised(kernel, errors, found.deviations, repair, seeds.child("repair").generator())
     return DiagnosisResult(
-        reducer=request.reducer,
-        torque=kernel.torque,
-        errors=errors,
+        request=request,
         assumed=assumed,
         curve=curve,
         noise=noise,
-        level=request.level,
         diagnosis=found,
-        repair=repair,
         advice=advice,
     )

@@ -8,7 +8,7 @@ from math import isfinite
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.drawings.seeds import SeedTree, require_seed
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.reducer.design import Reducer
@@ -63,7 +63,6 @@ class IdentificationRequest:
         for name in names:
             if names.count(name) > 1:
                 raise InputError.of_argument(place, "parameters", name, "each parameter once")
-        require_seed(place, self.seed)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,7 +17,6 @@ from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.fields import UNITS
 from tolalloc.drawings.heads import split_header
 from tolalloc.drawings.measured_parts import LARGEST_DEVIATION
-from tolalloc.drawings.seeds import require_seed
 from tolalloc.drawings.sources import Source, known_as
 from tolalloc.drawings.table_file import TextTable, read_table_file, read_text_table
 from tolalloc.drawings.zones import Feature
@@ -41,10 +40,6 @@ FOUND = 0.95
 """Probability with which a shift is found that is called detectable [-]."""
 FEWEST_READINGS = 5
 """Fewest readings of a column; the spread of fewer is hardly known [-]."""
-LEVELS = (0.001, 0.5)
-"""Smallest and largest false-alarm rate that is believed [-]."""
-MOST_NEXT = 10_000
-"""Most parts of the next sample [-]."""
 WORDS = ("part", "unit", "note")
 """Columns of a file of readings that are no readings, and are not read."""
 ERROR = "gauge"
@@ -197,14 +192,12 @@ class LotRequest:
 class LotResult:
     """What a lot shows."""
 
-    stated: Drawing  # What the parts were made to
-    drawing: Drawing  # The same with Cp and shift of the lot
+    request: LotRequest  # What was asked
+    drawing: Drawing  # The drawing of the parts with Cp and shift of the lot
     processes: tuple[MeasuredProcess, ...]  # One per column, in the order of the file
     capabilities: tuple[LotCapability, ...]  # One per source
     rows: int  # Measured parts or units [-]
-    level: float  # False-alarm rate over all columns and orders [-]
     lots: int  # Simulated lots of a process that is not normal, fewer where lots are very large [-]
-    curves: LotCurves | None = None  # Of units of the lot; None where none were measured
     orders: tuple[LotOrder, ...] = ()  # Of the curves
 
     @property
@@ -223,7 +216,7 @@ class LotResult:
         if not normal:
             return float("nan")
         tests = 2 * len(self.processes) + len(self.orders)
-        errors = ndtri(1.0 - self.level / (2.0 * tests)) + ndtri(FOUND)
+        errors = ndtri(1.0 - self.request.level / (2.0 * tests)) + ndtri(FOUND)
         return max(float(errors * (own.seen / own.deviation) / sqrt(own.law.parts)) for own in normal)
 
 
@@ -237,12 +230,6 @@ def prepare_lot(
     InputError, UnknownNameError
         The file, row, column and value that are not allowed, or the argument.
     """
-    least, most = LEVELS
-    if not least <= level <= most:
-        raise InputError.of_argument("lot", "false_alarms", level, f"{least:g} to {most:g}")
-    if next_parts is not None and not 2 <= next_parts <= MOST_NEXT:
-        raise InputError.of_argument("lot", "next_parts", next_parts, f"2 to {MOST_NEXT}")
-    require_seed("lot", seed)
     drawing = drawing.with_sources(_measured_places(path, drawing.sources))
     columns = load_lot(path, drawing.sources)
     return LotRequest(
@@ -462,14 +449,12 @@ def judge_lot(request: LotRequest, lots: Lots | None = None) -> LotResult:
     )
     capabilities = tuple(_capability(source, own, lots) for source, own in _by_source(request.columns))
     return LotResult(
-        stated=request.drawing,
+        request=request,
         drawing=request.drawing.with_sources([own.row for own in capabilities], request.path.name),
         processes=processes,
         capabilities=capabilities,
         rows=max(column.values.size for column in request.columns),
-        level=request.level,
         lots=lots.count,
-        curves=curves,
         orders=with_sources(curves, orders, rejected[tests:].tolist(), request.seed) if curves else (),
     )
 

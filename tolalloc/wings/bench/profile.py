@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from scipy.optimize import brentq
 
 from tolalloc.drawings.seeds import SeedTree
@@ -208,23 +208,22 @@ class ParameterChoice:
     parameters: tuple[Parameter, ...]  # What is fitted; nothing is the reducer as it was given
     left: Float[np.ndarray, " datum"]  # Residual of every reading after the fit to all units [rad]
     unseen: Float[np.ndarray, " datum"]  # Residual of every reading after the fit to all units but its own [rad]
-    noise: Float[np.ndarray, " datum"]  # Standard deviation of every reading [rad]
-    unit: Int[np.ndarray, " datum"]  # Unit of every reading [-]
+    data: AllReadings  # The readings
 
     @property
     def by_unit(self) -> Float[np.ndarray, " unit"]:
         """Mean squared unseen residual over noise of each unit [-]."""
-        square = (self.unseen / self.noise) ** 2
-        return np.array([square[self.unit == unit].mean() for unit in np.unique(self.unit)])
+        square = (self.unseen / self.data.noise) ** 2
+        return np.array([square[self.data.unit == unit].mean() for unit in self.data.units])
 
     @property
     def score(self) -> float:
         """Root of the mean over units of the squared unseen residual over noise [-]."""
         return float(np.sqrt(self.by_unit.mean()))
 
-    def rms(self, data: AllReadings, kind: str, *, unseen: bool) -> float:
+    def rms(self, kind: str, *, unseen: bool) -> float:
         """Return the root-mean-square residual of one kind of reading, of seen or of unseen units [rad]."""
-        values = (self.unseen if unseen else self.left)[data.rows(kind)]
+        values = (self.unseen if unseen else self.left)[self.data.rows(kind)]
         return float(np.sqrt((values**2).mean()))
 
 
@@ -242,7 +241,7 @@ def judged(problem: IdentificationProblem, surrogate: Surrogate, parameters: Seq
         weight[unit] = 0.0
         rows = data.unit == unit
         unseen[rows] = _left(asked, _fit(replace(asked, weight=weight)))[rows]
-    return ParameterChoice(parameters=own, left=everywhere, unseen=unseen, noise=data.noise, unit=data.unit)
+    return ParameterChoice(parameters=own, left=everywhere, unseen=unseen, data=data)
 
 
 def _fit(problem: IdentificationProblem) -> Float[np.ndarray, " parameter"]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 from tolalloc.reports.header import Header
 from tolalloc.running.progress import Progress, RunRecord
 from tolalloc.study.answer import Answer
-from tolalloc.study.inquiry import Inquiry, Word
+from tolalloc.study.inquiry import Inquiry, Seed, Word
 
 if TYPE_CHECKING:
     from tolalloc.wings.assembly.adjustment import AssemblyRequest, AssemblyResult
@@ -29,7 +29,7 @@ class Assemble(Inquiry["AssemblyRequest"]):
     precision: Annotated[float | None, Word("Weight of the final angles against effort, in place of the chain's.")] = (
         None
     )
-    seed: Annotated[int, Word("Seed of every random number.")] = 1
+    seed: Seed = 1
 
     def prepare(self) -> AssemblyRequest:
         """Return the assembly with its files read and checked."""

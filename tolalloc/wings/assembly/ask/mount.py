@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
+from tolalloc.reading.named_fields import whole
 from tolalloc.reports.header import Header
 from tolalloc.running.progress import Progress, RunRecord
 from tolalloc.study.answer import Answer
-from tolalloc.study.inquiry import Inquiry, ReducerName, TestTorque, Word
+from tolalloc.study.inquiry import Inquiry, ReducerName, Seed, TestTorque, Word
 
 if TYPE_CHECKING:
     from tolalloc.wings.assembly.mounting import MountingRequest, MountingResult
@@ -27,8 +28,8 @@ class Mount(Inquiry["MountingRequest"]):
     parts: Annotated[Path, Word("CSV: columns part, kind, error, value, unit (µm or arcsec).")]
     reducer: ReducerName = None
     torque: TestTorque = None
-    starts: Annotated[int, Word("Mountings from which several units are improved.")] = 4
-    seed: Annotated[int, Word("Seed of every random number.")] = 1
+    starts: Annotated[int, Word("Mountings from which several units are improved."), whole("1 to 64", 1, 64)] = 4
+    seed: Seed = 1
 
     def prepare(self) -> MountingRequest:
         """Return the parts and what is to be small."""

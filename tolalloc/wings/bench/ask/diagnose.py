@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from tolalloc.reports.header import Header
 from tolalloc.running.progress import Progress, RunRecord
 from tolalloc.study.answer import Answer
-from tolalloc.study.inquiry import Inquiry, Neglected, ProcessesName, ReducerName, StiffnessName, TestTorque, Word
+from tolalloc.study.inquiry import Inquiry, Neglected, ProcessesName, ReducerName, Seed, StiffnessName, TestTorque, Word
 
 if TYPE_CHECKING:
     from tolalloc.wings.bench.diagnosis import DiagnosisRequest, DiagnosisResult
@@ -42,7 +42,7 @@ class Diagnose(Inquiry["DiagnosisRequest"]):
     repair: Annotated[
         Path | None, Word("TOML: limit, prices of scrap and new parts, gauge minutes; then also what to measure next.")
     ] = None
-    seed: Annotated[int, Word("Seed of every random number.")] = 1
+    seed: Seed = 1
 
     def prepare(self) -> DiagnosisRequest:
         """Return which unit is to be diagnosed, against which drawings."""

@@ -12,7 +12,7 @@ from tolalloc.exceptions import InputError
 from tolalloc.reports.header import Header
 from tolalloc.running.progress import Progress
 from tolalloc.study.answer import Answer
-from tolalloc.study.inquiry import Inquiry, ReducerName, Word
+from tolalloc.study.inquiry import Inquiry, ReducerName, Seed, Word
 
 if TYPE_CHECKING:
     from tolalloc.reducers.reducer.design import Reducer
@@ -60,7 +60,7 @@ class Identify(Inquiry["tuple[Reducer, IdentificationRequest | None, Measurement
         bool,
         Word("Instead of units: the rigidity in [catalogue], one factor on all bearings.", option="--catalogue"),
     ] = False
-    seed: Annotated[int, Word("Seed of every random number.")] = 1
+    seed: Seed = 1
     write_to: Annotated[
         Path | None, Word("Stiffness file to write, new, for --stiffness elsewhere.", option="--write")
     ] = None

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from tolalloc.exceptions import InputError
+from tolalloc.reading.named_fields import number, or_none, whole
 from tolalloc.reports.header import Header
 from tolalloc.running.progress import Progress, RunRecord
 from tolalloc.study.answer import Answer
-from tolalloc.study.inquiry import Inquiry, Neglected, ProcessesName, ReducerName, StiffnessName, TestTorque, Word
+from tolalloc.study.inquiry import Inquiry, Neglected, ProcessesName, ReducerName, Seed, StiffnessName, TestTorque, Word
 
 if TYPE_CHECKING:
     from tolalloc.drawings.drawing import Drawing
@@ -32,9 +33,15 @@ class Lot(Inquiry["LotRequest"]):
     tolerances: Annotated[Path, Word("Tolerance table of the drawing: shipped name, CSV or XLSX.")]
     sheet: Annotated[str, Word("Sheet of a workbook that holds the table; the first unless given.")] = ""
     processes: ProcessesName = "generic"
-    false_alarms: Annotated[float, Word("Probability that any process is called moved if none is.")] = 0.05
+    false_alarms: Annotated[
+        float,
+        Word("Probability that any process is called moved if none is."),
+        number("0.001 to 0.5", least=0.001, most=0.5),
+    ] = 0.05
     next_parts: Annotated[
-        int | None, Word("Parts of the next sample, for its control limits; as many as now unless given.")
+        int | None,
+        Word("Parts of the next sample, for its control limits; as many as now unless given."),
+        or_none(whole("2 to 10000", 2, 10_000)),
     ] = None
     write_to: Annotated[
         Path | None, Word("Tolerance table to write, new: Cp and shift of the lot.", option="--write")
@@ -45,10 +52,14 @@ class Lot(Inquiry["LotRequest"]):
     reducer: ReducerName = None
     neglected: Neglected = None
     torque: TestTorque = None
-    noise: Annotated[float, Word("Standard deviation of one reading [arcsec].")] = 0.5
-    discrepancy: Annotated[float, Word("Standard deviation of what the model leaves out [arcsec].")] = 0.5
+    noise: Annotated[
+        float, Word("Standard deviation of one reading [arcsec]."), number("above 0 up to 60", above=0, most=60)
+    ] = 0.5
+    discrepancy: Annotated[
+        float, Word("Standard deviation of what the model leaves out [arcsec]."), number("0 to 60", least=0, most=60)
+    ] = 0.5
     stiffness: StiffnessName = ""
-    seed: Annotated[int, Word("Seed of every random number.")] = 1
+    seed: Seed = 1
 
     def with_reducer(self, *written: Path | None, argument: str = "reducer") -> Self:
         """Return it with the default reducer if there are curves, which alone ask for one."""
@@ -73,14 +84,9 @@ class Lot(Inquiry["LotRequest"]):
         """Return the curves and the model that predicts them."""
         from tolalloc.reading.units import ARCSECOND
         from tolalloc.reducers.choice import reducer
-        from tolalloc.wings.bench.diagnosis import LARGEST_NOISE
         from tolalloc.wings.bench.lot_orders import load_lot_curves
         from tolalloc.wings.bench.posterior import Noise
 
-        if not 0.0 < self.noise <= LARGEST_NOISE:
-            raise InputError.of_argument("lot", "noise", self.noise, f"above 0 up to {LARGEST_NOISE:g}")
-        if not 0.0 <= self.discrepancy <= LARGEST_NOISE:
-            raise InputError.of_argument("lot", "discrepancy", self.discrepancy, f"0 to {LARGEST_NOISE:g}")
         own, left_out = self.reducer, self.neglected or ()
         choice = reducer(str(own), stiffness=self.stiffness, torque=self.torque, neglected=left_out)
         choice = choice.set_to(drawing.settings)

@@ -57,7 +57,7 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
     def _sources(self) -> Table[int]:
         """What the gauge of every source would show, the likeliest to dominate first."""
         found = self.result.diagnosis
-        zones = np.array([source.zone for source in self.result.errors.active])
+        zones = np.array([source.zone for source in self.result.request.errors.active])
         shown = np.stack([found.reading_mean, *found.reading_interval]) / MICROMETRE
         columns = {
             "source": found.sources,
@@ -73,7 +73,7 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
     def _columns(self) -> Table[int]:
         """Every column with its interval."""
         found = self.result.diagnosis
-        levers = [source.lever for source in self.result.errors.active for _ in source.columns]
+        levers = [source.lever for source in self.result.request.errors.active for _ in source.columns]
         scale = np.array(levers) / MICROMETRE
         low, high = found.column_interval * scale
         shown = {"mean [µm]": found.deviations.mean(axis=0) * scale, "low 2.5 % [µm]": low, "high 97.5 % [µm]": high}
@@ -113,8 +113,8 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
     @property
     def subtitle(self) -> str:
         """How it was measured."""
-        sources = len(self.result.errors.active)
-        return _say("subtitle", reducer=self.header.model, torque=self.result.torque, sources=sources)
+        sources = len(self.result.request.errors.active)
+        return _say("subtitle", reducer=self.header.model, torque=self.result.curve.torque, sources=sources)
 
     @cached_property
     def sentences(self) -> tuple[str, ...]:
@@ -130,7 +130,7 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
         reading, low, high = alike(*(first[name] for name in _ENDS), figures=2)
         pairs = "; ".join(_say("pair", one=one, other=other) for one, other in found.twins)
         return (
-            _say("likely", measured=measured, level=self.result.level, likely=likely),
+            _say("likely", measured=measured, level=self.result.request.level, likely=likely),
             _say("first", source=first["source"], reading=reading, low=low, high=high, zone=first["zone [µm]"]),
             *((_say("twins", pairs=pairs),) if pairs else ()),
             *(
@@ -154,7 +154,7 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
         """What no source states."""
         noise = self.result.noise
         return (
-            *self.result.reducer.assumptions,
+            *self.result.request.reducer.assumptions,
             _say("assume_noise", reading=noise.reading / ARCSECOND),
             _say(
                 "assume_discrepancy", discrepancy=noise.discrepancy / ARCSECOND, angle=noise.correlation_angle / DEGREE
@@ -172,13 +172,13 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
         return {
             "unit": self.header.name,
             "reducer": self.header.model,
-            "torque [N·m]": self.result.torque,
+            "torque [N·m]": self.result.curve.torque,
             "seed": self.header.seed,
             "explained": found.fit.explained,
             "mean sum of squared residuals [-]": found.fit.chi_square,
             "expected [-]": found.fit.freedom,
             "named": list(found.named),
-            "level [-]": self.result.level,
+            "level [-]": self.result.request.level,
             "sources": self._sources.records(),
             "twins": [list(pair) for pair in found.twins],
             "not told apart": [list(group.sources) for group in found.groups],

@@ -146,7 +146,7 @@ class IdentificationTeller(Teller[IdentificationResult]):
             return _say("too_few_for_all", units=self._units)
 
         def left(item: ParameterChoice, *, unseen: bool) -> float:
-            return item.rms(self.result.data, PEAK_TO_PEAK, unseen=unseen) / ARCSECOND
+            return item.rms(PEAK_TO_PEAK, unseen=unseen) / ARCSECOND
 
         each = {"given": given, "bias": constant, "fit": whole}
         unseen = {name: left(item, unseen=True) for name, item in each.items()}
@@ -207,8 +207,8 @@ class IdentificationTeller(Teller[IdentificationResult]):
                 {
                     "fitted": choice_name(item),
                     "left out [noise]": item.score,
-                    "rms [arcsec]": {kind: item.rms(data, kind, unseen=False) / ARCSECOND for kind in kinds},
-                    "rms left out [arcsec]": {kind: item.rms(data, kind, unseen=True) / ARCSECOND for kind in kinds},
+                    "rms [arcsec]": {kind: item.rms(kind, unseen=False) / ARCSECOND for kind in kinds},
+                    "rms left out [arcsec]": {kind: item.rms(kind, unseen=True) / ARCSECOND for kind in kinds},
                 }
                 for item in own.choices
             ],
@@ -320,7 +320,7 @@ class IdentificationTeller(Teller[IdentificationResult]):
         def rms(kind: str, *, unseen: bool) -> Column[ParameterChoice]:
             return Column(
                 f"{kind}, {'units left out, ' if unseen else ''}rms [arcsec]",
-                lambda row: row.rms(data, kind, unseen=unseen) / ARCSECOND,
+                lambda row: row.rms(kind, unseen=unseen) / ARCSECOND,
             )
 
         columns: tuple[Column[ParameterChoice], ...] = (

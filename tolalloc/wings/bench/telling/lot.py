@@ -114,7 +114,7 @@ class LotTeller(Teller[LotResult]):
     @cached_property
     def sentences(self) -> tuple[str, ...]:
         """What moved, what could have been seen, and which zone is kept least."""
-        moved, count, level = self.result.moved, len(self.result.processes), self.result.level * 100.0
+        moved, count, level = self.result.moved, len(self.result.processes), self.result.request.level * 100.0
         first = [_say("unmoved", columns=count, level=level)]
         if moved:
             more = f"; and {len(moved) - _NAMED} more" if len(moved) > _NAMED else ""
@@ -126,9 +126,9 @@ class LotTeller(Teller[LotResult]):
     def _curves(self) -> tuple[str, ...]:
         """Which orders of the curves moved, and what makes them."""
         found = self.result.orders
-        if not self.result.curves:
+        if not self.result.request.curves:
             return ()
-        said = {"orders": len(found), "units": len(self.result.curves.waves)}
+        said = {"orders": len(found), "units": len(self.result.request.curves.waves)}
         moved = sorted((own for own in found if own.moved), key=lambda own: own.probability)
         if not moved:
             return (_say("orders_unmoved", **said),)
@@ -162,7 +162,7 @@ class LotTeller(Teller[LotResult]):
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """What a reader must know before acting on it."""
-        rows, curves = self.result.capabilities, self.result.curves
+        rows, curves = self.result.capabilities, self.result.request.curves
         return (
             *(_say("warn_far", source=own.source.name, count=own.far, parts=own.parts) for own in rows if own.far),
             *(
@@ -173,14 +173,14 @@ class LotTeller(Teller[LotResult]):
             *((_say("warn_failed", failed=self.header.failed),) if curves and self.header.failed else ()),
             *(curves.model.mismatches if curves else ()),
             *(_say("warn_repaired", repair=own) for own in (curves.repairs if curves else ())),
-            *self.result.stated.notes,
+            *self.result.request.drawing.notes,
         )
 
     @property
     def _assumed_of_curves(self) -> tuple[str, ...]:
-        if not self.result.curves:
+        if not self.result.request.curves:
             return ()
-        noise, torque = self.result.curves.discrepancy, self.result.curves.model.kernel.torque
+        noise, torque = self.result.request.curves.discrepancy, self.result.request.curves.model.kernel.torque
         errs = {"reading": noise.reading / ARCSECOND, "discrepancy": noise.discrepancy / ARCSECOND}
         return (_say("assume_curves", torque=torque, angle=noise.correlation_angle / DEGREE, **errs),)
 
@@ -192,7 +192,7 @@ class LotTeller(Teller[LotResult]):
         return (
             *((_say("assume_fit"),) if any(normal) else ()),
             *(() if all(normal) else (_say("assume_simulated", lots=self.result.lots),)),
-            _say("assume_holm", level=self.result.level * 100.0),
+            _say("assume_holm", level=self.result.request.level * 100.0),
             _say("assume_gauge_errs", names=", ".join(erring)) if erring else _say("assume_gauge"),
             *self._assumed_of_curves,
             *self.header.assumptions,
@@ -229,7 +229,7 @@ class LotTeller(Teller[LotResult]):
             for heading, said, name, frame in shown
         )
         process = replace(process, figures=(self._shift_figure, self._spread_figure))
-        return (process, *((orders,) if self.result.curves else ()), *others)
+        return (process, *((orders,) if self.result.request.curves else ()), *others)
 
     @property
     def terminal(self) -> tuple[tuple[pd.DataFrame, str], ...]:
@@ -241,7 +241,7 @@ class LotTeller(Teller[LotResult]):
         orders = ((self._orders.terminal(), _say("terminal_orders", lot=self.header.name)),)
         return (
             (processes.terminal(), _say("terminal_processes", lot=self.header.name)),
-            *(orders if self.result.curves else ()),
+            *(orders if self.result.request.curves else ()),
             (capabilities.terminal(), _say("terminal_capability", lot=self.header.name)),
         )
 
@@ -252,13 +252,13 @@ class LotTeller(Teller[LotResult]):
             "lot": self.header.name,
             "drawing": self.header.model,
             "measured [-]": self.result.rows,
-            "false-alarm rate [-]": self.result.level,
+            "false-alarm rate [-]": self.result.request.level,
             "moved": [own.name for own in self.result.moved],
             "shift found with 95 % probability [σ]": self.result.detectable,
             "processes": self._processes.records(),
             "capability": self._capabilities.records(),
             "control limits": self._limits.records(),
-            **({"orders of the curves": self._orders.records()} if self.result.curves else {}),
+            **({"orders of the curves": self._orders.records()} if self.result.request.curves else {}),
             "seed": self.header.seed,
             "warnings": list(self.warnings),
         }
