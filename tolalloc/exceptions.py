@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -91,6 +91,12 @@ class UnknownNameError(TolallocError):
         """Name the unknown, the kind of thing it should be, and the nearest known names."""
         names, name = sorted(known), in_short(name)
         return cls(f"{place}: {what} {name!r} is not known; {_what_is_known(name, names)}.")
+
+    @classmethod
+    def require(cls, place: Path | str, what: str, name: str, known: Collection[str]) -> None:
+        """Raise unless a name is known."""
+        if name not in known:
+            raise cls.among(place, what, name, known)
 
 
 def _what_is_known(name: str, names: Sequence[str]) -> str:

@@ -117,8 +117,7 @@ def schema(kind: str) -> dict[str, Any]:
     UnknownNameError
         There is no such kind.
     """
-    if kind not in KINDS:
-        raise UnknownNameError.among("schema", "kind", kind, KINDS)
+    UnknownNameError.require("schema", "kind", kind, KINDS)
     record = KINDS[kind]()
     found = record.model_json_schema(by_alias=True)
     for table in (found, *found.get("$defs", {}).values()):
@@ -141,8 +140,7 @@ class Likeness:
 
     def __post_init__(self) -> None:
         presets = [preset for own in FAMILIES.values() for preset in own.new.presets]
-        if self.preset not in presets:
-            raise UnknownNameError.among("new reducer", "preset", self.preset, presets)
+        UnknownNameError.require("new reducer", "preset", self.preset, presets)
         for name, count, allowed in (("cranks", self.cranks, self.new.cranks), ("discs", self.discs, self.new.discs)):
             if count is not None and count not in allowed:
                 said = f"{allowed[0]} to {allowed[-1]}" if allowed else f"nothing: a {self.family} has none"

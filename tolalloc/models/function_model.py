@@ -113,13 +113,11 @@ class FunctionModel:
         if not isinstance(self.slopes, Mapping):
             raise InputError.at(f"model {self.name}", "slopes", self.slopes, "output → input → two numbers")
         for output, slopes in self.slopes.items():
-            if output not in self.outputs:
-                raise UnknownNameError.among(place, "output", output, self.outputs)
+            UnknownNameError.require(place, "output", output, self.outputs)
             if not isinstance(slopes, Mapping):
                 raise InputError.at(place, output, slopes, "input → its least and its largest derivative")
             for name in slopes:
-                if name not in named:
-                    raise UnknownNameError.among(f"{place} of {output}", "input", name, named)
+                UnknownNameError.require(f"{place} of {output}", "input", name, named)
             for name in named:
                 if not _is_range(slopes.get(name)):
                     allowed = "two finite numbers, its least and its largest derivative"
@@ -144,8 +142,7 @@ class FunctionModel:
         """Return the model at the sources of a drawing, which must be inputs and give all that are not left out."""
         lengths = {column: LENGTHS[own.length_name] for own in errors.sources for column in own.columns}
         for column in (*errors.columns, *errors.fixed):
-            if column not in self.inputs:
-                raise UnknownNameError.among(f"{place}, model {self.name}", "source", column, self.inputs)
+            UnknownNameError.require(f"{place}, model {self.name}", "source", column, self.inputs)
         given = {*errors.columns, *errors.fixed}
         left_out = neglected_columns(self.neglected, [*self.nominals]) - given
         missing = [name for name in self.inputs if name not in given and name not in left_out]
@@ -246,8 +243,7 @@ class BoundFunction(Model):
     def reading(self, outputs: tuple[str, ...]) -> BoundFunction:
         """Return the response of these outputs alone."""
         for name in outputs:
-            if name not in self.source.outputs:
-                raise UnknownNameError.among(f"model {self.name}", "output", name, self.source.outputs)
+            UnknownNameError.require(f"model {self.name}", "output", name, self.source.outputs)
         return replace(self, asked=outputs)
 
     def __call__(self, x: Float[np.ndarray, "sample column"]) -> Evaluation:

@@ -324,8 +324,7 @@ class DifferencedResponse:
     steps: Float[np.ndarray, " column"]  # Step of every column to either side [unit of the column]
 
     def __post_init__(self) -> None:
-        if self.output not in self.response.outputs:
-            raise UnknownNameError.among("derivatives", "output", self.output, self.response.outputs)
+        UnknownNameError.require("derivatives", "output", self.output, self.response.outputs)
         if not (self.steps > 0.0).all():
             raise InputError.at("derivatives", "steps", float(self.steps.min()), "above 0")
 

@@ -85,8 +85,7 @@ def require_settings(place: str, known: Iterable[Setting], wanted: Mapping[str, 
     """Raise unless every wanted value is one of a known setting, within its bounds."""
     own = {setting.name: setting for setting in known}
     for name, value in wanted.items():
-        if name not in own:
-            raise UnknownNameError.among(place, "setting", name, own)
+        UnknownNameError.require(place, "setting", name, own)
         if not (is_number(value) and own[name].allows(value)):
             allowed = f"{own[name].lower:g} to {own[name].upper:g}, the bounds of this setting"
             raise InputError.at(place, name, value, allowed)

@@ -137,8 +137,7 @@ class NamedFields:
         """Refuse a field that the record does not have, by name and with the nearest one."""
         known = [own.name for own in fields(cls)]  # type: ignore[arg-type]  # every subclass is a dataclass
         for name in named:
-            if name not in known:
-                raise UnknownNameError.among(cls._place(named), "field", name, known)
+            UnknownNameError.require(cls._place(named), "field", name, known)
         missing = [
             own.name
             for own in fields(cls)[len(given) :]  # type: ignore[arg-type]

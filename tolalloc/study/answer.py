@@ -165,6 +165,5 @@ class Answer(Generic[Result]):
 def _picked(known: Mapping[str, Item], name: str, place: str) -> Item:
     """Return what has the name, the first one unless named."""
     asked = name or next(iter(known), "")
-    if asked not in known:
-        raise UnknownNameError.among(place, "name", asked, known)
+    UnknownNameError.require(place, "name", asked, known)
     return known[asked]

@@ -170,8 +170,7 @@ QUICK = Effort(ranking=QUICK_RANKING, allocation=QUICK_ALLOCATION, is_quick=True
 
 def effort_of(name: str, place: str) -> Effort:
     """Return the effort of a name, ``quick`` or ``full``."""
-    if name not in ("quick", "full"):
-        raise UnknownNameError.among(place, "effort", name, ("quick", "full"))
+    UnknownNameError.require(place, "effort", name, ("quick", "full"))
     return QUICK if name == "quick" else Effort()
 
 

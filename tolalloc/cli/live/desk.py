@@ -183,8 +183,7 @@ class Desk:
 
     def answer(self, name: str, sent: dict[str, Any]) -> dict[str, Any]:
         """Return the answer to a request."""
-        if name not in self._asked:
-            raise UnknownNameError.among("page", "request", name, self._asked)
+        UnknownNameError.require("page", "request", name, self._asked)
         return self._asked[name](sent)
 
     def stop(self) -> None:

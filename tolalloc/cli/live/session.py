@@ -69,8 +69,7 @@ class LiveDesign:
         zones, settings = (_numbers(sent, key) for key in ("zones", "settings"))
         present = {own.name: own.zone for own in prepared.errors.active}
         for name, zone in zones.items():
-            if name not in present:
-                raise UnknownNameError.among("page", "source", name, present)
+            UnknownNameError.require("page", "source", name, present)
             if not _SMALLEST <= zone <= LARGEST_ZONE:
                 raise InputError.at("page", name, zone, f"a zone of {_SMALLEST:g} to {LARGEST_ZONE:g} µm")
         # A zone that the drawing has is said by the drawing, so that no bit of it depends on the way to the page.
@@ -390,8 +389,7 @@ class Session:
     ) -> Float[np.ndarray, "share column"]:
         """Return the deviations of a unit with one of its errors at places of its zone [m, angles rad]."""
         errors, sources = self.prepared.errors, {own.name: own for own in self.sources(design)}
-        if source not in sources:
-            raise UnknownNameError.among("page", "source", source, sources)
+        UnknownNameError.require("page", "source", source, sources)
         own = np.array([name == source for name in errors.source_of_column])
         tried = np.tile(self._columns(design, number), (len(shares), 1))
         tried[:, own] = sources[source].middles + np.outer(shares, self._full(sources[source], number, own))

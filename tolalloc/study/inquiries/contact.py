@@ -63,8 +63,7 @@ class ToothContact(Inquiry["tuple[Reducer, float]"]):
             design = design.with_face_width(self.width * MILLIMETRE)
         if self.support is not None:
             design = design.with_pin_span(self.support * MILLIMETRE)
-        if self.law not in LAWS:
-            raise UnknownNameError.among(self.called, "contact law", self.law, LAWS)
+        UnknownNameError.require(self.called, "contact law", self.law, LAWS)
         torque = -design.load.rated_torque if self.torque is None else self.torque
         return design, design.torque_on_carrier(torque, self.called)
 

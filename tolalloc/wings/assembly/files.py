@@ -295,8 +295,7 @@ def load_errors(path: Path, plan: AssemblyPlan) -> Float[np.ndarray, "part 3"]:
     for row, cells in zip(table.rows, table.cells, strict=True):
         name, place = cells[columns[0]], f"{path}, row {row}"
         with faults.kept():
-            if name not in names:
-                raise UnknownNameError.among(place, "part", name, names)
+            UnknownNameError.require(place, "part", name, names)
             if name in found:
                 raise InputError.at(place, "part", name, "each part once, and this one stands further up too")
             where, allowed = f"{place} (part {name})", f"a number with a decimal point from {-LARGEST:g} to {LARGEST:g}"

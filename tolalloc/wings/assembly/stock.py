@@ -77,8 +77,7 @@ class PartStock:
         rows = np.zeros((len(turns), len(self.columns)))
         for row, turn in zip(rows, turns, strict=True):
             for column, value in mounted(part.errors, place, turn).items():
-                if column not in where:
-                    raise UnknownNameError.among(f"part {part.name} at {place.name}", "error", column, where)
+                UnknownNameError.require(f"part {part.name} at {place.name}", "error", column, where)
                 row[where[column]] = value
         return rows
 
@@ -161,8 +160,7 @@ def count_units(parts: Sequence[MeasuredPart], places: Sequence[MountingPlace], 
     """
     needed, there = Counter(place.kind for place in places), Counter(part.kind for part in parts)
     for part in parts:
-        if part.kind not in needed:
-            raise UnknownNameError.among(f"{origin}, part {part.name}", "kind", part.kind, needed)
+        UnknownNameError.require(f"{origin}, part {part.name}", "kind", part.kind, needed)
     for name, count in Counter(part.name for part in parts).items():
         if count > 1:
             raise InputError.at(origin, "number of parts of the name " + name, count, "1")
@@ -199,8 +197,7 @@ def load_parts(path: str | Path, reducer: Reducer) -> tuple[MeasuredPart, ...]:
             raise UnknownNameError.among(place, "kind", kind, known)
         if kinds.setdefault(part, kind) != kind:
             raise InputError.at(place, f"kind of part {part}", kind, f"{kinds[part]}, as further up")
-        if error not in known[kind]:
-            raise UnknownNameError.among(place, f"error of a {kind}", error, known[kind])
+        UnknownNameError.require(place, f"error of a {kind}", error, known[kind])
         if error in errors.setdefault(part, {}):
             allowed = "each error once, and this one stands further up"
             raise InputError.at(place, f"error of part {part}", error, allowed)

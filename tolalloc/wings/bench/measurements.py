@@ -201,8 +201,7 @@ def _units(record: MeasurementRecord, path: Path) -> tuple[BuiltUnit, ...]:
 
 
 def _position(name: str, place: Path | str, positions: Mapping[str, int]) -> int:
-    if name not in positions:
-        raise UnknownNameError.among(place, "unit", name, positions)
+    UnknownNameError.require(place, "unit", name, positions)
     return positions[name]
 
 

@@ -87,8 +87,7 @@ def parameter(
     relative standard deviation, of the bias one in arcseconds.
     """
     known = [own for own in SYMBOLS if own in (BIAS, TORQUE) or getattr(reducer.stiffness, own)]
-    if name not in known:
-        raise UnknownNameError.among(place, "parameter", name, known)
+    UnknownNameError.require(place, "parameter", name, known)
     starts = {BIAS: 0.0, TORQUE: 1.0}
     start = starts[name] if name in starts else float(getattr(reducer.stiffness, name))
     low, high = bounds or _WIDEST.get(name) or (start / _STIFFNESS_SPAN, start * _STIFFNESS_SPAN)

@@ -93,8 +93,7 @@ class SimulationRequest:
     pin_stiffness: float | None = None  # Stiffness of every pin contact in place of the reducer's own law [N/m]
 
     def __post_init__(self) -> None:
-        if self.engine not in ENGINES:
-            raise UnknownNameError.among("simulation", "engine", self.engine, ENGINES)
+        UnknownNameError.require("simulation", "engine", self.engine, ENGINES)
         for name in ("speed_rpm", "duration", "ramp", "step", "pin_stiffness"):
             value = getattr(self, name)
             if value is not None and not 0.0 < value < inf:
