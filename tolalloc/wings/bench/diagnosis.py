@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Annotated, ClassVar
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -14,6 +15,7 @@ from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
+from tolalloc.reading.named_fields import NamedFields, number
 from tolalloc.reading.units import ARCSECOND, DEGREE
 from tolalloc.reducers.choice import bind
 from tolalloc.reducers.reducer.design import Reducer
@@ -50,8 +52,6 @@ IMPLAUSIBLE = 0.001
 TAILS = (0.025, 0.975)
 """Shares below the ends of the intervals [-]."""
 
-LARGEST_NOISE = 60.0
-"""Largest error of a reading that is believed [arcsec]."""
 
 PLACE = "diagnosis"
 
@@ -193,32 +193,28 @@ def _fit(
 
 
 @dataclass(frozen=True, kw_only=True)
-class DiagnosisRequest:
+class DiagnosisRequest(NamedFields):
     """Which unit is to be diagnosed."""
+
+    called: ClassVar[str] = PLACE
+    are_arguments: ClassVar[bool] = True
 
     curve: Path  # CSV file with the columns ``angle [deg]`` and ``transmission error [arcsec]``
     reducer: Reducer  # Nominal design, with the stiffness in use
     errors: ErrorModel  # What the drawings say of its parts
     # Torque on the carrier, negative where it resists the rotation; the test torque unless given [N·m]
     torque_nm: float | None = None
-    noise_arcsec: float = 0.5  # Standard deviation of one reading [arcsec]
-    discrepancy_arcsec: float = 0.5  # Standard deviation of what the model leaves out [arcsec]
-    angle_offset_deg: float = 0.0  # Added to every angle of the bench [deg]
-    level: float = 0.97  # Probability that the named sources must have of containing the dominant one [-]
+    # Standard deviation of one reading, and of what the model leaves out [arcsec]
+    noise_arcsec: Annotated[float, number("above 0 up to 60", above=0, most=60)] = 0.5
+    discrepancy_arcsec: Annotated[float, number("0 to 60", least=0, most=60)] = 0.5
+    # Added to every angle of the bench [deg]
+    angle_offset_deg: Annotated[float, number("-360 to 360", least=-360, most=360)] = 0.0
+    # Probability that the named sources must have of containing the dominant one [-]
+    level: Annotated[float, number("0.5 up to but not 1", least=0.5, below=1)] = 0.97
     seed: int = 1  # Seed of every random number [-]
     neglected: tuple[str, ...] = ()  # Sources that the drawings may leave out, beside those that they may anyway
     repair: Repair | None = None  # What may be done with it, at which prices; None if nothing is to be decided
     effort: DiagnosisEffort = field(default_factory=DiagnosisEffort)  # How much may be computed
-
-    def __post_init__(self) -> None:
-        for name, good, allowed in (
-            ("noise_arcsec", 0 < self.noise_arcsec <= LARGEST_NOISE, f"above 0 up to {LARGEST_NOISE:g}"),
-            ("discrepancy_arcsec", 0 <= self.discrepancy_arcsec <= LARGEST_NOISE, f"0 to {LARGEST_NOISE:g}"),
-            ("angle_offset_deg", -360 <= self.angle_offset_deg <= 360, "-360 to 360"),
-            ("level", 0.5 <= self.level < 1, "0.5 up to but not 1"),
-        ):
-            if not good:
-                raise InputError.of_argument(PLACE, name, getattr(self, name), allowed)
 
 
 @dataclass(frozen=True, kw_only=True)

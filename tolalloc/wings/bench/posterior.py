@@ -63,13 +63,6 @@ class Noise:
     # Angle over which what is left out stays alike: its correlation falls as exp(−½(Δ/angle)²) [rad]
     correlation_angle: float = 1.5 * DEGREE
 
-    def __post_init__(self) -> None:
-        for name in ("reading", "correlation_angle"):
-            if not getattr(self, name) > 0.0:
-                raise InputError.at("noise", name, getattr(self, name), "above 0")
-        if not self.discrepancy >= 0.0:
-            raise InputError.at("noise", "discrepancy", self.discrepancy, "0 or more")
-
     def left_out(self, carrier_angle: Float[np.ndarray, " angle"]) -> Float[np.ndarray, "angle angle"]:
         """Return the covariance of what the model leaves out at angles of one turn [rad²]."""
         apart = np.abs(carrier_angle[:, np.newaxis] - carrier_angle) % TURN

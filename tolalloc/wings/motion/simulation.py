@@ -7,12 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
-from typing import Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.exceptions import InputError, SolveError, UnknownNameError
+from tolalloc.reading.named_fields import NamedFields, number, or_none
 from tolalloc.reading.units import ARCSECOND, RPM
 from tolalloc.reducers.equivalent.model import EquivalentModel, Status
 from tolalloc.reducers.equivalent.outputs import forces
@@ -72,36 +73,37 @@ MODE_ANGLES = 200
 """Angles at which natural frequencies are looked for [-]."""
 
 
+_Positive = Annotated[float, number("a number above 0", above=0)]
+_NotNegative = Annotated[float, number("0 or a positive number", least=0)]
+
+
 @dataclass(frozen=True, kw_only=True)
-class SimulationRequest:
+class SimulationRequest(NamedFields):
     """What is to be simulated; as it stands, the run of xi2015."""
+
+    called: ClassVar[str] = "simulation"
+    are_arguments: ClassVar[bool] = True
 
     reducer: str = "rv40e"  # Preset or TOML file
     unit: str = "exact"  # Shipped unit or TOML file
-    speed_rpm: float = 525.0  # Input speed that is reached [rpm]
+    speed_rpm: _Positive = 525.0  # Input speed that is reached [rpm]
     # Torque on the carrier, negative as it resists the rotation; minus the rated one unless given [N·m]
     torque_nm: float | None = None
     engine: str = "generalised-alpha"  # One of `ENGINES`
-    duration: float = 2.0  # Simulated time [s]
-    ramp: float = 1.0  # Time in which the speed rises; the load rises in half of it afterwards [s]
-    step: float = 5e-5  # Time step [s]
-    output_inertia: float = 0.0  # Moment of inertia that the carrier turns besides its own [kg·m²]
-    damping: float = 1e-5  # Damping over stiffness of meshes and bearings [s]
+    duration: _Positive = 2.0  # Simulated time [s]
+    ramp: _Positive = 1.0  # Time in which the speed rises; the load rises in half of it afterwards [s]
+    step: _Positive = 5e-5  # Time step [s]
+    output_inertia: _NotNegative = 0.0  # Moment of inertia that the carrier turns besides its own [kg·m²]
+    damping: _NotNegative = 1e-5  # Damping over stiffness of meshes and bearings [s]
     # Damping over mass of every part, in the prototype of the carrier's rotation alone; 500 1/s are a damping ratio of
     # 2 % at 2 kHz [1/s]
-    mass_damping: float | None = None
-    pin_stiffness: float | None = None  # Stiffness of every pin contact in place of the reducer's own law [N/m]
+    mass_damping: Annotated[float | None, or_none(number("0 or a positive number", least=0))] = None
+    # Stiffness of every pin contact in place of the reducer's own law [N/m]
+    pin_stiffness: Annotated[float | None, or_none(number("a number above 0", above=0))] = None
 
     def __post_init__(self) -> None:
         UnknownNameError.require("simulation", "engine", self.engine, ENGINES)
-        for name in ("speed_rpm", "duration", "ramp", "step", "pin_stiffness"):
-            value = getattr(self, name)
-            if value is not None and not 0.0 < value < inf:
-                raise InputError.of_argument("simulation", name, value, "a number above 0")
-        for name in ("output_inertia", "damping", "mass_damping"):
-            value = getattr(self, name) or 0.0
-            if not 0.0 <= value < inf:
-                raise InputError.of_argument("simulation", name, value, "0 or a positive number")
+        super().__post_init__()
         if not self.duration / MOST_STEPS <= self.step <= self.duration:
             allowed = f"{self.duration / MOST_STEPS:.3g} s to the duration of {self.duration:g} s"
             raise InputError.of_argument("simulation", "step", self.step, allowed)
