@@ -71,7 +71,7 @@ def difference_section(results: list[SimulationResult]) -> Section:
     table = pd.DataFrame(
         {
             "torque on the carrier [N·m]": [each.prepared.torque for each in results],
-            "input speed [rpm]": [each.speed / RPM for each in results],
+            "input speed [rpm]": [each.prepared.speed / RPM for each in results],
             "static transmission error, mean [arcsec]": [
                 float(each.at_rest.transmission_error.mean() / ARCSECOND) for each in results
             ],
