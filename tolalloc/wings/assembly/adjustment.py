@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -12,7 +11,6 @@ from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.running.progress import RunRecord
 from tolalloc.wings.assembly.control import regulator
-from tolalloc.wings.assembly.files import load_errors, load_plan
 from tolalloc.wings.assembly.gains import (
     Gains,
     StateWeightSweep,
@@ -112,23 +110,6 @@ class AssemblyResult:
     # Cheapest angular tolerances, if the chain states limits and costs that some tolerances keep
     tolerances: AngularTolerances | None
     unreachable: str  # Why there are none; empty unless limits are out of reach
-
-
-def prepare_assembly(
-    chain: str | Path, measured: Path | None = None, precision: float | None = None, seed: int = 1
-) -> AssemblyRequest:
-    """Return an assembly with its files read and checked: a shipped chain or a file, and measured errors of its parts.
-
-    The precision is Q in place of the chain's own [-].
-    """
-    if precision is not None and not 0 <= precision <= LARGEST_STATE_WEIGHT:
-        raise InputError.of_argument("assembly", "precision", precision, f"0 to {LARGEST_STATE_WEIGHT:g}")
-    plan = load_plan(chain)
-    if precision is not None:
-        plan = replace(plan, state_weight=precision)
-    if measured is None:
-        return AssemblyRequest(plan=plan, seed=seed)
-    return AssemblyRequest(plan=plan, name=measured.stem, errors=load_errors(measured, plan), seed=seed)
 
 
 def assemble(request: AssemblyRequest, record: RunRecord) -> AssemblyResult:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf
-from numbers import Real
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -16,6 +15,7 @@ from tolalloc.drawings.heads import split_header
 from tolalloc.drawings.table_file import TextTable, believed_number, read_text_table
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.files import Record, read_toml, shipped_or_path, validated
+from tolalloc.reading.named_fields import is_number
 from tolalloc.reading.units import ARCSECOND, DEGREE, MILLIMETRE
 from tolalloc.reducers.reducer.files import PRESETS
 from tolalloc.wings.assembly.chain import ChainPart, DatumFlowChain
@@ -36,8 +36,7 @@ IN_DEGREES = 0.05
 
 
 def _three(values: object) -> object:
-    numbers = isinstance(values, list) and all(isinstance(one, Real) and not isinstance(one, bool) for one in values)
-    if not isinstance(values, list) or not numbers or len(values) != 3:
+    if not (isinstance(values, list) and len(values) == 3 and all(map(is_number, values))):
         raise ValueError("allowed are three numbers, for x, y and z")
     return values
 

@@ -11,7 +11,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import combinations, permutations, product
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -21,12 +20,9 @@ from tolalloc.capability.experiment import LARGEST_FAILED_SHARE
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Response
-from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.reducer.design import at_torque
-from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.response.kernel import KernelResponse
 from tolalloc.running.progress import RunRecord
-from tolalloc.wings.assembly.stock import Mountings, PartStock, load_parts
+from tolalloc.wings.assembly.stock import Mountings, PartStock
 
 _FAILED = 1e9
 """What a unit without an answer counts in an assignment, beyond every sum of good ones [arcsec]."""
@@ -275,28 +271,8 @@ class MountingRequest:
     name: str  # Where the parts come from
     stock: PartStock  # The parts
     kernel: KernelResponse  # What is to be small
-    starts: int = 4  # Mountings from which several units are improved [-]
-    seed: int = 1  # Seed of every random number [-]
-
-
-def prepare_mounting(
-    parts: Path, reducer: str = "rv20e", torque_nm: float | None = None, starts: int = 4, seed: int = 1
-) -> MountingRequest:
-    """Return the parts with their CSV file read and checked, for the reducer of a preset or TOML file.
-
-    The torque on the carrier is the reducer's test torque unless given, negative where it resists the rotation [N·m].
-    """
-    design = load_reducer(reducer)
-    torque = design.torque_on_carrier(torque_nm, "mounting")
-    model, measured = EquivalentModel(at_torque(design, torque)), load_parts(parts, design)
-    columns = tuple(name for name in model.columns if name not in design.modification.deviations)
-    return MountingRequest(
-        name=parts.stem,
-        stock=PartStock(reducer=design, parts=measured, columns=columns),
-        kernel=KernelResponse(model=model, torque=torque, columns=columns, fixed=design.modification.deviations),
-        starts=starts,
-        seed=seed,
-    )
+    starts: int  # Mountings from which several units are improved [-]
+    seed: int  # Seed of every random number [-]
 
 
 def mount(request: MountingRequest, record: RunRecord) -> MountingResult:

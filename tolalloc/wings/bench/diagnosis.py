@@ -125,8 +125,6 @@ def diagnose(
     curve has many near explanations: scouts led from the prior towards the curve find them, damped Gauss–Newton steps
     climb down, and sequential Monte Carlo on the kernel samples the errors around the best one.
     """
-    if not 0.0 < level < 1.0:
-        raise InputError.at("diagnosis", "level", level, "a number between 0 and 1")
     if errors.joint:
         raise InputError.at("diagnosis", "joint source", errors.joint[0].name, "none, sources of the drawings only")
     solved: Counter[bool] = Counter()

@@ -262,10 +262,6 @@ class Damping:
             if not 0.0 <= value < np.inf:
                 raise InputError.at("damping", name, value, "0 or a positive number")
 
-    def per_stiffness(self, interface: str) -> float:
-        """Return the damping per stiffness of an interface without play [s]."""
-        return self.stiffness_proportional + self.interfaces.get(interface, 0.0)
-
     def check(self, groups: list[SpringGroup]) -> None:
         """Make sure that every interface with damping of its own is there and has no play."""
         allowed = [group.stiffness_name for group in groups if group.contact == "bilateral"]

@@ -46,8 +46,6 @@ MOST_STEPS = 200_000
 """Time steps beyond which the forces of all pins would fill the memory [-]."""
 OWN_MASS_DAMPING = 500.0
 """Damping over mass of the carrier without a load, unless another is asked for: about 2 % at 2 kHz [1/s]."""
-PROTOTYPE_RADIUS = 0.5
-"""Spectral radius of the prototype's integrator; at 0.9 stiff bearings and part errors lock it into alternation [-]."""
 FEWEST_STEPS = 4
 """Time steps per pin pass below which a run says nothing [-]."""
 LARGEST_TORQUE = 10.0
@@ -450,7 +448,7 @@ def _prototype(prepared: PreparedSimulation, motion: Motion, tell: Callable[[flo
         _damping(prepared),
         TimeCourse.step(prepared.speed, 0.0, asked.ramp),
         TimeCourse.step(prepared.torque, asked.ramp, prepared.loaded),
-        TimeSteps(duration=asked.duration, step=motion.step, output_step=motion.step, spectral_radius=PROTOTYPE_RADIUS),
+        TimeSteps(duration=asked.duration, step=motion.step, output_step=motion.step),
         prepared.prototype_errors,
         tell,
     )

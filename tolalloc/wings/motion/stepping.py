@@ -119,7 +119,8 @@ class Steps:
             first = own.stop
             if group.contact == "play":
                 continue
-            rows, delay = group.displacement * self.scale, self.damping.per_stiffness(group.stiffness_name)
+            rows, own_damping = group.displacement * self.scale, self.damping.interfaces.get(group.stiffness_name, 0.0)
+            delay = self.damping.stiffness_proportional + own_damping
             weighted = np.swapaxes(rows * group.stiffness[..., np.newaxis], 1, 2)
             between = weighted @ rows
             stiffness += between

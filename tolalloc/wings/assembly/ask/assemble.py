@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
+from tolalloc.exceptions import InputError
 from tolalloc.reports.header import Header
 from tolalloc.running.progress import Progress, RunRecord
 from tolalloc.study.answer import Answer
@@ -33,9 +34,19 @@ class Assemble(Inquiry["AssemblyRequest"]):
 
     def prepare(self) -> AssemblyRequest:
         """Return the assembly with its files read and checked."""
-        from tolalloc.wings.assembly.adjustment import prepare_assembly
+        from tolalloc.wings.assembly.adjustment import AssemblyRequest
+        from tolalloc.wings.assembly.files import load_errors, load_plan
+        from tolalloc.wings.assembly.plan import LARGEST_STATE_WEIGHT
 
-        return prepare_assembly(self.chain, self.measured, self.precision, self.seed)
+        if self.precision is not None and not 0 <= self.precision <= LARGEST_STATE_WEIGHT:
+            raise InputError.of_argument(self.called, "precision", self.precision, f"0 to {LARGEST_STATE_WEIGHT:g}")
+        plan = load_plan(self.chain)
+        if self.precision is not None:
+            plan = replace(plan, state_weight=self.precision)
+        if self.measured is None:
+            return AssemblyRequest(plan=plan, seed=self.seed)
+        errors = load_errors(self.measured, plan)
+        return AssemblyRequest(plan=plan, name=self.measured.stem, errors=errors, seed=self.seed)
 
     def room(self, prepared: AssemblyRequest) -> str:
         """Return the room that a chain with a reducer solves with."""

@@ -33,9 +33,24 @@ class Mount(Inquiry["MountingRequest"]):
 
     def prepare(self) -> MountingRequest:
         """Return the parts and what is to be small."""
-        from tolalloc.wings.assembly.mounting import prepare_mounting
+        from tolalloc.reducers.equivalent.model import EquivalentModel
+        from tolalloc.reducers.reducer.design import at_torque
+        from tolalloc.reducers.reducer.files import load_reducer
+        from tolalloc.reducers.response.kernel import KernelResponse
+        from tolalloc.wings.assembly.mounting import MountingRequest
+        from tolalloc.wings.assembly.stock import PartStock, load_parts
 
-        return prepare_mounting(self.parts, str(self.reducer), self.torque, self.starts, self.seed)
+        design = load_reducer(str(self.reducer))
+        torque = design.torque_on_carrier(self.torque, "mounting")
+        model, measured = EquivalentModel(at_torque(design, torque)), load_parts(self.parts, design)
+        columns = tuple(name for name in model.columns if name not in design.modification.deviations)
+        return MountingRequest(
+            name=self.parts.stem,
+            stock=PartStock(reducer=design, parts=measured, columns=columns),
+            kernel=KernelResponse(model=model, torque=torque, columns=columns, fixed=design.modification.deviations),
+            starts=self.starts,
+            seed=self.seed,
+        )
 
     def solve(self, prepared: MountingRequest, progress: Progress) -> Answer[MountingResult]:
         """Return who goes where, how it is turned there, and what that is worth beside chance."""

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
-from tolalloc.reading.units import ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE
+from tolalloc.reading.units import ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE, MILLIMETRE, unit_of
 from tolalloc.reducers import PEAK_TO_PEAK
 from tolalloc.reports.columns import of_positions
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, HeatMap, Series
 from tolalloc.reports.templates import Sentences
+from tolalloc.reports.wording import quantity
 from tolalloc.wings.assembly.orientations import (
     DISC_FORCE,
     LINE_LOAD,
@@ -63,9 +64,8 @@ def risen(effect: TransmissionEffect, precision: float) -> tuple[str, ...]:
     for output in _BETTER_SMALL:
         before, after = change(effect, output, precision)
         if after > before * (1 + _SAME):
-            name, unit = output.removesuffix("]").split(" [")
             at = f" at {effect.test_torque:g} N·m" if output == PEAK_TO_PEAK else ""
-            found.append(f"{name}{at} ({before:.4g} → {after:.4g} {unit})")
+            found.append(f"{quantity(output)}{at} ({before:.4g} → {after:.4g} {unit_of(output)})")
     return tuple(found)
 
 
@@ -82,7 +82,7 @@ def difference_table(effect: TransmissionEffect) -> pd.DataFrame:
     columns = {PRECISION: effect.state_weights}
     for output in _counted(effect):
         above = np.median(answers(effect, output), axis=1) / perfect(effect, output) - 1
-        columns[f"{output.split(' [')[0]}, above exact parts [%]"] = 100 * above
+        columns[f"{quantity(output)}, above exact parts [%]"] = 100 * above
     return rounded(of_positions("above exact parts", columns))
 
 
@@ -93,7 +93,7 @@ def fallen_table(effect: TransmissionEffect) -> pd.DataFrame | None:
     columns = {PRECISION: effect.state_weights[1:]}
     for output in _counted(effect):
         values = answers(effect, output)
-        columns[f"{output.split(' [')[0]}, smaller than unadjusted [%]"] = 100 * (values[1:] < values[0]).mean(axis=1)
+        columns[f"{quantity(output)}, smaller than unadjusted [%]"] = 100 * (values[1:] < values[0]).mean(axis=1)
     return rounded(of_positions("smaller than unadjusted", columns))
 
 
@@ -112,7 +112,7 @@ def transmission_sentences(effect: TransmissionEffect, precision: float) -> tupl
             "change" if single else "change_of_many",
             before=before,
             after=after,
-            unit=output.removesuffix("]").split(" [")[1],
+            unit=unit_of(output),
             perfect=perfect(effect, output),
             smaller=int((values[at] < values[0]).sum()),
             many=values.shape[1],
@@ -188,7 +188,7 @@ def _over_state_weight(effect: TransmissionEffect, name: str, output: str) -> Fi
     short = _say("short_band" if many else "single", low=BAND[0], high=BAND[1])
     return Figure(
         name=name,
-        title=_say("over_precision_figure", output=output.split(" [")[0].capitalize(), of=short),
+        title=_say("over_precision_figure", output=quantity(output).capitalize(), of=short),
         x_label=PRECISION,
         y_label=output,
         series=(Series.line(label, effect.state_weights, np.median(values, axis=1), low, high),),
