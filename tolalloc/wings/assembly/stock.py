@@ -23,7 +23,6 @@ from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.unit_file import LARGEST_LENGTH
 from tolalloc.wings.assembly.places import (
     MountingPlace,
-    PartTurn,
     mounted,
     own_name,
     owned_columns,
@@ -52,7 +51,7 @@ class PartStock:
         count_units(self.parts, places_of(self.reducer), "parts")
         for place in self.places:
             for part in self.fitting(place):
-                self._rows(self.parts[part], place, place.turns)
+                self._rows(self.parts[part], place)
 
     @cached_property
     def units(self) -> int:
@@ -69,13 +68,11 @@ class PartStock:
         """Return the numbers of the parts that fit a place [-]."""
         return tuple(at for at, part in enumerate(self.parts) if part.kind == place.kind)
 
-    def _rows(
-        self, part: MeasuredPart, place: MountingPlace, turns: Sequence[PartTurn]
-    ) -> Float[np.ndarray, "turn column"]:
+    def _rows(self, part: MeasuredPart, place: MountingPlace) -> Float[np.ndarray, "turn column"]:
         """Return what a part adds to the columns in each turn [m, angles rad]."""
         where = {name: at for at, name in enumerate(self.columns)}
-        rows = np.zeros((len(turns), len(self.columns)))
-        for row, turn in zip(rows, turns, strict=True):
+        rows = np.zeros((len(place.turns), len(self.columns)))
+        for row, turn in zip(rows, place.turns, strict=True):
             for column, value in mounted(part.errors, place, turn).items():
                 UnknownNameError.require(f"part {part.name} at {place.name}", "error", column, where)
                 row[where[column]] = value
@@ -87,7 +84,7 @@ class PartStock:
         rows, first, count = [], np.full((len(self.parts), len(self.places)), -1), 0
         for at, place in enumerate(self.places):
             for part in self.fitting(place):
-                rows.append(self._rows(self.parts[part], place, place.turns))
+                rows.append(self._rows(self.parts[part], place))
                 first[part, at], count = count, count + len(place.turns)
         return np.concatenate(rows), first
 

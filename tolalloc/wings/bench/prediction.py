@@ -16,7 +16,7 @@ from tolalloc.reducers.equivalent.model import Derivatives, EquivalentModel
 from tolalloc.reducers.equivalent.springs import HARMONICS
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.sensitivity.surrogate.regression import BoxPolynomial, fit_box_polynomial
-from tolalloc.wings.bench.measurements import Measurements
+from tolalloc.wings.bench.measurements import MeasuredCurve, MeasuredLoop, Measurements
 from tolalloc.wings.bench.parameters import BIAS, TORQUE, Parameter, box, values_at
 
 PEAK_TO_PEAK, CURVE, LOOP = "peak-to-peak", "curve", "loop"
@@ -40,6 +40,10 @@ class ReadingBlock:
     number: int  # Which of the measured curves or loops; 0 for the peak-to-peaks [-]
     rows: slice  # Its readings among all
     centred: bool  # Whether its mean has been removed, from readings and model alike
+
+    def shape_of(self, measured: Measurements) -> MeasuredCurve | MeasuredLoop:
+        """Return the curve or loop that was read."""
+        return measured.curves[self.number] if self.kind == CURVE else measured.loops[self.number]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -203,23 +207,20 @@ class KernelPredictor:
         """Yield blocks with the same angles, their readings one after another, and the derivatives."""
         measured = self.measurements
         for blocks in _with_same_angles(self.data.blocks, measured):
-            kind, first = blocks[0].kind, blocks[0].number
-            if kind == PEAK_TO_PEAK:
+            if blocks[0].kind == PEAK_TO_PEAK:
                 assert measured.peak_to_peak is not None
                 stated = measured.peak_to_peak.torque
                 own, torque = model.at_torque(stated), factor * stated
                 extremes, found = own.peak_to_peak_derivatives(errors[measured.peak_to_peak.unit], torque)
                 yield blocks, extremes.peak_to_peak, self._by_coordinate(found, torque)
-            elif kind == CURVE:
-                curves = [measured.curves[block.number] for block in blocks]
-                torques, units = np.array([curve.torque for curve in curves]), [curve.unit for curve in curves]
-                angles = measured.curves[first].carrier_angle
-                yield blocks, *self._rotations(model, errors[units], torques, angles, factor)
             else:
-                loops = [measured.loops[block.number] for block in blocks]
-                torques = np.concatenate([loop.torque for loop in loops])  # the instrument measures these themselves
-                rows = np.repeat([loop.unit for loop in loops], [loop.torque.size for loop in loops])
-                yield blocks, *self._rotations(model, errors[rows], torques, np.array([loops[0].carrier_angle]), None)
+                shapes = [block.shape_of(measured) for block in blocks]
+                torques = [np.atleast_1d(shape.torque) for shape in shapes]
+                rows = np.repeat([shape.unit for shape in shapes], [own.size for own in torques])
+                angles = np.atleast_1d(shapes[0].carrier_angle)
+                # The instrument measures the torques of a loop itself.
+                own_factor = factor if blocks[0].kind == CURVE else None
+                yield blocks, *self._rotations(model, errors[rows], np.concatenate(torques), angles, own_factor)
 
     def _rotations(
         self,
@@ -259,14 +260,10 @@ class KernelPredictor:
 
 def _with_same_angles(blocks: tuple[ReadingBlock, ...], measured: Measurements) -> list[tuple[ReadingBlock, ...]]:
     """Return the blocks in groups that share their carrier angles, and so their tables."""
-    groups: dict[tuple[object, ...], list[ReadingBlock]] = {}
+    groups: dict[tuple[str, bytes], list[ReadingBlock]] = {}
     for block in blocks:
-        angles: object = None
-        if block.kind == CURVE:
-            angles = measured.curves[block.number].carrier_angle.tobytes()
-        elif block.kind == LOOP:
-            angles = measured.loops[block.number].carrier_angle
-        groups.setdefault((block.kind, angles), []).append(block)
+        angles = np.empty(0) if block.kind == PEAK_TO_PEAK else block.shape_of(measured).carrier_angle
+        groups.setdefault((block.kind, np.asarray(angles).tobytes()), []).append(block)
     return [
         tuple(group[start : start + _SAMPLES_AT_ONCE])
         for group in groups.values()
