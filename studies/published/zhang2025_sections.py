@@ -300,8 +300,8 @@ def _mounted(kernel: KernelResponse, errors: Any, units: int, sets: int, progres
         seconds.append(time.perf_counter() - start)
         chance = random_mounting(stock, kernel, max(found.evaluations // units, 1), seeds.child("chance"))
         after = float(found.after.mean())
-        random.append((1 - after / chance.mean) * 100)
-        worst.append((1 - after / chance.worst) * 100)
+        random.append((1 - after / chance.means.mean()) * 100)
+        worst.append((1 - after / chance.means.max()) * 100)
         evaluations.append(found.evaluations)
         progress.advance(1)
     row: dict[str, Any] = {"mounting": SETS_OF[units], "sets [-]": sets}

@@ -64,21 +64,6 @@ class RandomMountings:
         means = self.peak_to_peaks.mean(axis=1)
         return np.asarray(means[np.isfinite(means)])
 
-    @property
-    def mean(self) -> float:
-        """Mean over the mountings [arcsec]."""
-        return float(self.means.mean())
-
-    @property
-    def best(self) -> float:
-        """Smallest mean over the units that was met [arcsec]."""
-        return float(self.means.min())
-
-    @property
-    def worst(self) -> float:
-        """Largest mean over the units that was met [arcsec]."""
-        return float(self.means.max())
-
 
 @dataclass(frozen=True, kw_only=True)
 class MountingResult:

@@ -72,12 +72,12 @@ class MountingTeller(Teller[MountingResult]):
                 "worth",
                 whose=_say("of_one") if units == 1 else _say("of_several", units=units),
                 after=after,
-                below_mean=1 - after / chance.mean,
+                below_mean=1 - after / chance.means.mean(),
                 among=_say("among_all" if chance.every else "among_random", count=count),
-                below_worst=1 - after / chance.worst,
-                worst=chance.worst,
+                below_worst=1 - after / chance.means.max(),
+                worst=chance.means.max(),
             ),
-            _say("every") if chance.every else _say("local", best=chance.best),
+            _say("every") if chance.every else _say("local", best=chance.means.min()),
         )
 
     @property
@@ -127,8 +127,8 @@ class MountingTeller(Teller[MountingResult]):
             "seed": self.header.seed,
             "units [-]": found.stock.units,
             "mean peak-to-peak as mounted [arcsec]": float(found.after.mean()),
-            "mean of random mountings [arcsec]": chance.mean,
-            "worst random mounting [arcsec]": chance.worst,
+            "mean of random mountings [arcsec]": float(chance.means.mean()),
+            "worst random mounting [arcsec]": float(chance.means.max()),
             "every mounting tried": chance.every,
             "fittings": self._fittings.records(),
             "units": self._units.records(),
