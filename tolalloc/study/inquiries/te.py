@@ -32,12 +32,10 @@ class TransmissionError(Inquiry["tuple[Reducer, BuiltUnit, float]"]):
 
     def prepare(self) -> tuple[Reducer, BuiltUnit, float]:
         """Return the design, the unit and the torque on the carrier [N·m]."""
-        from tolalloc.reducers.reducer.files import load_identified_stiffness, load_reducer, with_stiffness
+        from tolalloc.reducers.choice import reducer
         from tolalloc.reducers.unit_file import load_unit
 
-        design = load_reducer(str(self.reducer))
-        if self.stiffness:
-            design = with_stiffness(design, load_identified_stiffness(self.stiffness))
+        design = reducer(str(self.reducer), stiffness=self.stiffness).reducer
         return design, load_unit(self.unit), design.torque_on_carrier(self.torque, self.called)
 
     def solve(

@@ -18,7 +18,7 @@ from tolalloc.drawings.fields import UNITS
 from tolalloc.drawings.heads import split_header
 from tolalloc.drawings.measured_parts import LARGEST_DEVIATION
 from tolalloc.drawings.sources import Source, known_as
-from tolalloc.drawings.table_file import TextTable, read_table_file, read_text_table
+from tolalloc.drawings.table_file import TextTable, is_workbook, read_table_file, read_text_table
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
 from tolalloc.reading.units import MICROMETRE
@@ -348,7 +348,7 @@ def _stated(column: GaugedColumn, stated: TextTable | None) -> float:
 
 def _table(path: Path) -> TextTable:
     """Return the cells of a CSV file, or of the first sheet of a workbook."""
-    if path.suffix.lower() not in (".xlsx", ".xlsm"):
+    if not is_workbook(path):
         return read_text_table(path)
     (_, headers), *others = read_table_file(path)
     if not others:

@@ -21,6 +21,7 @@ from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import number
 from tolalloc.wings.bench.identification import IdentificationResult
 from tolalloc.wings.bench.information import LEVEL, Direction
+from tolalloc.wings.bench.measurements import MeasuredCurve
 from tolalloc.wings.bench.parameters import BIAS, Parameter
 from tolalloc.wings.bench.prediction import CURVE, LARGE_DRIFT, LOOP, PEAK_TO_PEAK, ReadingBlock
 from tolalloc.wings.bench.profile import ParameterChoice, ParameterEstimate
@@ -401,17 +402,15 @@ class IdentificationTeller(Teller[IdentificationResult]):
     def _shape_figures(self, kind: str) -> tuple[Figure, Figure]:
         """Return the first curve or loop, and what the model leaves of it before and after the fit."""
         block, measurements = self._first(kind), self.result.measurements
-        if kind == CURVE:
-            curve = measurements.curves[block.number]
-            unit, place, x = curve.unit, f"{curve.torque:g} N·m", curve.carrier_angle / DEGREE
+        both, read = (self.result.data.measured, self.result.at_found.values), block.shape_of(measurements)
+        measured, model = (values[block.rows] / ARCSECOND for values in both)
+        if isinstance(read, MeasuredCurve):
+            place, x = f"{read.torque:g} N·m", read.carrier_angle / DEGREE
             axis, y_label = "carrier angle [°]", "transmission error [arcsec]"
         else:
-            loop = measurements.loops[block.number]
-            unit, place, x = loop.unit, f"{loop.carrier_angle / DEGREE:.0f}°", loop.torque
+            place, x = f"{read.carrier_angle / DEGREE:.0f}°", read.torque
             axis, y_label = "torque on the carrier [N·m]", "twist less its mean [arcsec]"
-        name = _say("unit_at", unit=measurements.units[unit].name, place=place)
-        both = (self.result.data.measured, self.result.at_found.values)
-        measured, model = (values[block.rows] / ARCSECOND for values in both)
+        name = _say("unit_at", unit=measurements.units[read.unit].name, place=place)
         drawn = Series.line("measured", x, measured) if kind == CURVE else Series.points("measured", x, measured)
         shape = Figure(
             name=f"measured_{kind}",
