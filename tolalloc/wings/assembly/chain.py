@@ -66,11 +66,10 @@ class DatumFlowChain:
     @cached_property
     def carries(self) -> Bool[np.ndarray, "part part"]:
         """Whether the error of the second part moves the first: it is that part, or one that it stands on."""
-        where = {name: at for at, name in enumerate(self.names)}
         found = np.eye(len(self.parts), dtype=bool)
         for at, part in enumerate(self.parts):
             if part.on != self.datum:
-                found[at] |= found[where[part.on]]
+                found[at] |= found[self.names.index(part.on)]
         return found
 
     @cached_property
@@ -103,11 +102,10 @@ class DatumFlowChain:
 
     def finite(self, errors: Float[np.ndarray, "part 3"]) -> Float[np.ndarray, "part 3"]:
         """Return exact rotation vectors against nominal, in the datum's axes, of errors in own axes [rad]."""
-        where = {name: at for at, name in enumerate(self.names)}
         turned: list[Rotation] = []
         for at, part in enumerate(self.parts):
             own = Rotation.from_rotvec(self.axes[at] @ errors[at])
-            turned.append(own if part.on == self.datum else turned[where[part.on]] * own)
+            turned.append(own if part.on == self.datum else turned[self.names.index(part.on)] * own)
         return np.array([rotation.as_rotvec() for rotation in turned])
 
     def columns(self, orientations: Float[np.ndarray, "*samples part 3"]) -> dict[str, Float[np.ndarray, "*samples"]]:

@@ -49,9 +49,7 @@ class PartStock:
 
     def __post_init__(self) -> None:
         count_units(self.parts, places_of(self.reducer), "parts")
-        for place in self.places:
-            for part in self.fitting(place):
-                self._rows(self.parts[part], place)
+        _ = self._table  # an error that no column of the response stands for is said at once
 
     @cached_property
     def units(self) -> int:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from jaxtyping import Float
 
@@ -59,25 +57,22 @@ def bench_files(new: NewReducer) -> dict[str, str]:
     built = deviations + [true.modification.deviations.get(column, 0.0) for column in errors.columns]
     files = {"bench_units.csv": _parts(errors, built)}
     for unit, (curve, loop) in enumerate(zip(curves, loops, strict=True), start=1):
-        for kind, first, along, read in (
-            ("curve", "angle [deg]", angle / DEGREE, curve),
-            ("loop", "torque [N·m]", _LEVELS * rated, loop),
+        for kind, heads, along, read in (
+            ("curve", ("angle [deg]", "transmission error [arcsec]"), angle / DEGREE, curve),
+            ("loop", ("torque [N·m]", "twist [arcsec]"), _LEVELS * rated, loop),
         ):
-            second = {"curve": "transmission error [arcsec]", "loop": "twist [arcsec]"}[kind]
             rows = zip(along.round(6).tolist(), read.round(3).tolist(), strict=True)
-            files[f"bench_{kind}{unit}.csv"] = table_text((first, second), rows, (SIMULATED,))
+            files[f"bench_{kind}{unit}.csv"] = table_text(heads, rows, (SIMULATED,))
     return {"bench.toml": _main(reducer, len(deviations), rated), **files}
 
 
 def _parts(errors: ErrorModel, deviations: Float[np.ndarray, "unit column"]) -> str:
     """Return the errors of the parts, a row per unit; amounts of modification are whole ones, as in a unit file."""
-    columns = errors.columns
     units = [
-        BuiltUnit(name=str(unit), source="simulated", deviations=dict(zip(columns, map(float, row), strict=True)))
-        for unit, row in enumerate(deviations, start=1)
+        BuiltUnit(name=str(unit), source="simulated", deviations=dict(zip(errors.columns, row, strict=True)))
+        for unit, row in enumerate(deviations.round(9).tolist(), start=1)
     ]
-    rounded = [replace(own, deviations={name: round(v, 9) for name, v in own.deviations.items()}) for own in units]
-    return units_text(rounded, "bench_units.csv", (SIMULATED,))
+    return units_text(units, "bench_units.csv", (SIMULATED,))
 
 
 def _main(reducer: Reducer, units: int, rated: float) -> str:
