@@ -254,6 +254,10 @@ class BoundFunction(Model):
         self.observe(status)
         return Evaluation(values=values, status=status)
 
+    def with_derivatives(self, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
+        """Return the first output of every sample with its derivatives."""
+        return self.derivatives(self.outputs[0], x)
+
     def derivatives(self, output: str, x: Float[np.ndarray, "sample column"]) -> SettingDerivatives:
         """Return an output of every sample with its derivatives, by the user's jacobian or by central differences."""
         own = self.reading((output,))
