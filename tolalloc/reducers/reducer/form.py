@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from functools import lru_cache
 from math import pi
 from pathlib import Path
+from sys import float_info
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from tolalloc.drawings.heads import split_header
-from tolalloc.drawings.table_file import finite_at, read_text_table
+from tolalloc.drawings.table_file import believed_number, read_text_table
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
 
@@ -194,7 +195,7 @@ def read_profile(path: Path, columns: Sequence[str], may: Sequence[str] = ()) ->
     values = np.empty((len(table.rows), len(names)))
     for at, (row, cells) in enumerate(zip(table.rows, table.cells, strict=True)):
         for column, name in enumerate(names):
-            values[at, column] = finite_at(f"{path}, row {row}", name, cells[column], "a number")
+            values[at, column] = believed_number(f"{path}, row {row}", name, cells[column], float_info.max, "a number")
     return dict(zip(names, (values * factors).T, strict=True))
 
 
