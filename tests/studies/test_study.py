@@ -17,6 +17,7 @@ import tolalloc as ta
 from tests.builders import says
 from tests.studies.command import ROOT, command, refused, tolalloc
 from tests.studies.scripts import study_script
+from tolalloc.allocation.space.effort import QUICK_ALLOCATION, AllocationEffort
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.exceptions import InputError, TolallocError, UnknownNameError
 from tolalloc.sensitivity.effort import QUICK_RANKING
@@ -327,12 +328,17 @@ def _sums(effort: ta.Effort, function=lambda a, b: a + 2 * b) -> ta.Study:
 def test_seconds_are_counted_and_shared_by_ranking_and_allocation():
     """At 20,000 units a second; twice the time is twice the units, whatever the machine."""
     numbers = lambda a, b: float(a) + 2 * float(b)  # noqa: E731 (no arrays)
-    short, longer = (Prepared(study=_sums(ta.Effort(seconds=seconds), numbers)) for seconds in (4.0, 8.0))
+    short, longer = (Prepared(study=_sums(ta.Effort(seconds=seconds), numbers)) for seconds in (2.0, 4.0))
     assert longer.ranking_effort.units == pytest.approx(2 * short.ranking_effort.units, abs=1)
     assert longer.ranking_effort.sobol.limit == 2 * short.ranking_effort.sobol.limit
-    assert short.ranking_effort.counted(2) == pytest.approx(2.0 * 20_000, rel=0.5)
-    assert longer.allocation_effort.counted == pytest.approx(4.0 * 20_000, rel=0.02)
-    assert "8 s at 20,000 units a second" in longer.header.assumptions[-1]
+    assert short.ranking_effort.counted(2) == pytest.approx(1.0 * 20_000, rel=0.5)
+    assert longer.allocation_effort.counted == pytest.approx(2.0 * 20_000, rel=0.02)
+    assert "4 s at 20,000 units a second" in longer.header.assumptions[-1]
+    assert longer.allocation_effort.search.steps == QUICK_ALLOCATION.search.steps, "what a full run needs is more"
+    day = Prepared(study=_sums(ta.Effort(seconds=80.0), numbers))
+    assert day.allocation_effort.search.steps == AllocationEffort().search.steps
+    hurried = Prepared(study=_sums(ta.Effort(seconds=0.1), numbers))
+    assert hurried.header.assumptions[-1].startswith("0.1 s were asked for; the least effort that has an answer takes")
     whole_day = Prepared(study=_sums(ta.Effort(seconds=86_400.0)))
     assert whole_day.ranking_effort.sobol.limit * 4 <= 2**26, "what is kept of a day's units must fit into memory"
     assert whole_day.ranking_effort.units * 2 <= 2**20

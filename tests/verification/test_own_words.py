@@ -51,7 +51,7 @@ def test_they_are_in_the_written_drawing_and_read_back(answers, tmp_path):
     written = load_tolerance_table(tmp_path / "found" / "allocation.csv")
     assert [(source.drawing, source.label) for source in written] == [("4711-B", "Hülse Ø55"), ("4711-B", ""), ("", "")]
     page = page_of(tmp_path / "found")
-    assert page.count("Hülse Ø55") >= 2
+    assert "Hülse Ø55" in page
     book = pd.read_excel(tmp_path / "found" / "drawing.xlsx", sheet_name=None, header=None, dtype=str)
     assert any(np.any(sheet.to_numpy() == "Hülse Ø55") for sheet in book.values())
 

@@ -58,8 +58,8 @@ _NO_NAME = re.compile(r"[\[\]:*?/\\']")
 """What no name of a sheet may hold, or what a link to it would have to quote."""
 _CONTROL = re.compile(r"[\000-\010\013\014\016-\037]")
 """What no workbook may hold."""
-_ACROSS = 155
-"""Characters of a row that A4 holds across in letters of 7.5 points [-]."""
+_ACROSS, _MOST_COLUMNS = 200, 16_384
+"""Characters of a row that A4 holds across in letters of 7.5 points, and columns that a sheet has [-]."""
 HEAD = {"bold": True, "text_wrap": True, "valign": "top"}
 """Style of a header."""
 
@@ -104,6 +104,8 @@ class Sheet:
     def __init__(self, inner: Any) -> None:
         self.inner = inner
         self.rows = 0  # The last one that has a cell
+        self._widths: dict[int, float] = {}  # Column → characters
+        self._is_printed, self._printed = False, _MOST_COLUMNS
         self._cells: dict[tuple[int, int], tuple[object, dict[str, object]]] = {}
 
     def cell(self, row: int, column: int, value: object = None, **style: object) -> None:
@@ -117,30 +119,42 @@ class Sheet:
 
     def width(self, column: int, characters: float) -> None:
         """Set the width of a column."""
+        self._widths[column] = characters
         self.inner.set_column(column - 1, column - 1, characters)
 
     def height(self, row: int, points: float) -> None:
         """Set the height of a row."""
         self.inner.set_row(row - 1, points)
 
-    def set_up_print(self, *, headed: bool = True, characters: float = 0.0) -> None:
+    def print_only(self, columns: int) -> None:
+        """Leave all columns behind the first ones out of print, and rows without a cell."""
+        self._printed = columns
+        self.inner.print_area(0, 0, self.rows - 1, columns - 1)
+
+    def set_up_print(self, *, headed: bool = True) -> None:
         """Let the sheet print across on A4, with its header, if it has one, on every page.
 
-        It is as wide as the paper, or as several with the first column on each, so that so many characters of a row
-        are printed no smaller than they can be read.
+        It is as wide as the paper, or as several with the first column on each where letters would be too small.
         """
-        pages = max(ceil(characters / _ACROSS), 1)
+        self._is_printed = True
         self.inner.set_paper(9)  # A4
         self.inner.set_landscape()
-        self.inner.fit_to_pages(pages, 0)
-        if pages > 1:
-            self.inner.repeat_columns(0)
         if headed:
             self.inner.repeat_rows(0)
         self.inner.set_footer("&L&A&R&P / &N")
 
+    def _fit_to_pages(self) -> None:
+        """Spread the printed columns over as many pages as they need to be read."""
+        characters = sum(own for column, own in self._widths.items() if column <= self._printed)
+        pages = max(ceil(characters / _ACROSS), 1)
+        self.inner.fit_to_pages(pages, 0)
+        if pages > 1:
+            self.inner.repeat_columns(0)
+
     def write(self, book: Book) -> None:
         """Hand all cells over to XlsxWriter."""
+        if self._is_printed:
+            self._fit_to_pages()
         for (row, column), (value, style) in self._cells.items():
             _write(self.inner, (row - 1, column - 1), value, style, book)
 
@@ -170,18 +184,15 @@ class Book:
         """Return a new sheet with a table: headers frozen, numbers as their unit asks for, set up for print."""
         sheet = self.sheet(name)
         sheet.inner.freeze_panes(1, 0)
-        characters = 0.0
+        sheet.set_up_print()
         for number, header in enumerate(frame.columns, start=1):
             values = frame.iloc[:, number - 1].tolist()
             longest = max([len(str(header)) * 0.7, *(len(str(value)) for value in values[:40])])
-            width = min(max(longest + 2, 10), 60)
-            characters += width
-            sheet.width(number, width)
+            sheet.width(number, min(max(longest + 2, 10), 60))
             sheet.cell(1, number, str(header), **HEAD)
             shown = {"num_format": _FORMATS.get(in_cost_units(unit_of(str(header))), "0.0###")}
             for row, value in enumerate(values, start=2):
                 sheet.cell(row, number, value, **(shown if isinstance(value, float | Formula) else {}))
-        sheet.set_up_print(characters=characters)
         return sheet
 
     def style(self, **properties: object) -> Any:

@@ -132,7 +132,8 @@ class Effort(NamedFields):
         rate = f"at {model.stated_rate:,.0f} units a second, an assumed rate that no clock corrects"
         takes = units / model.stated_rate
         if takes > _LONGER * self.seconds:
-            return (f"the least effort that has an answer, for about {takes:,.0f} s {rate}: {self.seconds:,g} s asked",)
+            least = f"the least effort that has an answer takes about {takes:,.0f} s {rate}"
+            return (f"{self.seconds:,g} s were asked for; {least}",)
         return (f"units for about {self.seconds:,g} s {rate}; four times as long halves the intervals of the indices",)
 
     def of_ranking(self, model: Model, sources: int, kinds: int) -> RankingEffort:

@@ -11,7 +11,7 @@ FEWEST_FOR_YIELD = 1152
 """Units of a design in the shortest run: 1,109 just show the usual yield, 99.73 %, with 95 % confidence [-]."""
 _MOST_OF_DESIGN, _MOST_CONFIRMED = 2**16, 2**23
 """Units of a design, and those that confirm one, that memory holds however long a run may take [-]."""
-_OF_SEARCH, _OF_CONFIRMATION, _OF_FRONT = 1.5, 1.5, 0.7
+_OF_SEARCH, _OF_CONFIRMATION, _OF_FRONT = 2.5, 4.0, 1.1
 """Time of a unit of a search, a confirmation and a front over that of one with all limited outputs [-]."""
 
 

@@ -100,7 +100,7 @@ def add_answer(book: Book, result: AllocationResult, header: Header, watched: pd
             rows.row += 1
         rows.across(text, name=_say("sheet_warnings") if at == 0 else " ")
     rows.sheet.set_up_print()
-    rows.sheet.inner.print_area(f"A1:F{rows.row}")
+    rows.sheet.print_only(len(_WIDTHS))
 
 
 def _guard(rows: AnswerSheet, groups: int) -> None:

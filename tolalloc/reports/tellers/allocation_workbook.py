@@ -233,7 +233,7 @@ def _lay_out(drawing: Sheet, columns: int) -> None:
     for column in range(1, columns + 1):
         drawing.width(column, _WIDTHS[column - 1] if column < _WEIGHTS else 16)
     drawing.inner.freeze_panes(1, 2)
-    drawing.inner.print_area(f"A1:{letter(_WEIGHTS - 1)}{drawing.rows}")
+    drawing.print_only(_WEIGHTS - 1)
 
 
 def _add_requirements(book: Book, watched: pd.DataFrame) -> None:
@@ -246,7 +246,7 @@ def _add_requirements(book: Book, watched: pd.DataFrame) -> None:
     for column in range(2, watched.shape[1] + 1):
         sheet.width(column, 16)  # a formula is longer than its number
     sheet.height(1, 4 * _LINE)
-    sheet.inner.print_area(f"A1:E{sheet.rows}")
+    sheet.print_only(5)
 
 
 def _mark(result: AllocationResult, lines: Sequence[_Line], drawing: Sheet) -> None:
