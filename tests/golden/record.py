@@ -38,7 +38,7 @@ _UNSTEADY = (
     (r"\d+(\.\d+)? (s|min|h) to \d+(\.\d+)? (s|min|h) here", "# here"),
     (r"# s to \d+(\.\d+)? (s|min|h) here", "# here"),
     (r"\d{4}-\d\d-\d\d", "DATE"),
-    (r"Compiling the kernel.*\n", ""),
+    (r"(Compiling the kernel|What is asked takes).*\n", ""),
     (r", \d+ units/s", ", # units/s"),
     (r'(computing time \[s\](": |,))[\d.e+,-]*\d', r"\g<1>0"),
     (r"(computing time \[s\]) .*$", r"\1"),

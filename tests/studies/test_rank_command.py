@@ -91,7 +91,7 @@ def test_errors_of_the_housing_make_multiples_of_the_teeth_and_turning_ones_of_t
     orders = pd.read_csv(ranked / "tables" / "orders.csv")
     order, alone = orders["order of the output turn [-]"], orders["alone low 5 % [-]"] > 0.05
     of_housing, of_discs = (
-        orders["dimension"].str.startswith("housing."),
+        orders["dimension"].str.startswith("housing "),
         orders["dimension"] == "disc pitch",
     )
     # The main orders of either: order 2 of the housing's pins, order 1 of a disc's teeth; the discs stand opposite each

@@ -303,7 +303,7 @@ def test_processes_change_only_where_that_clearly_pays(three, prepared):
     _, found = three
     stacks = aimed(found, [found])
     for factor, change in ((0.01, True), (10.0, False)):
-        space, _ = with_alternatives(prepared, "housing.pitch", factor)
+        space, _ = with_alternatives(prepared, "housing pitch", factor)
         programs, present = Programs(space), np.zeros(len(space.groups), dtype=int)
         chosen = programs.choose(stacks, present)
         assert bool((chosen != present).any()) == change

@@ -288,7 +288,7 @@ def _tell_today(prepared: Prepared, progress: Progress) -> None:
 
     seconds = expected_seconds(prepared)
     if seconds > _SHORT:
-        progress.tell(f"What is asked takes about {in_words(seconds)} on this machine.")
+        progress.tell(f"What is asked takes about {in_words(seconds)} here.")
 
 
 def cache_beside(folder: Path) -> ResultCache:
