@@ -12,9 +12,7 @@ import tolalloc as ta
 from tests.builders import seeded_units
 from tolalloc.exceptions import InputError
 from tolalloc.reducers.cycloid.tooth_profile import path_curvature
-from tolalloc.reducers.equivalent.model import EquivalentModel
-from tolalloc.reducers.equivalent.perfect import exact_unit
-from tolalloc.reducers.equivalent.wear import Wear, flank_depth_per_force, pin_depth_per_work, wear_of
+from tolalloc.reducers.equivalent.wear import flank_depth_per_force, pin_depth_per_work, wear_of
 from tolalloc.reducers.load_case import LoadCase
 from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.reducer.design import Modification, Reducer
@@ -46,20 +44,6 @@ def units(drawing: ta.Drawing, count: int) -> np.ndarray:
     return seeded_units(drawing.errors, count)
 
 
-def depths(wear: Wear) -> np.ndarray:
-    """Return what is taken off the flanks at the points of a tooth space [m]."""
-    return -np.array(wear.form.worn.deviation)
-
-
-def pin_depth(reducer: Reducer, wear: Wear) -> float:
-    """Return what the radius of the pins loses if they lose the volume that the flanks of both discs do [m]."""
-    stage, angle = reducer.cycloid_stage, np.array(wear.form.worn.angle)
-    root = np.sqrt(1 + stage.shortening**2 - 2 * stage.shortening * np.cos(angle))
-    along = stage.pin_circle_radius * root * (1 + stage.pin_radius * path_curvature(stage, angle))
-    space = (depths(wear) * along).mean() * 2 * np.pi / stage.pin_count  # [m²] of one tooth space
-    return space * stage.disc_teeth / (2 * np.pi * stage.pin_radius * stage.pin_count)
-
-
 def test_one_contact_wears_as_archard_says(reducer):
     stage, angle, force = reducer.cycloid_stage, np.array(np.radians(60.0)), 500.0
     root = np.sqrt(1 + stage.shortening**2 - 2 * stage.shortening * np.cos(angle))
@@ -74,22 +58,23 @@ def test_one_contact_wears_as_archard_says(reducer):
 
 
 def test_volume_off_the_flanks_is_coefficient_times_force_times_way(reducer):
-    """Off the flanks as much as off the pins, whose volume a unit of exact parts tells."""
-    found, model = wear_of(reducer, (WORK,), 100.0), EquivalentModel(reducer)
-    errors = exact_unit(model)
-    diameters = [model.columns.index(f"each_pin.diameter.{pin}") for pin in range(1, 41)]
-    taken = (errors - found.aged(model, errors))[:, diameters].mean()
-    assert pin_depth(reducer, found) == pytest.approx(taken / 2, rel=0.05)
+    stage, found = reducer.cycloid_stage, wear_of(reducer, (WORK,), 100.0)
+    root = np.sqrt(1 + stage.shortening**2 - 2 * stage.shortening * np.cos(found.angle))
+    along = stage.pin_circle_radius * root * (1 + stage.pin_radius * path_curvature(stage, found.angle))
+    flank = (found.depth * along).mean() * 2 * np.pi / stage.pin_count  # [m²] of one tooth space
+    assert flank * stage.face_width * stage.disc_teeth * 2 == pytest.approx(found.volume, rel=0.03)
+    pins = found.pin_depth * 2 * np.pi * stage.pin_radius * stage.face_width * 2 * stage.pin_count
+    assert pins == pytest.approx(found.volume, rel=1e-3)
 
 
 def test_depth_grows_with_hours_and_coefficient_and_half_steps_change_little(reducer):
-    assert wear_of(reducer, (WORK,), 0.0).form is None
-    most = [depths(wear_of(reducer, (WORK,), hours)).max() for hours in (1000.0, 3000.0, 6000.0)]
-    assert all(np.diff(most, prepend=0.0) > 0)
+    depths = [wear_of(reducer, (WORK,), hours).depth.max() for hours in (0.0, 1000.0, 3000.0, 6000.0)]
+    assert depths[0] == 0.0
+    assert all(np.diff(depths) > 0)
     fine = wear_of(reducer, (WORK,), 6000.0, step=5e-7)
-    assert depths(fine).max() == pytest.approx(most[-1], rel=0.01)
+    assert fine.depth.max() == pytest.approx(depths[-1], rel=0.01)
     harder = replace(reducer, friction=replace(reducer.friction, wear_mm3_per_nm=1e-10))
-    assert depths(wear_of(harder, (WORK,), 6000.0)).max() == pytest.approx(most[1], rel=1e-6)
+    assert wear_of(harder, (WORK,), 6000.0).depth.max() == pytest.approx(depths[2], rel=1e-6)
 
 
 def test_parts_without_hours_are_new_to_the_last_bit(model, drawing):
@@ -115,7 +100,7 @@ def test_a_unit_ages_by_its_own_errors(model, drawing):
     columns = [own.model.columns.index(f"each_pin.diameter.{pin}") for pin in range(1, 41)]
     taken = own.errors(x)[:, columns] - model.kernel.errors(x)[:, columns]
     assert taken.max() < 0
-    assert taken.mean() == pytest.approx(-2 * pin_depth(own.model.reducer, own.wear), rel=0.1)
+    assert taken.mean() == pytest.approx(-2 * own.wear.pin_depth, rel=0.1)
 
 
 @pytest.mark.slow

@@ -54,6 +54,11 @@ class Wear:
     Flanks are common to all units; the pins of a unit wear by its own forces, `aged`.
     """
 
+    hours: float  # [h]
+    angle: Float[np.ndarray, " point"]  # φ of the points of a tooth space, 0 in its middle, equally spaced [rad]
+    depth: Float[np.ndarray, " point"]  # Off the flanks along their normal there, mean of the discs [m]
+    pin_depth: float  # Off the radius of a pin, the same all around it [m]
+    volume: float  # Off the flanks of all discs; the pins have lost as much [m³]
     form: PartForm | None  # Of the worn parts, as `tolalloc.reducers.reducer.design.Reducer` has it
     phases: tuple[DutyPhase, ...]
     steps: tuple[_Step, ...]
@@ -159,8 +164,8 @@ def wear_of(
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> found = wear_of(load_reducer("rv20e"), (LoadCase("rated", torque=-167, speed=15),), 6000)
-    >>> round(-1e6 * min(found.form.worn.deviation), 2)  # off the flanks at most [µm]
-    2.27
+    >>> round(1e6 * float(found.depth.max()), 2), round(1e6 * found.pin_depth, 2)  # off flanks, off pins' radius [µm]
+    (2.27, 0.12)
     """
     duty = require_duty(f"wear of {reducer.name}", cases)
     default = reducer.load.test_torque if torque is None else torque
@@ -179,8 +184,8 @@ def wear_of(
 def _worn(reducer: Reducer, phases: tuple[DutyPhase, ...], hours: float, step: float) -> Wear:
     count = reducer.cycloid_stage.pin_count * PHASES // _TOGETHER
     angle = 2.0 * pi / count * (np.arange(count) + 0.5 - 0.5 / _TOGETHER)
-    depth, pins = np.zeros(count), 0.0
-    first, across = _rates(reducer, phases, angle, depth, pins)
+    depth, pins, volume = np.zeros(count), 0.0, 0.0
+    first, across, _ = _rates(reducer, phases, angle, depth, pins)
     most = hours * max(float(first.max()), 2.0 * across)
     if most > LARGEST_FREE:
         fitting = hours * LARGEST_FREE / most
@@ -189,12 +194,21 @@ def _worn(reducer: Reducer, phases: tuple[DutyPhase, ...], hours: float, step: f
     number = max(ceil(most / step), 1)
     own, steps = hours / number, list[_Step]()
     for _ in range(number if hours else 0):
-        flank, round_pin = _rates(reducer, phases, angle, depth, pins)
+        flank, round_pin, _ = _rates(reducer, phases, angle, depth, pins)
         middle = depth + own / 2.0 * flank, pins + own / 2.0 * round_pin
         steps.append(_Step(hours=own, start=_form(reducer, angle, depth), middle=_form(reducer, angle, middle[0])))
-        flank, round_pin = _rates(reducer, phases, angle, *middle)
-        depth, pins = depth + own * flank, pins + own * round_pin
-    return Wear(form=_form(reducer, angle, depth), phases=phases, steps=tuple(steps))
+        flank, round_pin, lost = _rates(reducer, phases, angle, *middle)
+        depth, pins, volume = depth + own * flank, pins + own * round_pin, volume + own * lost
+    return Wear(
+        hours=hours,
+        angle=angle,
+        depth=depth,
+        pin_depth=pins,
+        volume=volume,
+        form=_form(reducer, angle, depth),
+        phases=phases,
+        steps=tuple(steps),
+    )
 
 
 def _form(reducer: Reducer, angle: Points, depth: Points) -> PartForm | None:
@@ -207,8 +221,8 @@ def _form(reducer: Reducer, angle: Points, depth: Points) -> PartForm | None:
 
 def _rates(
     reducer: Reducer, phases: Sequence[DutyPhase], angle: Points, depth: Points, pins: float
-) -> tuple[Points, float]:
-    """Return what an hour takes off the flanks and off the radius of the pins [m]."""
+) -> tuple[Points, float, float]:
+    """Return what an hour takes off the flanks and off the pins' radius, and the volume off all flanks [m, m, m³]."""
     stage = reducer.cycloid_stage
     flank, work = np.zeros(depth.size), 0.0
     for phase in phases:
@@ -225,7 +239,7 @@ def _rates(
         flank += passes * (flank_depth_per_force(reducer, at) * force).reshape(-1, _TOGETHER).mean(axis=1)
         ways = np.abs(sliding_ways(reducer, solved.equilibria.carrier_angle))
         work += phase.turns * 2.0 * pi * float((solved.forces.pins * ways).sum(axis=(2, 3)).mean())
-    return flank, work / stage.pin_count * pin_depth_per_work(reducer)
+    return flank, work / stage.pin_count * pin_depth_per_work(reducer), work * reducer.friction.wear
 
 
 def _force_over_flank(solved: Solved) -> tuple[Float[np.ndarray, " phase"], Float[np.ndarray, " phase"]]:
