@@ -148,7 +148,7 @@ def graded():
 @pytest.fixture(scope="module")
 def priced(tmp_path_factory):
     """Four groups that may change, each by several processes, and a lower limit whose stack adds, too."""
-    free = {"disc bores", "pin.diameter", "disc run-out", "housing.pitch"}
+    free = {"disc bores", "pin diameter", "disc run-out", "housing pitch"}
     sources = [replace(own, locked=own.dimension not in free) for own in load_tolerance_table("rv20e_table4")]
     table = tmp_path_factory.mktemp("table") / "locked.csv"
     table_frame(sources).to_csv(table, index=False)

@@ -353,7 +353,7 @@ def test_amounts_that_are_not_those_of_today_are_said_with_the_zones_on_the_firs
     assert says(first, "allocation.convention", convention=results.model.drawn_amounts.convention)
 
 
-@pytest.mark.parametrize(("middle", "names"), [(0.0, ()), (-3e-6, ("pin.diameter",))])
+@pytest.mark.parametrize(("middle", "names"), [(0.0, ()), (-3e-6, ("pin diameter",))])
 def test_a_grade_off_the_nominal_size_is_said_to_be_no_letter(results, middle, names):
     """Zones climb grades about the middle of the table: 0/−6 becomes −1.75/−4.25, which is IT3 wide but no h3."""
     graded = on_grades(results, middle)
