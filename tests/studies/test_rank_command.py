@@ -71,7 +71,7 @@ def test_pairs_say_what_errors_add_together(ranked):
     assert len(pairs) == 10  # of five dimensions, both discs' pitch one of them
     assert (pairs["S2 low 5 % [-]"] <= pairs["second index S2 [-]"]).mean() > 0.9
     # The two discs and the housing act together, pin and groove hardly at all.
-    assert "pin.diameter" not in set(pairs.iloc[0][["dimension", "with"]])
+    assert "pin diameter" not in set(pairs.iloc[0][["dimension", "with"]])
 
 
 @pytest.mark.slow
