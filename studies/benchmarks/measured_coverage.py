@@ -134,7 +134,7 @@ def main() -> None:
                 held.append(not design.met or case.share(own.space.zones(design.design) * 1e3) >= TARGET)
                 drawn = own.verify(own.space.uniform(1.0), "drawn").achieved
                 inside.append(drawn.low <= case.share(known) <= drawn.high)
-                margin = design.doubts[own.requirements[0].output].margin(case.limits, 1 - TARGET)
+                margin = design.uncertainties[own.requirements[0].output].margin(case.limits, 1 - TARGET)
                 margins.append(margin / own.limit)
                 scale = as_if_known(case, own)
                 plain.append(case.share(scale * known) >= TARGET)

@@ -46,7 +46,7 @@ def row(case: RareCase, seeds: int) -> dict[str, Any]:
         "worst": float(factors[~cautioned].max()) if not cautioned.all() else None,
         "beyond": int((np.abs(estimates - case.exact) > 3 * errors).sum()),
         "cautioned": int(cautioned.sum()),
-        "calls": float(np.mean([item.calls for item in found])),
+        "calls": float(np.mean([sum(own.calls for own in item.estimates) for item in found])),
     }
 
 
