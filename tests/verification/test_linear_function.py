@@ -15,6 +15,7 @@ from tolalloc.drawings.correlation import Correlation, Pair
 from tolalloc.drawings.distributions import Distribution
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.zones import Feature
+from tolalloc.sensitivity.sobol import SourceIndices
 
 UNIFORM, TRIANGULAR = {"distribution": Distribution.UNIFORM}, {"distribution": Distribution.TRIANGULAR}
 SHIFTED = {"shift": 0.3, "cp": 1.3}
@@ -78,6 +79,30 @@ def test_the_share_beyond_is_that_of_random_units(mix):
     limits = Limits(lower=float(np.quantile(y, 0.002)), upper=float(np.quantile(y, 0.997)))
     share = law_of(errors, slopes).beyond(limits, 0.0)
     assert np.mean(~limits.kept_by(y)) == pytest.approx(share, abs=4 * np.sqrt(share / y.size))
+
+
+@pytest.mark.parametrize("mix", MIXES)
+def test_what_columns_add_to_the_variance_is_what_random_units_scatter(mix):
+    """400,000 units: within four standard errors of each variance."""
+    errors = errors_of(MIXES[mix])
+    x = units_at_random(errors, 400_000)
+    slopes = 1e3 * np.arange(1, 1 + x.shape[1]) * (-1.0) ** np.arange(x.shape[1])
+    off = (x * slopes - (x * slopes).mean(axis=0)) ** 2
+    error = off.std(axis=0) / np.sqrt(len(x))
+    assert (np.abs(law_of(errors, slopes).variances - off.mean(axis=0)) < 4 * error).all()
+
+
+def test_indices_of_a_linear_output_are_the_parts_of_its_variance():
+    """Two correlated sizes count as one: 0.1² + 0.2² + 2·0.6·0.1·0.2 = 0.074 beside 0.3² = 0.09, a third part 0.16²."""
+    zones = (1e-4, 2e-4, 3e-4, 1.6e-4)
+    sources = tuple(source(f"s{at}", zone=zone) for at, zone in enumerate(zones))
+    errors = ErrorModel(sources, correlation=Correlation(pairs=(Pair(one="s0", other="s1", correlation=0.6),)))
+    found = SourceIndices.of_linear(law_of(errors, np.full(4, 1000.0)), errors.dimension_of_column)
+    parts = np.array([0.074, 0.09, 0.0256])
+    assert found.sources == ("s0 + s1", "s2", "s3")
+    np.testing.assert_allclose(found.total, parts / parts.sum(), rtol=1e-12)
+    np.testing.assert_allclose(found.total_interval, np.tile(found.total, (2, 1)), rtol=1e-12)
+    assert [pair.probability for pair in found.neighbours] == [1.0, 1.0]
 
 
 @pytest.mark.parametrize("mix", MIXES)

@@ -390,16 +390,19 @@ class DrawingQuestion:
             return None
         return best_yield(lambda target: cost_at_yield(space, free, target), price, self.effort.yields)
 
-    def shares(self, space: DesignSpace, design: Float[np.ndarray, " variable"]) -> SourceIndices | None:
+    def shares(self, drawn: VerifiedDesign) -> SourceIndices | None:
         """Return the indices of the leading output by dimension of the drawing, at the zones and settings of a design.
 
         None if it is constant.
         """
-        errors, blocks, leading = space.errors, self.effort.share_blocks, self.requirements[0].output
-        response = self.model.at(space.settings_of(design)).reading((leading,))
-        experiment = Experiment(response, errors, space.zones(design), self.seeds("shares"), self.largest_failed_share)
+        errors, blocks, leading = drawn.space.errors, self.effort.share_blocks, self.requirements[0].output
+        groups = errors.dimension_of_column
+        if law := drawn.laws.get(leading):
+            return SourceIndices.of_linear(law, groups)
+        response, zones = self.model.at(drawn.settings).reading((leading,)), drawn.space.zones(drawn.design)
+        experiment = Experiment(response, errors, zones, self.seeds("shares"), self.largest_failed_share)
         cheap = learnt(experiment, blocks)
-        fixed, groups = SobolEffort(start=blocks, limit=blocks), errors.dimension_of_column
+        fixed = SobolEffort(start=blocks, limit=blocks)
         try:
             return sobol_indices(experiment, fixed, factor_groups=groups, cheap=cheap).of(leading)
         except ConstantOutputError:
@@ -461,7 +464,7 @@ def allocate_drawing(question: DrawingQuestion, record: RunRecord, name: str) ->
         proven = question.proven(free, record)
         with record.stage("shares of variance"):
             chosen = Candidates(fixed=fixed, free=free, graded=graded).drawn
-            shares = question.shares(chosen.space, chosen.design)
+            shares = question.shares(chosen)
         with record.stage("units of the drawing"):
             examination = question.examined(chosen)
     return AllocationResult(

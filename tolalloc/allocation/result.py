@@ -340,7 +340,7 @@ def limit_price(side: OneSidedConstraint, price: float) -> tuple[float, str]:
     λ·step (own derivation), as every shadow price for small changes.
     """
     step, unit = limit_step(side), unit_of(side.stack.name)
-    return price * step, unit if step == 1 else f"{step:g} {unit}"
+    return price * step, unit if step == 1 else f"{step:g} {unit}".removesuffix(" -")
 
 
 def unit_quantile(design: VerifiedDesign, check: Check, side: OneSidedConstraint) -> float:

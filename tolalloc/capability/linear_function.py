@@ -268,6 +268,16 @@ class LinearLaw:
         return np.asarray(loads * (self.errors.normal_correlation @ loads if self.errors.is_correlated else loads))
 
     @cached_property
+    def variances(self) -> Float[np.ndarray, " column"]:
+        """What every column adds to the variance, half of what two share to each of them [unit of the output²]."""
+        alone = [
+            0.0 if _is_normal(source) else source.zone_mapping.moments[1] / source.lever * zone
+            for source, zone in zip(self.errors.active, self.zones, strict=True)
+        ]
+        own = np.array(alone)[self._source_of_column] * self.function.slopes
+        return np.asarray(self._covariances + own**2)
+
+    @cached_property
     def _normal_deviation(self) -> float:
         return float(np.sqrt(max(self._covariances.sum(), 0.0)))
 

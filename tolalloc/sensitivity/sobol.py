@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from tolalloc.capability.experiment import Experiment
+from tolalloc.capability.linear_function import LinearLaw
 from tolalloc.exceptions import ConstantOutputError, InputError, UnknownNameError
 from tolalloc.models.model import Evaluation, Response, Samples
 from tolalloc.sensitivity.effort import LARGEST, SobolEffort
@@ -47,6 +48,29 @@ class SourceIndices(SourceRanking):
     pairs: tuple[tuple[int, int], ...]
     second: Float[np.ndarray, " pair"]
     second_resamples: Float[np.ndarray, "resample pair"]
+
+    @classmethod
+    def of_linear(cls, law: LinearLaw, groups: tuple[str, ...]) -> SourceIndices:
+        """Return the indices of a linear output without an error, by the group of every column.
+
+        Sᵢ = STᵢ = Σ slope²·variance of the group's columns over that of all, correlations in the group included [-].
+        """
+        of_group = dict.fromkeys(groups, 0.0)
+        for group, variance in zip(groups, law.variances.tolist(), strict=True):
+            of_group[group] += variance
+        share = np.array(list(of_group.values())) / law.variances.sum()
+        exact = np.tile(share, (2, 1))
+        return cls(
+            sources=tuple(of_group),
+            total=share,
+            total_resamples=exact,
+            blocks=0,
+            first=share,
+            first_resamples=exact,
+            pairs=(),
+            second=np.empty(0),
+            second_resamples=np.empty((2, 0)),
+        )
 
     @property
     def first_interval(self) -> Ends:

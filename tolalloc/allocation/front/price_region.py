@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -13,6 +13,7 @@ from tolalloc.allocation.cost.model import Process, Weighted
 from tolalloc.allocation.search import process_choice
 from tolalloc.allocation.search.convex_program import ConvexProgram
 from tolalloc.allocation.search.discrete import DiscreteProblem, DiscreteSolution, Option
+from tolalloc.allocation.search.lagrange_dual import LagrangeDual, ascend
 from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Solution
 from tolalloc.exceptions import SolveError
 
@@ -67,28 +68,61 @@ def price_ranges(problem: AllocationProblem, optimum: Solution) -> tuple[PriceRa
     Own derivation; A. V. Fiacco, Introduction to sensitivity and stability analysis in nonlinear programming (1983),
     for V′.
     """
-    program = ConvexProgram(problem.features, optimum.processes, len(problem.stacks), problem.shared)
+    features = zip(problem.features, optimum.processes, strict=True)
+    alone = replace(problem, features=tuple(replace(own, processes=(own.processes[at],)) for own, at in features))
+    dual = LagrangeDual(alone)
+    # Settings give the dual kinks, at which an ascent stops, and planes make it long.
+    kinked = dual.planar.any() or problem.shared.names
+    worth = _worth_by_program(alone) if kinked else _worth_by_dual(dual, optimum)
+
+    def price(at: int, zone: float) -> float | None:
+        (made,) = alone.features[at].processes
+        slope = float(made.cost.slope(np.array(zone)))
+        own = worth(at, zone) if slope < 0 and made.minimum <= zone <= made.maximum else None
+        return None if own is None else own / -slope
+
     found = []
-    for at, zone in enumerate(optimum.zones):
-        low = _price(problem, program, at, zone / (1 + SAME))
-        high = _price(problem, program, at, zone * (1 + SAME))
+    for at, zone in enumerate(optimum.zones.tolist()):
+        low, high = price(at, zone / (1 + SAME)), price(at, zone * (1 + SAME))
         found.append(PriceRange(low=0.0 if low is None else low, high=np.inf if high is None else high))
     return tuple(found)
 
 
-def _price(problem: AllocationProblem, program: ConvexProgram, at: int, zone: float) -> float | None:
-    """Return the factor of a zone's cost at which it is cheapest at a value; none where no price makes it so."""
-    lower, upper = program.lower.copy(), program.upper.copy()
-    if not lower[at] <= zone <= upper[at]:
-        return None
-    lower[at], upper[at] = zone * (1 - _HELD), zone * (1 + _HELD)
-    found = program.solve(problem.stacks, lower=lower, upper=upper)
-    if found is None:  # no other zones make room for it
-        return None
-    slopes = [stack.zone_slopes(found.zones)[at] for stack in problem.stacks]
-    worth = float(found.prices @ np.array(slopes)) + 2 * problem.features[at].loss * zone
-    slope = float(problem.features[at].processes[program.processes[at]].cost.slope(np.array(zone)))
-    return float(worth / -slope) if slope < 0 else None
+Worth = Callable[[int, float], float | None]
+"""Returns what less of a zone held at a value is worth to all others, none where they have no room beside it."""
+
+
+def _worth_by_program(problem: AllocationProblem) -> Worth:
+    """Return what tells the worth by the prices of a convex program in which the zone is held."""
+    program = ConvexProgram(problem.features, np.zeros(len(problem.features), int), len(problem.stacks), problem.shared)
+
+    def worth(at: int, zone: float) -> float | None:
+        lower, upper = program.lower.copy(), program.upper.copy()
+        lower[at], upper[at] = zone * (1 - _HELD), zone * (1 + _HELD)
+        found = program.solve(problem.stacks, lower=lower, upper=upper)
+        if found is None:
+            return None
+        slopes = [stack.zone_slopes(found.zones)[at] for stack in problem.stacks]
+        return float(found.prices @ np.array(slopes)) + 2 * problem.features[at].loss * zone
+
+    return worth
+
+
+def _worth_by_dual(dual: LagrangeDual, optimum: Solution) -> Worth:
+    """Return what tells it by the dual, from the optimum's prices; a bound above the dearest design shows no room."""
+    problem = dual.problem
+    smallest, largest = np.array([(own.processes[0].minimum, own.processes[0].maximum) for own in problem.features]).T
+    dearest = problem.cost(smallest, np.zeros(smallest.size, int)) + float(problem.losses @ largest**2)
+    allowed = np.ones(smallest.size, bool)
+
+    def worth(at: int, zone: float) -> float | None:
+        held = dual.held(at, zone)
+        start = held.price(optimum.prices, held.planes(optimum.zones))
+        best = max(ascend(held, start, allowed, dearest), key=lambda priced: held.bound(priced, allowed))
+        linear, square = held.zone_prices(best.prices, best.planes)
+        return None if held.bound(best, allowed) >= dearest else float(linear[at] + 2 * square[at] * zone)
+
+    return worth
 
 
 def graded_price_ranges(problem: DiscreteProblem, optimum: DiscreteSolution) -> tuple[PriceRange, ...]:

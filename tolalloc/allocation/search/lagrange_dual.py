@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -171,11 +172,8 @@ class LagrangeDual:
 
     def price(self, prices: Float[np.ndarray, " stack"], planes: Float[np.ndarray, "stack feature"]) -> PricedProcesses:
         """Return the least priced cost of every process, for prices of 0 or above and planes of unit length."""
-        half = np.where(self._squared, prices / 2, 0.0)
-        plane = np.where(self._squared, 0.0, prices)
-        budget = np.where(self._squared, self._budget, 1.0)
-        linear = prices @ self._worst_case + plane @ (planes * self._root_sum_square)
-        square = (half / budget) @ self._root_sum_square**2 + self.problem.losses
+        half, plane = np.where(self._squared, prices / 2, 0.0), np.where(self._squared, 0.0, prices)
+        linear, square = self.zone_prices(prices, planes)
         slope, box = prices @ self._slopes, self.problem.shared
         shared = np.where(slope > 0, box.lower, box.upper)
         least, zones = np.empty((2, self.feature.size))
@@ -190,6 +188,27 @@ class LagrangeDual:
             prices=prices,
             planes=planes,
         )
+
+    def zone_prices(
+        self, prices: Float[np.ndarray, " stack"], planes: Float[np.ndarray, "stack feature"]
+    ) -> tuple[Float[np.ndarray, " feature"], Float[np.ndarray, " feature"]]:
+        """Return the price of every zone [cost units per unit of the zone], and of its square [cost units per unit²].
+
+        What stacks take of them, and the loss; the arguments are those of `price`.
+        """
+        plane, budget = np.where(self._squared, 0.0, prices), np.where(self._squared, self._budget, 1.0)
+        linear = prices @ self._worst_case + plane @ (planes * self._root_sum_square)
+        square = ((prices - plane) / (2 * budget)) @ self._root_sum_square**2 + self.problem.losses
+        return np.asarray(linear), np.asarray(square)
+
+    def held(self, at: int, zone: float) -> LagrangeDual:
+        """Return the dual of the same allocation with the zone of a feature held."""
+        found, here = copy(self), [self.feature[own.places] == at for own in self._alone]
+        found._alone = tuple(
+            replace(own, low=np.where(its, zone, own.low), high=np.where(its, zone, own.high))
+            for own, its in zip(self._alone, here, strict=True)
+        )
+        return found
 
     def choice(self, priced: PricedProcesses, allowed: Bool[np.ndarray, " process"]) -> Int[np.ndarray, " feature"]:
         """Return the place of the least allowed process of every feature among all processes."""
@@ -280,7 +299,14 @@ def ascend(
         [np.log(np.stack([floor, floor * 1e18], axis=1)), np.tile([-2.0, 2.0], (free.size - stacks, 1))]
     )
     with suppress(StopIteration):
-        minimize(falling, free, jac=True, method="L-BFGS-B", bounds=ends, options={"maxiter": _STEPS, "ftol": 1e-14})
+        minimize(
+            falling,
+            free,
+            jac=True,
+            method="L-BFGS-B",
+            bounds=ends,
+            options={"maxiter": _STEPS, "ftol": 1e-14, "gtol": 1e-6},
+        )
     return tried
 
 

@@ -512,8 +512,12 @@ class Requirement:
     def sentence(self) -> str:
         """The requirement in words."""
         ends = {"at least": self.limits.lower, "at most": self.limits.upper}
-        said = " and ".join(f"{word} {end:g}" for word, end in ends.items() if end is not None)
+        said = " and ".join(f"{word} {self.told(end)}" for word, end in ends.items() if end is not None)
         return f"{self.output}: {said}, shown for {self.guarantee.words}"
+
+    def told(self, limit: float) -> str:
+        """Return one of its limits as it was stated [unit of the output]."""
+        return f"{limit:g}"
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -571,6 +575,10 @@ class OwnLimit(Requirement):
     """
 
     stated_by: ClassVar[str] = "model"
+
+    def told(self, limit: float) -> str:
+        """Return its limit, which nobody stated, as a result is read [unit of the output]."""
+        return f"{limit:.4g}"
 
     def in_force(self, model: Model) -> OwnLimit:
         """Return the requirement with the limit at the settings of a model."""

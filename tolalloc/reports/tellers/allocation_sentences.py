@@ -298,7 +298,7 @@ def missed(design: VerifiedDesign) -> str:
     return _say(
         "missed" if np.isfinite(side.value) else "missed_unanswered",
         output=quantity(check.requirement.output),
-        limit=with_unit(f"{side.limit:g}", check.requirement.output),
+        limit=with_unit(check.requirement.told(side.limit), check.requirement.output),
         shown=check.requirement.guarantee.words,
         value=with_unit(f"{side.value:.4g}", check.requirement.output),
         excess=with_unit(f"{side.excess:.3g}", check.requirement.output),
@@ -399,7 +399,8 @@ def _prices(result: AllocationResult, cost_unit: str) -> Iterator[str]:
     for check, side in result.chosen.limited_sides if result.free.chosen.met else ():
         if price := result.price_of(check, side):
             cost, _ = limit_price(side, price)
-            limit, step = (with_unit(f"{own:g}", side.stack.name) for own in (side.limit, limit_step(side)))
+            told = check.requirement.told(side.limit), f"{limit_step(side):g}"
+            limit, step = (with_unit(own, side.stack.name) for own in told)
             gaps = {"output": quantity(side.stack.name), "limit": limit, "step": step}
             yield _say("price", price=cost, cost_unit=cost_unit, **gaps)
 

@@ -66,7 +66,9 @@ def requirements_table(result: AllocationResult) -> Table[_Limited]:
 def _limit(row: _Limited) -> str:
     """Return a limit in words."""
     _, side, check = row
-    return f"{'at most' if side.sign > 0 else 'at least'} {side.limit:g} {unit_of(check.requirement.output)}"
+    asked = check.requirement
+    said = f"{'at most' if side.sign > 0 else 'at least'} {asked.told(side.limit)} {unit_of(asked.output)}"
+    return said.removesuffix(" -")
 
 
 def today_frame(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
