@@ -259,7 +259,9 @@ def _write_page(document: Document, path: Path) -> None:
     for full in reversed(_in_full(document)):
         sections.insert(next((at for at, own in enumerate(sections) if own["part"] == full["part"]), 0), full)
     for number, section in enumerate(sections, start=1):
-        section["number"] = number
+        told = section["paragraphs"] or section["figures"] or any(table for *_, table in section["tables"])
+        # A fold that only names tables is opened for nothing.
+        section |= {"number": number, "named": section["folded"] and section["tables"] and not told}
     page = Environment(
         loader=PackageLoader("tolalloc.reports", "page"), autoescape=True, trim_blocks=True, lstrip_blocks=True
     ).get_template("document.html.j2")
