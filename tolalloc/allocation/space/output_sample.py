@@ -236,7 +236,7 @@ class LimitedSample:
         few = largest_first(np.maximum(excess, planes.max(axis=0)), int(_FURTHER * share * excess.size) + _SURELY)
         return excess[few], planes[:, few]
 
-    @property
+    @cached_property
     def excess(self) -> Float[np.ndarray, " solved"]:
         """How far every unit lies beyond the limits, negative inside, infinite without a value [unit of the output]."""
         found = self.limits.excess(self.values).max(axis=0)

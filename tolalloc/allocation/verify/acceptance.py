@@ -408,7 +408,7 @@ def _with_bound(
 def _is_hopeless(design: VerifiedDesign) -> bool:
     """Return whether even the middle of what the units say lies beyond a limit, by more than a standard error."""
     independent = design.independent
-    if independent is None:
+    if independent is None or design.met:  # what is shown at a confidence lies inside at even odds too
         return False
     bounds = [bound for check in design.checks for bound in _bounds(design, check, independent, _EVEN_ODDS)]
     return any(np.isfinite(bound.value) and bound.excess > bound.standard_error for bound in bounds)
