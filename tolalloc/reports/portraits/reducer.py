@@ -309,7 +309,7 @@ def _examination(portrait: ReducerPortrait, figures: Mapping[str, float]) -> Exa
         f"the {model.rated_pin_force:,.0f} N of the rated torque; half of all press with "
         f"{float(f'{half:.2g}'):,g} N or more.",
         _no_load(model, figures),
-        f"The radial clearance of a unit is {number(least, '.2g')} µm at least.",
+        f"The tightest of these reducers has {number(least, '.2g')} µm of radial clearance.",
         *portrait.remarks,
         *cautions,
     )
