@@ -110,8 +110,15 @@ def _write_blanks(_: Any) -> None:
                 picture.write_bytes(BLANK)
 
 
+def _say_levels(_: Any, __: str, ___: str, context: dict[str, Any], ____: Any) -> None:
+    """Give the headings of the list of pages a level, which a screen reader needs and Sphinx leaves out."""
+    listed = context.get("furo_navigation_tree", "")
+    context["furo_navigation_tree"] = listed.replace('role="heading"', 'role="heading" aria-level="2"')
+
+
 def setup(app: Any) -> None:
     """Make the pages that no hand writes before Sphinx reads them."""
+    app.connect("html-page-context", _say_levels, priority=900)  # after the theme has made its list
     app.connect("builder-inited", _write_commands, priority=100)  # before the gallery is made
     app.connect("builder-inited", _write_files, priority=101)
     app.connect("builder-inited", _write_cases, priority=102)

@@ -14,6 +14,7 @@ from urllib.parse import unquote
 import pytest
 
 import tolalloc as ta
+from tests.studies.live_page import BROWSER, DRIVER, browser
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -139,6 +140,19 @@ def handbook(tmp_path):
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert result.returncode == 0, result.stderr
     return tmp_path
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not (BROWSER and DRIVER), reason="a browser and its driver are missing")
+def test_a_page_has_no_serious_barrier(handbook):
+    axe, driver = pytest.importorskip("axe_core_python.selenium").Axe(), browser()
+    try:
+        for name in ("index", "theory", "_made/commands", "_made/gallery/index"):
+            driver.get((handbook / f"{name}.html").as_uri())
+            found = [own for own in axe.run(driver)["violations"] if own["impact"] in ("serious", "critical")]
+            assert [(own["id"], own["nodes"][0]["html"]) for own in found] == []
+    finally:
+        driver.quit()
 
 
 @pytest.mark.slow
