@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -50,15 +51,24 @@ class LinearFunction:
     @classmethod
     def through(cls, x: Samples, values: AtSamples) -> LinearFunction | None:
         """Return the plane that all samples lie on up to rounding, none if one does not or has no answer."""
-        few = x.shape[1] + _SPARE
-        if values.size <= few or not np.isfinite(values).all():
-            return None
+        return cls.through_each(x, {"": values}).get("")
+
+    @classmethod
+    def through_each(cls, x: Samples, outputs: Mapping[str, AtSamples]) -> dict[str, LinearFunction]:
+        """Return the planes of those outputs whose samples all lie on one, by their names."""
+        few, found = x.shape[1] + _SPARE, dict[str, LinearFunction]()
+        known = {name: values for name, values in outputs.items() if values.size > few and np.isfinite(values).all()}
+        if not known:
+            return found
         centre, size = x[:few].mean(axis=0), np.maximum(x[:few].std(axis=0), np.finfo(float).tiny)
-        middle = float(values[:few].mean())
-        slopes = np.linalg.lstsq((x[:few] - centre) / size, values[:few] - middle, rcond=None)[0] / size
-        rounding = _LINEAR * float(np.ptp(values))
-        plane = cls(offset=float(middle - centre @ slopes), slopes=slopes, rounding=rounding)
-        return None if plane.leaves(x[:few], values[:few]).any() or plane.leaves(x, values).any() else plane
+        middles = [float(values[:few].mean()) for values in known.values()]
+        off = np.stack([values[:few] - middle for values, middle in zip(known.values(), middles, strict=True)], axis=1)
+        solved = np.linalg.lstsq((x[:few] - centre) / size, off, rcond=None)[0].T / size
+        for (name, values), slopes, middle in zip(known.items(), solved, middles, strict=True):
+            plane = cls(offset=float(middle - centre @ slopes), slopes=slopes, rounding=_LINEAR * float(np.ptp(values)))
+            if not (plane.leaves(x[:few], values[:few]).any() or plane.leaves(x, values).any()):
+                found[name] = plane
+        return found
 
     @classmethod
     def near(cls, x: Samples, values: AtSamples) -> LinearFunction:

@@ -308,8 +308,7 @@ class DesignSample:
     @cached_property
     def _linear(self) -> dict[str, LinearFunction]:
         """Outputs that are linear in the deviations, as far as these units tell."""
-        found = {output: LinearFunction.through(self.x, self.values(output)) for output in self.outputs}
-        return {output: own for output, own in found.items() if own}
+        return LinearFunction.through_each(self.x, {output: self.values(output) for output in self.outputs})
 
     def _derivatives(self, output: str, rows: Int[np.ndarray, " few"]) -> SettingDerivatives:
         if not (output in self._whole and output in self._linear):
@@ -459,6 +458,16 @@ class DesignSample:
 
     def slopes_at(self, output: str, rows: Int[np.ndarray, " few"]) -> Float[np.ndarray, "few variable"]:
         """Return the derivatives of an output of some units by every variable, NaN where one has none."""
+        asked = output, rows.tobytes()
+        if asked not in self._slopes_told:  # the same units are the furthest beyond other limits of another output
+            self._slopes_told[asked] = self._slopes_at(output, rows)
+        return self._slopes_told[asked]
+
+    @cached_property
+    def _slopes_told(self) -> dict[tuple[str, bytes], Float[np.ndarray, "few variable"]]:
+        return {}
+
+    def _slopes_at(self, output: str, rows: Int[np.ndarray, " few"]) -> Float[np.ndarray, "few variable"]:
         if output in self.exact and rows.max(initial=-1) < self.derivative_units:
             return np.asarray(self._slopes(self.exact[output], self.standard)[rows])
         model, standard = self.at(self.design), self.standard[rows]
