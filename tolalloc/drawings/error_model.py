@@ -179,7 +179,7 @@ class ErrorModel:
 
     def dependent(self, uniform: Columns) -> Columns:
         """Return uniform numbers as sources depend on each other, by correlation and then by mated classes [-]."""
-        found = self.mixed(uniform, self._factor)
+        found = self.mixed(uniform, self._factor) if self._correlated_blocks or self.compensators else uniform
         for own in self.compensators:
             own.sorted(found, self._known)
         return found
@@ -204,7 +204,7 @@ class ErrorModel:
 
     def marginal_values(self, uniform: Columns) -> Columns:
         """Return all deviations per unit of zone for uniform numbers that already have their correlation."""
-        values = np.zeros_like(uniform)
+        values = np.empty_like(uniform)
         for source, columns in zip(self._varying, self.columns_of_source, strict=True):
             values[:, columns] = source.standard_values(uniform[:, columns])
         return values
@@ -227,7 +227,8 @@ class ErrorModel:
 
     def _arranged(self, standard: Columns, zones: Zones) -> Columns:
         """Return the columns that the standard values give before sizes are chosen [m, rad]."""
-        found = np.asarray(standard * np.repeat(zones, self._counts) + self.middles)
+        found = np.asarray(standard * np.repeat(zones, self._counts))
+        found += self.middles
         of_sources = {own.name: float(zone) for own, zone in zip(self.active, zones, strict=False)}
         for own in self.compensators:
             own.arranged(found, of_sources, self._known)

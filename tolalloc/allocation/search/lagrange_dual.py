@@ -212,6 +212,8 @@ class LagrangeDual:
 
     def choice(self, priced: PricedProcesses, allowed: Bool[np.ndarray, " process"]) -> Int[np.ndarray, " feature"]:
         """Return the place of the least allowed process of every feature among all processes."""
+        if self.starts.size == self.feature.size:  # one process each
+            return self.starts
         parts = np.split(np.where(allowed, priced.least, np.inf), self.starts[1:])
         return np.asarray(self.starts + [np.argmin(part) for part in parts])
 

@@ -196,7 +196,7 @@ class UnitSolver:
             x = experiment.deviations(errors.standard_values(uniform))
             is_near = self.screen(x) if self.screen else np.ones(len(x), bool)
             kept = is_near | (first + np.arange(len(x)) < drawn.whatever)
-            rows.append(x[kept])
+            rows.append(x[kept] if self.screen else x)
             near.append(is_near[kept])
             first += len(x)
             if sum(map(len, rows)) >= _AT_ONCE:
