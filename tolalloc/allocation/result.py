@@ -22,6 +22,7 @@ from tolalloc.allocation.space.output_sample import LimitedSample
 from tolalloc.allocation.space.problem import OneSidedConstraint, Solution
 from tolalloc.allocation.space.requirement import AtYield, Check, Requirement
 from tolalloc.allocation.verify.verification import VerifiedDesign
+from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import KeptLimits, Yield
 from tolalloc.capability.near_limit import SolvedUnits
 from tolalloc.drawings.compensators import Compensator
@@ -255,7 +256,8 @@ class AllocationResult:
     def price_of(self, check: Check, side: OneSidedConstraint) -> float:
         """Return what a limit of the drawing costs, nothing where the drawing does not touch it.
 
-        Of limits that are kept at once, one that hardly a unit misses leaves all that may be missed to the others.
+        Of limits that are kept at once, one that hardly a unit misses leaves all that may be missed to the others,
+        unless many lie just inside it, as where all deviations end somewhere.
 
         Parameters
         ----------
@@ -270,8 +272,9 @@ class AllocationResult:
         price, jointly = self.free.prices.get(side.stack.name, 0.0), self.chosen.jointly
         touches = price * side.scale > max(_WORTH * self.chosen.cost, solver_noise(self.free.optimum))
         if touches and jointly:
-            missed = 1 - self.chosen.yield_of(check.requirement, side.sign).estimate
-            touches = missed > _USED * jointly.joint.failures
+            inside = side.limit - side.sign * _INSIDE * side.scale
+            near = replace(check.requirement, limits=Limits(upper=inside) if side.sign > 0 else Limits(lower=inside))
+            touches = 1 - self.chosen.yield_of(near).estimate > _USED * jointly.joint.failures
         return price if touches else 0.0
 
     @cached_property
@@ -310,7 +313,9 @@ class AllocationResult:
 _WORTH = 1e-3
 """Worth of a limit over the cost, from which it is said to bind [-]."""
 _USED = 0.02
-"""Part of the failures allowed to all limits at once that must miss one of them for it to be said to bind [-]."""
+"""Part of the failures allowed to all limits at once that must lie beyond or near one for it to be said to bind [-]."""
+_INSIDE = 0.005
+"""How near, over the scale of the limit [-]."""
 
 
 def solver_noise(solution: Solution) -> float:

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from tolalloc.allocation.search.lower_bound import least_cost
+from tolalloc.allocation.search.lower_bound import COUNTS, division_bounds, least_cost
 from tolalloc.allocation.search.multiple_choice import MultipleChoice, best_choice
 from tolalloc.allocation.search.zone_allocation import ROUNDING, aimed, kept_stacks
 from tolalloc.allocation.space.design_space import DesignSpace
+from tolalloc.allocation.space.joint_yield import JointCheck
 from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Shared, Stack
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier, cheapest_met
 from tolalloc.drawings.ladder import Ladder, group_ladder
@@ -24,6 +25,8 @@ from tolalloc.models.settings import DrawnAmounts
 MOST_NODES = 10_000
 """Nodes of branch and bound for one proof, a limit that is the same on every machine [-]."""
 
+_CUTS = 8
+"""Cuts of boxes of divisions of the failures, each of which solves two choices [-]."""
 _ROUNDING = 1e-9
 """What a zone or a value of a grid may lose between units [-]."""
 
@@ -340,18 +343,18 @@ def allocate_grades(verifier: Verifier, start: VerifiedDesign, steps: int) -> Gr
     """
     space = with_shared_zones(verifier.space)
     own, design = replace(verifier, space=space), np.clip(start.design, space.lower, space.upper)
-    grid, tried = _Grid(space, verifier.model.drawn_amounts, design), [own.verify(design, "graded start")]
+    grid = _Grid(space, verifier.model.drawn_amounts, design)
+    tried = [own.verify(design, "graded start").evenly_divided()]
     missed, kept = -1.0, np.inf
     while len(tried) <= steps and kept - missed > _SETTLED:
         margin = missed + 1.0 if kept == np.inf else (missed + kept) / 2
-        stacks = _inside(tried[-1], tried, margin)
-        found = grid.problem(stacks).solve()
-        choice = grid.design(found) if found else grid.least_violating(stacks)
+        found = _cheapest(grid, tried[-1], tried, margin)
+        choice = grid.design(found) if found else grid.least_violating(_inside(tried[-1], tried, margin))
         verified = next((item for item in tried[1:] if np.allclose(choice, item.design, atol=1e-6)), None)
         if verified and not verified.met and found is None:
             break  # no margin makes any other choice
         if verified is None:
-            verified = own.verify(choice, f"graded {len(tried)}")
+            verified = own.verify(choice, f"graded {len(tried)}").evenly_divided()
             tried.append(verified)
         missed, kept = (missed, margin) if verified.met else (margin, kept)
     return _graded(grid, cheapest_met(tuple(tried[1:])), tuple(tried))
@@ -393,11 +396,56 @@ def choice_beside(
     """
     grid = _Grid(verified.space, drawn, verified.design)
     for factor in _FURTHER:
-        found = grid.problem(_inside(verified, [*tried, verified], factor * margin)).solve()
+        found = _cheapest(grid, verified, [*tried, verified], factor * margin)
         choice = None if found is None else grid.design(found)
         if choice is None or not np.allclose(choice, verified.design, atol=1e-6):
             return choice
     return None
+
+
+def _cheapest(grid: _Grid, last: VerifiedDesign, tried: list[VerifiedDesign], margin: float) -> DiscreteSolution | None:
+    """Return the cheapest choice that the models of a design let keep the limits, however they divide the failures.
+
+    Branch and bound over the divisions (`division_bounds`): the choice that a box allows may keep all limits at once.
+    """
+    best, joint = grid.problem(_inside(last, tried, margin)).solve(), last.jointly
+    if joint is None:
+        return best
+    counting = [at for at, part in enumerate(joint.joint.parts) if part > COUNTS]
+
+    def cost(upper: Float[np.ndarray, " counting"]) -> float:
+        nonlocal best
+        parts = np.ones(len(joint.tails))
+        parts[counting] = np.maximum(upper, np.finfo(float).tiny)
+        boxed = last.divided(tuple(parts.tolist()))
+        stacks = _inside(boxed, tried, margin)
+        found = grid.problem(stacks).solve()
+        if found is None:
+            return np.inf
+        if (best is None or found.cost < best.cost) and _failing(boxed, stacks, grid.design(found)) <= _allowed(joint):
+            best = found
+        return found.cost
+
+    for bound in islice(division_bounds(cost, len(counting)), _CUTS if len(counting) > 1 else 0):
+        if best is not None and bound >= best.cost * (1 - ROUNDING):
+            break
+    return best
+
+
+def _allowed(joint: JointCheck) -> float:
+    """Return the sum of the shares that may fail the limits [-]."""
+    return joint.overlap * joint.joint.failures * (1 + ROUNDING)
+
+
+def _failing(boxed: VerifiedDesign, stacks: tuple[Stack, ...], design: Float[np.ndarray, " variable"]) -> float:
+    """Return the sum of the shares that models let fail the limits at another design [-]."""
+    groups, joint, found, at = len(boxed.space.groups), boxed.jointly, 0.0, 0
+    assert joint is not None
+    for check, tail, share in zip(boxed.checks_alone, joint.tails, joint.shares, strict=True):
+        own, at = stacks[at : at + len(check.steering)], at + len(check.steering)
+        excess = max(float(each.load(design[:groups], design[groups:])) - each.budget for each in own)
+        found += tail.share_at(excess, share)
+    return found
 
 
 def _inside(last: VerifiedDesign, tried: list[VerifiedDesign], margin: float) -> tuple[Stack, ...]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import count, islice
 
 import numpy as np
 from jaxtyping import Float
@@ -20,7 +21,7 @@ from tolalloc.exceptions import SolveError
 
 _ROUNDING = 1e-9
 """Part of a budget by which a load that is its own budget may lie beyond it [-]."""
-_COUNTS = 0.05
+COUNTS = 0.05
 """Part of the failures below which a limit hardly counts [-]."""
 _CUTS = 20
 """Cuts of boxes of divisions [-]."""
@@ -153,7 +154,7 @@ def _least_of_divisions(design: VerifiedDesign, joint: JointCheck, least: Callab
     """
     guarantees = [own.guarantee for own in joint.joint.requirements]
     yields = {at: own.target for at, own in enumerate(guarantees) if isinstance(own, AtYield)}
-    counting = [at for at, part in enumerate(joint.joint.parts) if part > _COUNTS and at in yields]
+    counting = [at for at, part in enumerate(joint.joint.parts) if part > COUNTS and at in yields]
     apart = 1 - _coinciding(design, joint)
 
     def cost(upper: Float[np.ndarray, " counting"]) -> float:
@@ -163,13 +164,28 @@ def _least_of_divisions(design: VerifiedDesign, joint: JointCheck, least: Callab
             rises[at] = joint.tails[at].extrapolation(min(part * joint.joint.failures, alone), alone)
         return least(rises)
 
-    lower, upper = np.zeros(len(counting)), np.ones(len(counting))
+    return next(islice(division_bounds(cost, len(counting), apart), _CUTS if len(counting) > 1 else 0, None))
+
+
+def division_bounds(
+    cost: Callable[[Float[np.ndarray, " counting"]], float], limits: int, apart: float = 1.0
+) -> Iterator[float]:
+    """Yield, after every cut of a box, what no division of the failures among so many limits costs less than.
+
+    Parameters
+    ----------
+    cost
+        Of the largest parts of a box, what none of its divisions costs less than.
+    apart
+        1 − ρ, the part of the failures that coincide with no others [-].
+    """
+    lower, upper = np.zeros(limits), np.ones(limits)
     boxes = [(cost(upper), 0, lower, upper)]
-    for number in range(1, _CUTS + 1 if len(counting) > 1 else 1):
+    for number in count(1):
+        yield boxes[0][0]
         whole, _, lower, upper = heapq.heappop(boxes)
         for half, (below, above) in enumerate(_halves(lower, upper, apart)):
             heapq.heappush(boxes, (max(whole, cost(above)), 2 * number + half, below, above))
-    return boxes[0][0]
 
 
 Box = tuple[Float[np.ndarray, " counting"], Float[np.ndarray, " counting"]]

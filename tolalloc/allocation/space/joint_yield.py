@@ -191,6 +191,14 @@ class Tail:
             return self.law.excess(self.limits, share) - self.law.excess(self.limits, before)
         return self.slope * float(ndtri(before) - ndtri(share))
 
+    def share_at(self, excess: float, before: float) -> float:
+        """Return the failing share where another one lies so far beyond the limits [unit of the output] [-]."""
+        from scipy.special import ndtr, ndtri
+
+        if self.law:
+            return self.law.beyond(self.limits, self.law.excess(self.limits, before) - excess)
+        return float(ndtr(ndtri(before) + excess / self.slope)) if self.slope > 0 else float(excess > 0)
+
     def excess(self, share: float) -> float:
         """Return how far beyond the limits a share of the units lies further out than [unit of the output]."""
         return max(own.excess for own in self.bounds) + self.extrapolation(share)

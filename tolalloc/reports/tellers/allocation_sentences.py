@@ -537,4 +537,8 @@ def cheapest_settings(result: AllocationResult, cost_unit: str) -> tuple[str, ..
         f"{quantity(name)} {with_unit(f'{value:.3g}', name)}"
         for name, value in zip(trade.names, trade.cheapest, strict=True)
     )
-    return (_say("trade", settings=settings, cost=np.nanmin(trade.cost), cost_unit=cost_unit, error=error),)
+    cost, drawn = float(np.nanmin(trade.cost)), result.free.chosen
+    gaps = {"settings": settings, "cost": cost, "cost_unit": cost_unit, "error": error}
+    if drawn.met and drawn.cost < cost:
+        return (_say("trade_dearer", drawn=drawn.cost, **gaps),)
+    return (_say("trade", **gaps),)
