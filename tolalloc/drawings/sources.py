@@ -35,6 +35,8 @@ _WHOLE = 1e-6
 """Part of a step that a number may lack and still count as whole [-]."""
 _ROUNDING = 1e-9
 """Mean of a deviation over its zone, up to which it is rounding [-]."""
+_WRITTEN = 1e-6
+"""Distance from the middle, over the zone, up to which it is what written digits leave [-]."""
 _POINTS_PER_WAVE = 32
 """Points of the shortest wave of a spectrum; the range between them is at most 0.5 % too small."""
 _TIMES = re.compile(r"(?:(\d+)[x×] +)?(.*?)(?: +\(?(\d+)[x×]\)?)?", re.DOTALL)
@@ -314,7 +316,7 @@ class Source:
             reading += f", taken at {self.teeth} teeth"
         if self.over:
             reading += f" over a length of {self.over / LENGTHS[self.length_name]:g} {self.length_name}"
-        if abs(self.middle) > _ROUNDING * self.zone:
+        if abs(self.middle) > _WRITTEN * self.zone:
             reading += f", its middle {self.said(self.middle, '+.3g')} from the nominal size".replace("-", "−")
         for order, amplitude, at in self.systematic:
             reading += (
@@ -350,7 +352,7 @@ class Source:
         """What the zone became, where it became anything else."""
         mean, deviation = (number * self.zone for number in self.zone_mapping.moments)
         if self.feature is Feature.SIZE:
-            off = self.said(mean, "+.3g") if abs(mean) > _ROUNDING * self.zone else self.said(0.0)
+            off = self.said(mean, "+.3g") if abs(mean) > _WRITTEN * self.zone else self.said(0.0)
             spread = f"{self._kind}, mean {off} off the middle, σ = {self.said(deviation)}"
         elif self.feature is Feature.POSITION:
             spread = f"radius {self._kind}, mean {self.said(mean)}, σ = {self.said(deviation)}, any phase"

@@ -351,8 +351,11 @@ def _price(space: DesignSpace, name: str, zone: float) -> float:
     """Return the cost of a zone by the cheapest process that holds it [cost units]."""
     made = cheapest(space, name, zone)
     if made is None:
-        held = f"{min(own.minimum for own in space.processes[name]) / MICROMETRE:.3g} to " + (
-            f"{max(own.maximum for own in space.processes[name]) / MICROMETRE:.3g} µm, what its processes hold"
+        ways = space.processes[name]
+        held = (
+            f"{min(own.minimum for own in ways) / MICROMETRE:.3g} to "
+            f"{max(own.maximum for own in ways) / MICROMETRE:.3g} µm, what its "
+            f"{'row allows' if len(ways) == 1 else 'processes hold'}"
         )
         raise InputError.at("difference", name, f"{zone / MICROMETRE:g} µm", held)
     return float(made.total(np.array(zone)))

@@ -61,10 +61,13 @@ class DifferenceTeller(Teller[DifferenceResult]):
         """What changes of the cost, the yield and the leading output."""
         result, cost = self.result, self.result.cost_change
         leading, found = result.requirements[0], _in_percent(result.yield_change)
+        changes = [*zip(result.limited, result.quantile_changes, strict=True)]
+        moved = [own for (own, _), change in changes if not change.low <= 0.0 <= change.high]
+        told = leading if leading in moved or not moved else moved[0]
         quantiles = " and ".join(
             _say("quantile", share=_percent(share), output=short(own.output), **_with_interval(change, own.output))
-            for (own, share), change in zip(result.limited, result.quantile_changes, strict=True)
-            if own is leading
+            for (own, share), change in changes
+            if own is told
         )
         costs = {"before": result.whole_cost, "after": result.whole_cost + cost, "change": cost}
         shares = {"change": found.estimate, "low": found.low, "high": found.high}

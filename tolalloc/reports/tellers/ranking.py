@@ -401,6 +401,7 @@ class RankingTeller(Teller[RankingResult]):
         )
         yield Section(
             heading=_say("alone_heading"),
+            paragraphs=(_say("alone_others", output=quantity(result.leading)),) if len(result.limits) > 1 else (),
             figures=tuple(figures.inverse_figures(result)),
             tables=(("alone", tables.inverse_table(result)),),
         )
