@@ -204,7 +204,8 @@ class RankingEffort(NamedFields):
         """Return the effort for a model that answers for whole arrays, unless its numbers are the user's own.
 
         The Sobol analysis has as many blocks of sources + 2 units, a power of two, as the stated rate allows, and at
-        least those of any model: counted work and no clock decides, so the same study has the same bits.
+        least those of any model: counted work and no clock decides, so the same study has the same bits. Shapley
+        effects have a quarter as many permutations.
 
         Examples
         --------
@@ -215,7 +216,8 @@ class RankingEffort(NamedFields):
             return self
         allowed = int(ARRAY_RATE * FAST_SECONDS[self == QUICK_RANKING]) // (sources + 2)
         blocks = max(self.sobol.limit, _power(allowed))
-        return replace(self, sobol=replace(self.sobol, start=blocks, limit=blocks))
+        sobol = replace(self.sobol, start=blocks, limit=blocks)
+        return replace(self, sobol=sobol, permutations=max(self.permutations, blocks // 4))
 
 
 QUICK_RANKING = RankingEffort(

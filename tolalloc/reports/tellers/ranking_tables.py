@@ -231,7 +231,7 @@ def shapley_table(found: ShapleyEffects) -> pd.DataFrame:
     """Return the Shapley effects on the leading output, the largest first."""
     columns: dict[str, Any] = {
         "source": found.sources,
-        "Shapley effect [-]": found.effects[0],
+        "Shapley effect [-]": _told(found.effects[0]),
         **_ends("", found.interval(0)),
         **_ends("rank ", found.rank_interval(0)),
     }
@@ -357,7 +357,7 @@ def measures_table(result: RankingResult) -> pd.DataFrame:
     for header, names, values in (
         (f"Sens [{unit}/µm]", result.local.sources, result.local.slope),
         (f"alone at its limit [{unit}]", result.classical.sources, result.classical.alone),
-        *((("Shapley effect [-]", result.shapley.sources, result.shapley.effects[0]),) if result.shapley else ()),
+        *((("Shapley effect [-]", result.shapley.sources, _told(result.shapley.effects[0])),) if result.shapley else ()),
     ):
         frame[header] = frame["source"].map(dict(zip(names, values, strict=True)))
     return frame
