@@ -357,7 +357,7 @@ def measures_table(result: RankingResult) -> pd.DataFrame:
     for header, names, values in (
         (f"Sens [{unit}/µm]", result.local.sources, result.local.slope),
         (f"alone at its limit [{unit}]", result.classical.sources, result.classical.alone),
-        *((("Shapley effect [-]", result.shapley.sources, _told(result.shapley.effects[0])),) if result.shapley else ()),
+        *((("Shapley effect [-]", shapley.sources, _told(shapley.effects[0])),) if (shapley := result.shapley) else ()),
     ):
         frame[header] = frame["source"].map(dict(zip(names, values, strict=True)))
     return frame
