@@ -33,6 +33,7 @@ from tolalloc.sensitivity.effort import RankingEffort
 from tolalloc.study.problem import COMMON, Limit, Problem
 
 _ASSEMBLED = "Units are judged as they are assembled, by an allocation with its own choice, else with {label}."
+_AS_THEY_COME = "Units are judged with parts as they come, but by an allocation, which may choose {labels}."
 _SHARED = "Rows without a group are one line where identical parts have the same zone, limits and price: {lines}."
 """What is said of the lines that `Prepared.errors` made, with the number of rows of each."""
 
@@ -88,11 +89,13 @@ class Prepared:
         rows = zip(self._stated.sources, self.errors.sources, strict=True)
         lines = Counter(own.group for before, own in rows if not before.group)
         shared = ", ".join(f"{line} ({rows})" for line, rows in lines.items() if rows > 1)
-        acting = self.assemblies[0]
+        acting, *others = self.assemblies
+        asked = " or ".join(choice_label(own) for own in others if own)
         return (
             *stated,
             *((_SHARED.format(lines=shared),) if shared else ()),
             *((_ASSEMBLED.format(label=choice_label(acting)),) if acting else ()),
+            *((_AS_THEY_COME.format(labels=asked),) if asked and not acting else ()),
         )
 
     @cached_property
