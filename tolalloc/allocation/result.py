@@ -314,7 +314,7 @@ _WORTH = 1e-3
 """Worth of a limit over the cost, from which it is said to bind [-]."""
 _USED = 0.02
 """Part of the failures allowed to all limits at once that must lie beyond or near one for it to be said to bind [-]."""
-_INSIDE = 0.005
+_INSIDE = 0.01
 """How near, over the scale of the limit [-]."""
 
 
