@@ -572,3 +572,17 @@ def test_a_ranking_of_one_block_draws_its_index_within_what_is_possible(tmp_path
     for series in ranking.series[:2]:
         assert 0 <= series.low[0] <= series.y[0] <= series.high[0] <= 1
     assert (tmp_path / "run" / "report.html").exists()
+
+
+def test_other_questions_say_that_an_allocation_may_sort_what_they_take_as_it_comes():
+    row = {"plus": 4, "minus": -4, "unit": "µm", "min": 1, "max": 20, "cost": 1, "nominal": 10.0}
+    study = ta.Study(
+        ta.model(lambda hole, shaft: hole - shaft, inputs=("hole", "shaft"), outputs=("gap [mm]",)),
+        ta.Drawing.of_rows([{"id": name, **row} for name in ("hole", "shaft")]),
+        limits={"gap [mm]": ta.Limit(lower=-0.004, upper=0.004)},
+        compensators=[ta.Sorting("shaft", "hole", classes=(1, 2))],
+    )
+    (note,) = Prepared(study=study).notes
+    assert (
+        note == "Units are judged with parts as they come, but by an allocation, which may choose 2 classes of shaft."
+    )

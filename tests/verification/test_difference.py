@@ -65,6 +65,21 @@ def test_two_limits_have_a_quantile_each():
         assert says(found.sentences[1], "difference.quantile", share=share, output="gap")
 
 
+def test_the_limit_that_moves_is_told_where_the_first_one_does_not():
+    rows = [{"id": "housing", "nominal": 30.1, **ZONE}, {"id": "shaft", "nominal": 30.0, **ZONE}]
+    both = ta.Study(
+        ta.model(
+            lambda housing, shaft: (housing, shaft), inputs=("housing", "shaft"), outputs=("bore [mm]", "pin [mm]")
+        ),
+        ta.Drawing.of_rows(rows),
+        limits={"bore [mm]": ta.Limit(upper=30.12), "pin [mm]": ta.Limit(upper=30.02)},
+        name="both",
+    )
+    (_, said) = both.ask(ta.Difference(zones={"shaft": 20.0}, units=4096)).sentences
+    assert "quantile of the pin" in said
+    assert "bore" not in said
+
+
 def test_no_change_is_none_and_the_same_units_cancel_what_two_runs_do_not():
     same = fit().ask(ta.Difference(zones={"housing": 40.0}))
     assert same.result.yield_change.estimate == 0.0

@@ -211,6 +211,8 @@ class RankingEffort(NamedFields):
         --------
         >>> QUICK_RANKING.of_fast_model(4).sobol.limit, QUICK_RANKING.of_fast_model(100).sobol.limit
         (16384, 1024)
+        >>> QUICK_RANKING.permutations, QUICK_RANKING.of_fast_model(4).permutations
+        (100, 4096)
         """
         if self not in (RankingEffort(), QUICK_RANKING):
             return self
