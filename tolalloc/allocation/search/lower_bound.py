@@ -118,7 +118,7 @@ def least_cost(design: VerifiedDesign, cheapest: Cheapest, near_by: Callable[[tu
     min(own cost, cost of what keeps Σ load ≤ budget) (own derivation).
 
     Of limits that are kept at once, every design divides the failures in some way: the least of all ways is taken, by
-    branch and bound (`_least_of_divisions`).
+    branch and bound (`division_bounds`).
     """
     free = design.cost - design.space.locked_cost
     weaker, last = _weaker(design), design.checks[-1]
