@@ -46,6 +46,8 @@ _LEAST_CARRIED = 0.01
 """The same below which it has no digit to print [-]."""
 _NAMED = 3
 """Sources that the answer names [-]."""
+_NOTHING = 0.005
+"""Share that is written as 0 % [-]."""
 _AS_STRONG = 0.9
 """Share of the largest change per micrometre from which a source is as strong as any [-]."""
 _say = Sentences("ranking")
@@ -483,11 +485,17 @@ def _carried(narrowed: float) -> str:
     return " " + _say("carried", narrowed=f"{narrowed:.2f}" if narrowed >= _LEAST_CARRIED else "less than 0.01")
 
 
+def _told_apart(sobol: SourceIndices) -> list[int]:
+    """Return the first places, but for those of which even the end of the interval is written as 0 %."""
+    first, *others = sobol.order[:_NAMED]
+    return [first, *(at for at in others if sobol.total_interval[1][at] >= _NOTHING)]
+
+
 def _drivers(sobol: SourceIndices) -> Iterator[str]:
     """Yield who drives the leading output, and how sure each place is."""
     low, high = sobol.total_interval
     following = {pair.before: pair for pair in sobol.neighbours}
-    for place, at in enumerate(sobol.order[:_NAMED], start=1):
+    for place, at in enumerate(_told_apart(sobol), start=1):
         share = {"total": min(sobol.total[at], 1.0), "low": low[at], "high": high[at]}
         before = f" {_before(following[at], sobol.sources)}" if at in following else ""
         yield _say("driver", place=place, source=sobol.sources[at], before=before, **share)
@@ -506,7 +514,7 @@ def _named_drivers(sobol: SourceIndices, output: str) -> str:
     """Return the same of all of them in one sentence, without the places."""
     low, high = sobol.total_interval
     named = []
-    for at in sobol.order[:_NAMED]:
+    for at in _told_apart(sobol):
         share = {"total": min(sobol.total[at], 1.0), "low": 100 * low[at], "high": high[at]}
         named.append(_say("driver_short", source=sobol.sources[at], **share))
     return _say("drivers_short", output=output, names=", ".join(named))
