@@ -119,7 +119,10 @@ def test_a_worst_case_with_bought_parts_costs_what_lagrange_says(nominal):
         limits={"y [mm]": ta.Limit(lower=3 * nominal - 0.015, upper=3 * nominal + 0.015, show=ta.WorstCase())},
         effort="quick",
     )
-    found = study.ask(ta.Allocation(front=False, what_if=False)).result
+    answer = study.ask(ta.Allocation(front=False, what_if=False))
+    found, said = answer.result, answer.sentences[0]
     least = sum(np.sqrt(cost * half) for cost, half in zip(costs, halves.values(), strict=True)) ** 2 / 8.5 + 3
     assert found.met
     assert found.cost == pytest.approx(least, rel=2e-3)  # whole steps of the zones cost some of it
+    assert said.startswith("Met: the y of the worst units found inside the zones is ")
+    assert "%" not in said

@@ -14,7 +14,7 @@ from tolalloc.allocation.result import AllocationResult, limit_price, limit_step
 from tolalloc.allocation.search.candidates import ALONE
 from tolalloc.allocation.search.zone_allocation import ZoneAllocation
 from tolalloc.allocation.space.joint_yield import JointRequirement
-from tolalloc.allocation.space.requirement import AtYield, Guarantee, OwnLimit
+from tolalloc.allocation.space.requirement import AtYield, Check, Guarantee, OwnLimit, WorstCase
 from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.capability.indices import capability
 from tolalloc.capability.monte_carlo import Yield
@@ -96,7 +96,8 @@ def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     if len(result.requirements) > 1 and not chosen.jointly:
         found.append(_say("all_limits", share=chosen.joint.estimate))
     found += _few_parts(result, cost_unit)
-    if result.met and result.error < _EVEN_ODDS:
+    sampled = not isinstance(chosen.checks[0].requirement.guarantee, WorstCase)
+    if result.met and result.error < _EVEN_ODDS and sampled:
         found.append(_say("error", error=result.error))
     return (
         *found,
@@ -114,6 +115,8 @@ def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
 def _verdict(result: AllocationResult) -> str:
     """Return whether the drawing keeps its limits, and the yield that shows it: of all limits where that was asked."""
     chosen, check = result.chosen, result.chosen.checks[0]
+    if isinstance(check.requirement.guarantee, WorstCase):
+        return _worst(result, check)
     key, achieved, said = "met", chosen.achieved, {"stay": _stay(result)}
     if chosen.jointly:
         key, achieved, check = "met_jointly", chosen.joint, chosen.checks[-1]
@@ -126,6 +129,18 @@ def _verdict(result: AllocationResult) -> str:
         **interval_gaps(achieved),
         **said,
     )
+
+
+def _worst(result: AllocationResult, check: Check) -> str:
+    """Return whether the worst units inside the zones keep the limits."""
+    asked, sides = check.requirement, check.constraints
+    worst = enumerated(with_unit(f"{side.value:.4g}", asked.output) for side in sides)
+    limits = enumerated(
+        f"{'at most' if side.sign > 0 else 'at least'} {with_unit(asked.told(side.limit), asked.output)}"
+        for side in sides
+    )
+    word = _say("verdict_met" if result.met else "verdict_missed")
+    return _say("met_worst", verdict=word, output=quantity(asked.output), worst=worst, limits=limits)
 
 
 def _verdict_word(result: AllocationResult, guarantee: Guarantee, achieved: Yield) -> str:
