@@ -55,7 +55,7 @@ def test_a_check_of_a_design_speaks_of_its_clearances(model):
         there = model.at(np.array((flank, radial)))
         sentences = portrait_of(there).examination(there.examined(x)).sentences
         assert any(re.search(rf" {flank:g} µm .* {radial:g} µm ", own) for own in sentences)
-        assert any(f" is {radial:g} µm at least" in own for own in sentences)
+        assert any(f" has {radial:g} µm of radial clearance" in own for own in sentences)
 
 
 @pytest.mark.parametrize(("radial", "warned"), [(15.0, True), (10.0, True), (5.0, True), (3.0, True), (1.5, False)])
