@@ -31,9 +31,8 @@ _REFUSED = 4
 """Refused answers, the latest ones, whose models the following programs of a step keep too [-]."""
 _KEPT = 0.002
 """Excess up to which a limit counts as kept within a step, over the deviation of its output [-]."""
-_MOST_LACKING, _MOST_DRAWN_IN, _HALVINGS = 0.02, 0.1, 12
-"""Part of the zones that it may be worth at most, the same of a refused answer, and how often that is halved to find it
-[-]."""
+_MOST_LACKING, _HALVINGS = 0.02, 12
+"""Part of the zones that it may be worth at most, and how often that is halved to find it [-]."""
 _LESS = 0.95
 """Part of the excess that a convex program must leave where a limit is not kept, for its answer to be better [-]."""
 _SETTLED_WITHIN = 1e-4
@@ -129,7 +128,7 @@ class Programs:
         Convex programs one after another, each around the best design so far. Where the units say of an answer that it
         is not better, cheaper where all limits are kept, less beyond them where one is not, the next one reaches half
         as far, in logarithms, and keeps the models around the refused one too, as a cutting plane; after a better one
-        half as far again. A refused one may be cheaper still with its zones smaller by what it lacks.
+        half as far again.
         """
         low, high = self.box(processes, around, reach)
         centre, within, refused = np.clip(around, low, high), reach, list[Stack]()
@@ -154,28 +153,21 @@ class Programs:
                 centre, excess, cost, within = found, beyond, price, min(reach, within**_LONGER)
                 continue
             refused = [*steering.of_units(found), *refused]
-            inside = self._inside(found, steering, _MOST_DRAWN_IN)
-            left, price = steering.excess(inside), float(self.space.cost(inside))
-            if excess <= _KEPT and left <= 0.0 and price < (1 - _SETTLED_WITHIN) * cost:
-                centre, excess, cost = inside, left, price
-                continue
             within = float(np.sqrt(within))
             if within < _LEAST_REACH or not steering.quantiles:
                 break
-        return self._inside(centre, steering, _MOST_LACKING) if excess <= _KEPT else centre
+        return self._inside(centre, steering)
 
-    def _inside(
-        self, design: Float[np.ndarray, " variable"], steering: Steering, most: float
-    ) -> Float[np.ndarray, " variable"]:
-        """Return a design with its zones smaller by what it lacks of what it must keep, by a part at most."""
-        groups = len(self.space.groups)
-        if steering.excess(design) <= 0.0:
+    def _inside(self, design: Float[np.ndarray, " variable"], steering: Steering) -> Float[np.ndarray, " variable"]:
+        """Return a design that is hardly beyond what it must keep with its zones smaller by what it lacks."""
+        groups, excess = len(self.space.groups), steering.excess(design)
+        if not 0.0 < excess <= _KEPT:
             return design
 
         def smaller(by: float) -> Float[np.ndarray, " variable"]:
             return np.append(np.maximum(design[:groups] * (1 - by), self.space.lower[:groups]), design[groups:])
 
-        return smaller(float(halved(lambda by: steering.excess(smaller(by)) <= 0.0, most, 0.0, _HALVINGS)))
+        return smaller(float(halved(lambda by: steering.excess(smaller(by)) <= 0.0, _MOST_LACKING, 0.0, _HALVINGS)))
 
 
 @dataclass(frozen=True, kw_only=True)

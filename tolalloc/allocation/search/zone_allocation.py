@@ -41,13 +41,12 @@ def scale_in_proportion(verifier: Verifier, steps: int) -> tuple[VerifiedDesign,
     -----
     The next scale is 1 + left/rise times this one, with what is left of a limit, a standard error kept, and what all
     zones together take of it, the tightest limit counting and at most a factor of 2.5, until a met design has next to
-    nothing left to gain. Where that lies beyond a scale that was missed, as limits that are each kept may together be
-    missed, or below one that was met, half of the way between these two is gone.
+    nothing left to gain.
 
     sₖ₊₁ = sₖ·clip(1 + left/rise, 0.4, 2.5) (own derivation); exact in one step where a quantile is in
     proportion to the zones. Where too many units of a scale have no answer, half of the way to it is gone.
     """
-    space, scale, factor, met, missed = verifier.space, 1.0, 1.0, 0.0, np.inf
+    space, scale, factor = verifier.space, 1.0, 1.0
     widest = float(space.upper[: len(space.groups)].max())  # beyond it no zone lies inside its range
     tried: list[VerifiedDesign] = []
     for step in range(steps):
@@ -60,11 +59,8 @@ def scale_in_proportion(verifier: Verifier, steps: int) -> tuple[VerifiedDesign,
             scale /= factor
             continue
         tried.append(verified)
-        met, missed = (max(met, scale), missed) if verified.met else (met, min(missed, scale))
-        factor = min(_factor(verified), widest / scale, np.inf if verified.met else 1 - SETTLED)
-        if 0.0 < met < missed < np.inf and not met < scale * factor < (1 - SETTLED) * missed:
-            factor = float(np.sqrt(met * missed)) / scale
-        if (verified.met and factor < 1 + SETTLED) or missed < (1 + SETTLED) * met:
+        factor = min(_factor(verified), widest / scale)
+        if verified.met and factor < 1 + SETTLED:
             break
         scale *= factor
     return tuple(tried)
