@@ -485,8 +485,8 @@ def _carried(narrowed: float) -> str:
     return " " + _say("carried", narrowed=f"{narrowed:.2f}" if narrowed >= _LEAST_CARRIED else "less than 0.01")
 
 
-def _told_apart(sobol: SourceIndices) -> list[int]:
-    """Return the first places, but for those of which even the end of the interval is written as 0 %."""
+def _first_named(sobol: SourceIndices) -> list[int]:
+    """Return the positions of the first places, without those of which the end of the interval is written as 0 %."""
     first, *others = sobol.order[:_NAMED]
     return [first, *(at for at in others if sobol.total_interval[1][at] >= _NOTHING)]
 
@@ -495,7 +495,7 @@ def _drivers(sobol: SourceIndices) -> Iterator[str]:
     """Yield who drives the leading output, and how sure each place is."""
     low, high = sobol.total_interval
     following = {pair.before: pair for pair in sobol.neighbours}
-    for place, at in enumerate(_told_apart(sobol), start=1):
+    for place, at in enumerate(_first_named(sobol), start=1):
         share = {"total": min(sobol.total[at], 1.0), "low": low[at], "high": high[at]}
         before = f" {_before(following[at], sobol.sources)}" if at in following else ""
         yield _say("driver", place=place, source=sobol.sources[at], before=before, **share)
@@ -514,7 +514,7 @@ def _named_drivers(sobol: SourceIndices, output: str) -> str:
     """Return the same of all of them in one sentence, without the places."""
     low, high = sobol.total_interval
     named = []
-    for at in _told_apart(sobol):
+    for at in _first_named(sobol):
         share = {"total": min(sobol.total[at], 1.0), "low": 100 * low[at], "high": high[at]}
         named.append(_say("driver_short", source=sobol.sources[at], **share))
     return _say("drivers_short", output=output, names=", ".join(named))
