@@ -255,7 +255,7 @@ def require_convex(place: str, process: Process) -> None:
 _SMALLEST_SHARE = 1e-9
 """Smallest worth of a stack's budget that the ascent tries, over the range of the cost [-]."""
 _ENDS = {"maxiter": 60, "ftol": 1e-14, "gtol": 1e-6}
-"""Steps of the ascent, of which a handful are usual, and gains and slopes of the bound, over the range of the cost, that
+"""Steps of the ascent, of which a handful are usual, and gain and slope of the bound, over the range of the cost, that
 end it: at a slope of 1e-5 a price is still half a thousandth off [-]."""
 
 

@@ -58,7 +58,7 @@ class DifferenceTeller(Teller[DifferenceResult]):
 
     @cached_property
     def sentences(self) -> tuple[str, ...]:
-        """What changes of the cost, the yield and the leading output, of the first that moves where that one does not."""
+        """What changes of the cost, the yield and the leading output, or the first that moves where it does not."""
         result, cost = self.result, self.result.cost_change
         leading, found = result.requirements[0], _in_percent(result.yield_change)
         changes = [*zip(result.limited, result.quantile_changes, strict=True)]
