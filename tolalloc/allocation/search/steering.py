@@ -31,8 +31,9 @@ _REFUSED = 4
 """Refused answers, the latest ones, whose models the following programs of a step keep too [-]."""
 _KEPT = 0.002
 """Excess up to which a limit counts as kept within a step, over the deviation of its output [-]."""
-_MOST_LACKING, _HALVINGS = 0.02, 12
-"""Part of the zones that it may be worth at most, and how often that is halved to find it [-]."""
+_MOST_LACKING, _MOST_DRAWN_IN, _HALVINGS = 0.02, 0.1, 12
+"""Part of the zones that it may be worth at most, the same of a refused answer, and how often that is halved to find it
+[-]."""
 _LESS = 0.95
 """Part of the excess that a convex program must leave where a limit is not kept, for its answer to be better [-]."""
 _SETTLED_WITHIN = 1e-4
@@ -128,10 +129,12 @@ class Programs:
         Convex programs one after another, each around the best design so far. Where the units say of an answer that it
         is not better, cheaper where all limits are kept, less beyond them where one is not, the next one reaches half
         as far, in logarithms, and keeps the models around the refused one too, as a cutting plane; after a better one
-        half as far again.
+        half as far again. Where all of them are refused, one may still be cheaper with its zones smaller by what it
+        lacks.
         """
         low, high = self.box(processes, around, reach)
-        centre, within, refused = np.clip(around, low, high), reach, list[Stack]()
+        start = np.clip(around, low, high)
+        centre, within, refused, beside = start, reach, list[Stack](), [start]
         excess, cost = steering.excess(centre), float(self.space.cost(centre))
         for _ in range(_ROUNDS):
             own_low, own_high = self.box(processes, centre, within)
@@ -153,21 +156,27 @@ class Programs:
                 centre, excess, cost, within = found, beyond, price, min(reach, within**_LONGER)
                 continue
             refused = [*steering.of_units(found), *refused]
+            beside.append(found)
             within = float(np.sqrt(within))
             if within < _LEAST_REACH or not steering.quantiles:
                 break
-        return self._inside(centre, steering)
+        if centre is not start or excess > _KEPT:
+            return self._inside(centre, steering, _MOST_LACKING) if excess <= _KEPT else centre
+        drawn_in = (self._inside(own, steering, _MOST_DRAWN_IN) for own in beside)
+        return min((own for own in drawn_in if steering.excess(own) <= 0.0), key=self.space.cost, default=start)
 
-    def _inside(self, design: Float[np.ndarray, " variable"], steering: Steering) -> Float[np.ndarray, " variable"]:
-        """Return a design that is hardly beyond what it must keep with its zones smaller by what it lacks."""
-        groups, excess = len(self.space.groups), steering.excess(design)
-        if not 0.0 < excess <= _KEPT:
+    def _inside(
+        self, design: Float[np.ndarray, " variable"], steering: Steering, most: float
+    ) -> Float[np.ndarray, " variable"]:
+        """Return a design with its zones smaller by what it lacks of what it must keep, by a part at most."""
+        groups = len(self.space.groups)
+        if steering.excess(design) <= 0.0:
             return design
 
         def smaller(by: float) -> Float[np.ndarray, " variable"]:
             return np.append(np.maximum(design[:groups] * (1 - by), self.space.lower[:groups]), design[groups:])
 
-        return smaller(float(halved(lambda by: steering.excess(smaller(by)) <= 0.0, _MOST_LACKING, 0.0, _HALVINGS)))
+        return smaller(float(halved(lambda by: steering.excess(smaller(by)) <= 0.0, most, 0.0, _HALVINGS)))
 
 
 @dataclass(frozen=True, kw_only=True)

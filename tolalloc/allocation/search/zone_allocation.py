@@ -92,6 +92,8 @@ _AGAIN = 0.02
 """Excess up to which a step aims as far inside as the last one lay beyond, over the deviation of an output [-]."""
 _LEAST_REACH = 1.05
 """Ratio of zones below which a step does not fall back where units have no answer [-]."""
+_SCALED_WITHIN = 0.05
+"""Part of a common factor, and of its cost, within which it is told as what one factor takes [-]."""
 _PROMISED = 0.02
 """Excess up to which a step is taken to keep its limits, over the deviation of an output [-]."""
 _EXPLAINED = 2.0
@@ -286,6 +288,14 @@ class ZoneAllocation:
     def proportional(self) -> VerifiedDesign:
         """The cheapest met design with all zones scaled alike, or the least violating one."""
         return cheapest_met(self.proportional_tried)
+
+    @property
+    def proportional_settled(self) -> bool:
+        """Whether a little wider a scale is known not to be met: it misses, or it comes to a limit kept alone."""
+        best = self.proportional
+        missed = max((own.cost for own in self.proportional_tried if not own.met), default=0.0)
+        near = (1 - _SCALED_WITHIN) * best.cost < missed < best.cost
+        return best.met and (near or _factor(best) < 1 + _SCALED_WITHIN)
 
     @property
     def baseline(self) -> VerifiedDesign:

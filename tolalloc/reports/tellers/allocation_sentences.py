@@ -261,13 +261,13 @@ def _against(cost: float, other: float) -> str:
 
 
 def _cost(result: AllocationResult, cost_unit: str) -> str:
-    """Return what the drawing costs, and what proportional scaling does where its units keep the limits."""
+    """Return what the drawing costs, and what proportional scaling does where its units come close to the limits."""
     chosen, alike, before = result.chosen, result.free.proportional, result.free.baseline.cost
     word, settings = portrait_of(result.model).settings_word, ""
     if result.space.settings:
         settings = _say("cost_settings_many" if word.endswith("s") else "cost_settings", word=word)
     key = "cost_tighter" if alike.cost > before * (1 + _SAME_COST) else "cost_scaled"
-    said = _say(key, settings=settings, alike=alike.cost) if alike.met else ""
+    said = _say(key, settings=settings, alike=alike.cost) if result.free.proportional_settled else ""
     same = abs(chosen.cost / before - 1) < _SAME_COST
     told = _say("cost_same" if same else "cost", before=before, cost=chosen.cost, cost_unit=cost_unit, alike=said)
     return told.rstrip()
