@@ -26,6 +26,7 @@ from tolalloc.reducers.equivalent.condensation import (
 )
 from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel, Status
 from tolalloc.reducers.equivalent.outputs import Forces, forces
+from tolalloc.reducers.equivalent.ring import ring_motion
 from tolalloc.reducers.equivalent.springs import Coordinates, Positions, SpringGroup
 from tolalloc.reducers.families.family import Place, first_tooth
 from tolalloc.reducers.families.known import SOURCES, family_of
@@ -95,7 +96,8 @@ class States:
     torque: float  # Torque on the carrier, which resists this direction [N·m]
     force: Float[np.ndarray, "angle disc pin"]  # Normal force between every pin and every disc [N]
     gap: Float[np.ndarray, "angle disc pin"]  # Between them, negative where they are compressed [m]
-    displacement: Float[np.ndarray, "angle coordinate"]  # All coordinates of the model [m, rad]
+    # All coordinates of the model, discs in the housing; then, if the ring gives, its way x, y at every disc [m, rad]
+    displacement: Float[np.ndarray, "angle drawn"]
     transmission_error: Float[np.ndarray, " angle"]  # Carrier rotation beyond its nominal angle [rad]
 
 
@@ -113,6 +115,8 @@ class Turn:
     groups: tuple[SpringGroup, ...]  # All spring rows but those of pins
     way_by_coordinate: Float[np.ndarray, "angle row coordinate"]  # Of the bilateral rows [m/m or m/rad]
     rest_by_way: Float[np.ndarray, "angle rest row"]  # The other coordinates that belong to the rows' ways [m/m, rad/m]
+    coordinates: Coordinates
+    ring: Float[np.ndarray, "angle disc 2 way"]  # How far the ring goes at the discs per way that it has [m/m or m/rad]
 
 
 @lru_cache(maxsize=4)
@@ -134,6 +138,8 @@ def _turn_of(model: EquivalentModel, count: int) -> Turn:
         groups=tuple(groups),
         way_by_coordinate=rows,
         rest_by_way=np.linalg.pinv(rows[:, :, rest]),
+        coordinates=at.coordinates,
+        ring=ring_motion(at),
     )
 
 
@@ -148,7 +154,7 @@ def _solved_states(turn: Turn, errors: Float[np.ndarray, " column"], torque: flo
         torque=torque,
         force=carried.pins[0],
         gap=-_compressions(equilibria),
-        displacement=_displacements(turn, equilibria, carried),
+        displacement=_in_the_housing(turn, _displacements(turn, equilibria, carried)),
         transmission_error=equilibria.transmission_error[0],
     )
 
@@ -213,6 +219,18 @@ def _displacements(turn: Turn, equilibria: Equilibria, carried: Forces) -> Float
     return found
 
 
+def _in_the_housing(turn: Turn, found: Float[np.ndarray, "angle coordinate"]) -> Float[np.ndarray, "angle drawn"]:
+    """Return the coordinates with the discs where they stand in the housing, the ring's own motion at them behind."""
+    coordinates = turn.coordinates
+    if not coordinates.ring:
+        return found
+    moved = np.einsum("adxw,aw->adx", turn.ring, found[:, -len(coordinates.ring) :])
+    for disc in range(coordinates.disc_count):
+        first = coordinates.disc(disc)
+        found[:, first : first + 2] += moved[:, disc]
+    return np.concatenate([found, moved.reshape(len(found), -1)], axis=1)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Scene:
     """A reducer and one of its units as a picture needs them.
@@ -228,7 +246,9 @@ class Scene:
     turns: Mapping[str, float]  # Turns of carrier, cranks, discs, planets and sun per output turn, with their sign [-]
     # Angles at θc = 0, one entry per crank, disc, pin or planet, and of the sun's first tooth [rad]
     start: Mapping[str, list[float]]
-    coordinates: Mapping[str, list[int]]  # First coordinate of sun, planets, discs and carrier [-]
+    coordinates: Mapping[
+        str, list[int]
+    ]  # First coordinate of sun, planets, discs, carrier and, if it gives, the ring [-]
     output_turns: int  # Turns of the carrier after which every part is where it was [-]
     carrier_angle: Float[np.ndarray, " angle"]  # θc of the equilibria, over one output turn [rad]
     forward: States  # Equilibria while the carrier turns counter-clockwise against the torque
@@ -287,6 +307,7 @@ def scene_of(
             "planet": [first.planet(crank) for crank in range(reducer.crank_count)],
             "disc": [first.disc(disc) for disc in range(reducer.disc_count)],
             "carrier": [first.carrier],
+            **({"ring": [first.count + 2 * disc for disc in range(reducer.disc_count)]} if first.ring else {}),
         },
         output_turns=reducer.closing_turns,
         carrier_angle=turn.carrier_angle,

@@ -80,16 +80,16 @@ class _View:
         self.polygon(triangle * np.exp(1j * (pose.at("carrier")[0] + further)), _INK, _INK, 0.5)
 
 
-def _draw_pins(pen: _View, pose: Pose) -> None:
-    """Draw the housing with the pins in their grooves; the disc comes between the two."""
+def _draw_pins(pen: _View, pose: Pose, ring: complex) -> None:
+    """Draw the ring, where it stands, with the pins in their grooves; the disc comes between the two."""
     outline = pose.outline
-    pen.circle(0j, outline["housing_radius"], "housing.pins", _HOUSING)
+    pen.circle(ring, outline["housing_radius"], "housing.pins", _HOUSING)
     for place, colour, edge, factor, level in (
         ("housing.grooves", _GROOVE, "none", 1.45, 1.0),
         ("pins", _STEEL, _LINE, 1.0, 1.5),
     ):
         drawn = PatchCollection(
-            [Circle((at.real, at.imag), factor * outline["pin_radius"]) for at in pose.pins],
+            [Circle((at.real, at.imag), factor * outline["pin_radius"]) for at in pose.pins + ring],
             facecolor=pen.colour(place, colour),
             edgecolor=edge,
             linewidth=0.7,
@@ -97,13 +97,13 @@ def _draw_pins(pen: _View, pose: Pose) -> None:
         )
         drawn.set_zorder(level)
         pen.axes.add_collection(drawn)
-    pen.circle(0j, outline["pin_circle_radius"], "", _PAPER, edgecolor="none")
+    pen.circle(ring, outline["pin_circle_radius"], "", _PAPER, edgecolor="none")
 
 
 def _draw_disc(pen: _View, pose: Pose, disc: int, largest: float) -> None:
     """Draw a disc with its cranks against the pins."""
     outline, number = pose.outline, disc + 1
-    _draw_pins(pen, pose)
+    _draw_pins(pen, pose, pose.ring(disc))
     teeth = pose.teeth(disc)
     edge_colour = pen.colour(f"disc{number}.teeth", _INK)
     wide = 1.2 * (1.0 + pen.shares.get(f"disc{number}.teeth", 0.0))
@@ -155,6 +155,7 @@ def _draw_output(pen: _View, pose: Pose) -> None:
 def _draw_forces(pen: _View, pose: Pose, disc: int, largest: float) -> None:
     """Draw the forces of the pins on a disc as arrows."""
     point, normal = pose.contact(disc)
+    point = point + pose.ring(disc)
     length = _LONGEST * pose.outline["pin_circle_radius"] * pose.state("force")[disc] / largest
     shown = length > 0.004 * pose.outline["pin_circle_radius"]
     point, normal, length = point[shown], normal[shown], length[shown]

@@ -163,9 +163,13 @@ class Pose:
             + self.offset(f"carrier.bore{crank + 1}", self.carrier_angle)
         )
 
+    def ring(self, disc: int) -> complex:
+        """Return how far the ring of pins stands off at a disc, where it gives."""
+        return self.shift("ring", disc) if "ring" in self.record["coordinates"] else 0j
+
     @cached_property
     def pins(self) -> Complex[np.ndarray, " pin"]:
-        """Centres of the pins."""
+        """Centres of the pins where the ring stands still."""
         return np.asarray(self.outline["pin_circle_radius"] * np.exp(1j * self.at("pin")))
 
     def contact(self, disc: int) -> tuple[Complex[np.ndarray, " pin"], Complex[np.ndarray, " pin"]]:
@@ -189,7 +193,7 @@ class Pose:
         seen = np.angle((point - self.discs[disc]) / rotated)
         gap = 1e3 * self.record["magnification"] * self.state("gap")[disc]
         away = np.interp(np.angle(exact), seen, gap, period=2 * np.pi)
-        return np.asarray((exact + away * normal) * rotated + self.discs[disc])
+        return np.asarray((exact + away * normal) * rotated + self.discs[disc] + self.ring(disc))
 
 
 def gear(teeth: int, module: float, pressure_angle: float) -> Complex[np.ndarray, " point"]:

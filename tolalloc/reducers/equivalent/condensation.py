@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.reducers.equivalent.interfaces import PinContact, pin_contact
+from tolalloc.reducers.equivalent.ring import ROTATIONS, on_ring, ring_supports
 from tolalloc.reducers.equivalent.springs import AtAngles, Coordinates, Positions, SpringGroup, harmonic_waves
 from tolalloc.reducers.families.known import family_of
 from tolalloc.reducers.reducer.design import Reducer
@@ -52,13 +53,14 @@ class CondensedAngles(NamedTuple):
 
 def bilateral_groups(at: Positions) -> list[SpringGroup]:
     """Return all spring groups but the pin contact."""
-    return family_of(at.reducer).groups(at)
+    groups = family_of(at.reducer).groups(at)
+    return [*on_ring(groups, at), *ring_supports(at)] if at.coordinates.ring else groups
 
 
 def rotation_scale(reducer: Reducer, coordinates: Coordinates) -> Float[np.ndarray, " coordinate"]:
     """Return the lever by which each coordinate is divided so that all are lengths [m or 1].
 
-    Own derivation: x = ℓ·θ with ℓ = r_b2, r_d, and a_sp or a; any lever gives the same equilibrium.
+    Own derivation: x = ℓ·θ with ℓ = r_b2, r_d, a_sp or a, and R_p; any lever gives the same equilibrium.
     """
     scale = np.ones(coordinates.count)
     if coordinates.input_turns:
@@ -68,6 +70,8 @@ def rotation_scale(reducer: Reducer, coordinates: Coordinates) -> Float[np.ndarr
     for disc in range(reducer.disc_count):
         scale[coordinates.disc(disc) + 2] = 1 / reducer.cycloid_stage.disc_pitch_radius
     scale[coordinates.carrier + 2] = 1 / reducer.carrier_radius
+    for way in set(coordinates.ring) & set(ROTATIONS):
+        scale[coordinates.of_ring(way)] = 1 / reducer.cycloid_stage.pin_circle_radius
     return scale
 
 

@@ -27,10 +27,12 @@ from tolalloc.reducers.equivalent.springs import AtAngles, Positions, harmonic_w
 from tolalloc.reducers.families.known import INTERFACES, family_of
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.form import PartForm
+from tolalloc.reducers.reducer.housing import GIVES
 
 AtPins = Float[np.ndarray, "sample angle disc pin"]
 """A number of every pin on every disc, at every angle of every sample."""
 MESHES = tuple(own.stiffness for own in INTERFACES if own.is_mesh)
+_SINGLE = (*MESHES, *(f"ring_{way}" for way in GIVES))
 """Interfaces that carry along one direction, named as in `Stiffness`; the others carry x and y."""
 _ROUNDING = 1e-4
 """Amplitude over the largest one below which an order is not named [-]."""
@@ -58,12 +60,12 @@ class Forces:
         return np.asarray(np.hypot(vector[..., 0], vector[..., 1]))
 
     def vectors(self, interface: str) -> Float[np.ndarray, "sample angle element 2"]:
-        """Return the force x, y in each element of an interface; a mesh has x only [N]."""
+        """Return the force x, y in each element of an interface; a mesh and a way of the ring have x only [N]."""
         own, bilateral = self.rows_of_stiffness[interface], self.rows.shape[2]
         if own.start >= bilateral:
             return self.elements[:, :, own.start - bilateral : own.stop - bilateral]
         rows = self.rows[:, :, own]
-        if interface in MESHES:
+        if interface in _SINGLE:
             return np.stack([rows, np.zeros_like(rows)], axis=-1)
         return rows.reshape(*rows.shape[:2], -1, 2)
 

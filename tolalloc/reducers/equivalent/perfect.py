@@ -13,12 +13,12 @@ from math import inf, pi
 import numpy as np
 from jaxtyping import Float, Integer, UInt8
 
+from tolalloc.reducers.equivalent.condensation import bilateral_groups
 from tolalloc.reducers.equivalent.friction import sliding_ways
 from tolalloc.reducers.equivalent.hysteresis import BACKLASH, TURN_ANGLES, HysteresisLoop, hysteresis_loop
 from tolalloc.reducers.equivalent.model import Curves, EquivalentModel, Errors, Weights
 from tolalloc.reducers.equivalent.outputs import Solved
 from tolalloc.reducers.equivalent.springs import Positions
-from tolalloc.reducers.families.known import family_of
 from tolalloc.reducers.reducer.design import Reducer, at_torque, compliances
 
 PHASES = 72
@@ -175,7 +175,7 @@ def twist_shares(reducer: Reducer) -> tuple[TwistShare, ...]:
     own, torque = solved.reducer, solved.torque
     work = torque * float(solved.transmission_error.mean())
     rows, left, parts = [], 1.0, compliances(own, torque)
-    for group in family_of(own).groups(Positions(own, np.zeros(1))):
+    for group in bilateral_groups(Positions(own, np.zeros(1))):
         interface, stiffness = group.stiffness_name, float(group.stiffness[0, 0])
         share = float((found.of(interface) ** 2).sum(axis=2).mean() / stiffness / work)
         left -= share

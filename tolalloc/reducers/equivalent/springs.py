@@ -23,21 +23,26 @@ HARMONICS = (1, 2, 4)
 
 @dataclass(frozen=True)
 class Coordinates:
-    """Index of every displacement in the vector q: 2 + 3·cranks + 3·discs + 3 of them, and the input's turn if free."""
+    """Index of every displacement in the vector q: 2 + 3·cranks + 3·discs + 3 of them, and the input's turn if free.
+
+    Where the ring of pins gives, a coordinate for each of its ways follows; then discs are where they are against it.
+    """
 
     crank_count: int
     disc_count: int
     input_count: int = 2  # Of the sun or the input shaft, 3 where its rotation is not given
+    ring: tuple[str, ...] = ()  # Ways in which the ring of pins gives, of `tolalloc.reducers.reducer.housing.GIVES`
 
     @classmethod
     def of(cls, reducer: Reducer) -> Coordinates:
         """Return the layout of a reducer's displacements."""
-        return cls(reducer.crank_count, reducer.disc_count, reducer.input_count)
+        ring = tuple(reducer.housing.stiffnesses)
+        return cls(reducer.crank_count, reducer.disc_count, reducer.input_count, ring)
 
     @property
     def count(self) -> int:
         """Number of coordinates, 17 for two cranks and two discs."""
-        return self.carrier + 3
+        return self.carrier + 3 + len(self.ring)
 
     @property
     def input(self) -> int:
@@ -61,6 +66,10 @@ class Coordinates:
     def carrier(self) -> int:
         """First of the carrier's three, Xca and Yca [m] and θca [rad]."""
         return self.disc(self.disc_count)
+
+    def of_ring(self, way: str) -> int:
+        """Return that of a way of the ring, along and across [m], turn and tilts [rad]."""
+        return self.carrier + 3 + self.ring.index(way)
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from tolalloc.reading.named_fields import is_number
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.reducer.bearings import Friction, FrictionDimensions, Part
 from tolalloc.reducers.reducer.form import PartForm
+from tolalloc.reducers.reducer.housing import Housing
 from tolalloc.reducers.reducer.stiffness import Material, Stiffness, contact_modulus, line_contact, pin_bending
 
 Teeth = Annotated[int, Field(ge=5, le=1000)]
@@ -243,6 +244,7 @@ class Reducer:
     clearances: NominalClearances = field(default_factory=Clearances)
     # Parts that yield in series, of the interfaces whose stiffness follows from dimensions
     parts: tuple[Part, ...] = ()
+    housing: Housing = field(default_factory=Housing)
     friction: Friction = field(default_factory=Friction)
     friction_dimensions: FrictionDimensions = field(default_factory=FrictionDimensions)
     catalogue: Catalogue | None = None

@@ -30,6 +30,7 @@ from tolalloc.reducers.reducer.design import (
     Reducer,
     at_torque,
 )
+from tolalloc.reducers.reducer.housing import Housing
 from tolalloc.reducers.reducer.idle_torque import IdleTorque
 from tolalloc.reducers.reducer.stiffness import (
     TAPER_ANGLE,
@@ -57,6 +58,11 @@ CROWNING = (
     "force of the pin; forces, twist and transmission error are those of the section in the middle over the whole width"
 )
 """What is assumed of crowned teeth."""
+BOLTED = (
+    "the ring gives as its bolts and the cones that they clamp let it, by a rule of thumb, alike all around; the "
+    "bodies behind the flange are left out"
+)
+"""What is assumed of a ring whose bolts are stated."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -295,6 +301,7 @@ class AnyReducerRecord(Record):
     pin_material: Material | None = None
     modification: ModificationRecord
     load: Load
+    housing: Housing = Housing()
     friction: Friction = Friction()
     catalogue: Catalogue | None = None
     assumptions: tuple[str, ...] = ()
@@ -318,7 +325,12 @@ class AnyReducerRecord(Record):
             "disc_material": self.material,
             "pin_material": self.pin_material or self.material,
             "modification": Modification.from_convention(given.convention, *amounts),
-            "assumptions": (*self.assumptions, *([CROWNING] if self.cycloid_stage.crowning else [])),
+            "housing": self.housing.filled(self.material),
+            "assumptions": (
+                *self.assumptions,
+                *([CROWNING] if self.cycloid_stage.crowning else []),
+                *([BOLTED] if self.housing.bolts else []),
+            ),
         }
 
     def require_catalogue(self, reducer: Reducer) -> None:

@@ -302,7 +302,8 @@ def largest_preload(ball_radius: float, balls: int, elastic_modulus: float, pois
     return balls * 4.0 / 3.0 * contact_modulus * ball_radius**2 * LARGEST_CONTACT**3
 
 
-def _shear_modulus(material: Material) -> float:
+def shear_modulus(material: Material) -> float:
+    """Return G = E/(2(1 + µ)) [Pa]."""
     return material.elastic_modulus / (2.0 * (1.0 + material.poisson_ratio))
 
 
@@ -332,7 +333,7 @@ def shaft_flexibility(
     factor = 6.0 * (1.0 + material.poisson_ratio) / (7.0 + 6.0 * material.poisson_ratio)
     shear = near * behind / span
     return np.asarray(
-        bending / (material.elastic_modulus * inertia) + shear / (factor * _shear_modulus(material) * area)
+        bending / (material.elastic_modulus * inertia) + shear / (factor * shear_modulus(material) * area)
     )
 
 
@@ -363,7 +364,7 @@ class Crankshaft:
 
     def twist(self, material: Material) -> float:
         """Return the angle by which the gear turns against the journals per torque, l/(GJ) [rad/(N·m)]."""
-        return self.gear_distance / (_shear_modulus(material) * pi * self.diameter**4 / 32.0)
+        return self.gear_distance / (shear_modulus(material) * pi * self.diameter**4 / 32.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -380,7 +381,7 @@ class Pillars:
         """Return the angle between the flanges per torque through the pillars [rad/(N·m)]."""
         inertia, area = self.width * self.thickness**3 / 12.0, self.width * self.thickness
         bending = self.length**3 / (12.0 * material.elastic_modulus * inertia)
-        shear = self.length / (5.0 / 6.0 * _shear_modulus(material) * area)
+        shear = self.length / (5.0 / 6.0 * shear_modulus(material) * area)
         return (bending + shear) / (self.count * self.radius**2)
 
 

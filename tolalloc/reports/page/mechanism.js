@@ -377,17 +377,18 @@ export class Mechanism {
   buildDisc(view, disc) {
     const { scene } = this, { outline } = scene, { pin_radius: pin, pin_circle_radius: circle } = outline;
     const number = disc + 1, origin = [0, 0];
-    this.place("housing.pins", "path", {
+    const onRing = [this.place("housing.pins", "path", {
       class: "housing", "fill-rule": "evenodd", d: ring(origin, outline.housing_radius) + ring(origin, circle),
-    }, view);
+    }, view)];
     const at = positions(scene, 0).pins;
-    this.place("housing.grooves", "path", { class: "groove", d: at.map((place) => half(place, 1.45 * pin)).join("") }, view);
+    const grooves = at.map((place) => half(place, 1.45 * pin)).join("");
+    onRing.push(this.place("housing.grooves", "path", { class: "groove", d: grooves }, view));
     const others = [];
     for (let other = outline.disc_count - 1; other >= 0; other -= 1) {
       if (other !== disc) others.push([other, made("path", { class: "other-disc", d: this.teeth.modified }, view)]);
     }
     const body = this.place(`disc${number}`, "path", { class: "disc", "fill-rule": "evenodd" }, view);
-    this.place("pins", "path", { class: "pin", d: at.map((place) => ring(place, pin)).join("") }, view);
+    onRing.push(this.place("pins", "path", { class: "pin", d: at.map((place) => ring(place, pin)).join("") }, view));
     const teeth = this.place(`disc${number}.teeth`, "path", { class: "edge" }, view);
     if (outline.output_pin_count) this.buildHoles(view, disc);
     const pattern = outline.crank_count
@@ -403,10 +404,13 @@ export class Mechanism {
       cranks.push({ other, journal, shaft, lever });
     }
     const arrows = made("path", { class: "force" }, view);
+    onRing.push(arrows);
     const end = outline.housing_radius, inner = circle + 1.6 * pin;
     const output = made("path", { class: "output", d: `M${0.995 * end} 0L${inner} ${0.035 * end}L${inner} ${-0.035 * end}Z` }, view);
     this.painters.push((pose) => {
-      const angle = pose.at.disc[disc], centre = pose.at.discs[disc];
+      const angle = pose.at.disc[disc], away = pose.ring[disc], [x, y] = pose.at.discs[disc];
+      const centre = [x + away[0], y + away[1]]; // the outline has its gaps from the pins, which go with the ring
+      for (const own of onRing) own.setAttribute("transform", moved(away));
       for (const [other, path] of others) path.setAttribute("transform", moved(pose.at.discs[other], pose.at.disc[other]));
       const shape = this.teeth.outline(pose.contacts[disc], pose.magnification);
       const holes = pose.bores[disc].map((own) => ring(own, outline.bore_radius)).join("");
@@ -592,6 +596,7 @@ export class Mechanism {
       bores: at.discs.map(([x, y], disc) => at.cranks.map(([cx, cy], crank) => sum([x + cx, y + cy], shift(discOf(disc)),
         [...across(outline.crank_circle_radius, at.carrier[crank]), q[discOf(disc) + 2]],
         turned(`disc${disc + 1}.bore${crank + 1}`, carrierAngle)))),
+      ring: at.discs.map((_, disc) => (coordinates.ring ? sum([0, 0], shift(coordinates.ring[disc])) : [0, 0])),
       carrierCentre: sum([0, 0], shift(coordinates.carrier[0])),
       carrierBores: at.cranks.map((own, crank) => sum(own, shift(coordinates.carrier[0]),
         [...across(outline.crank_circle_radius, at.carrier[crank]), q[coordinates.carrier[0] + 2]],

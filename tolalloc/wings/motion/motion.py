@@ -137,8 +137,8 @@ def motion_of(
 
 def _require_motion(reducer: Reducer) -> None:
     """Raise where a part of the reducer moves as no equation of motion says, such as a centre gear."""
-    if reducer.unmoved:
-        raise InputError(f"reducer {reducer.name}: {reducer.unmoved} is not moved in time; this needs one without it.")
+    if unmoved := reducer.unmoved or ("a ring that gives" if reducer.housing.stiffnesses else ""):
+        raise InputError(f"reducer {reducer.name}: {unmoved} is not moved in time; this needs one without it.")
 
 
 def nominal_acceleration(at: Positions, motion: Motion) -> Float[np.ndarray, "time coordinate"]:
