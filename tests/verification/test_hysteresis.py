@@ -30,7 +30,7 @@ from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.reducer.idle_torque import IdleTorque
 
 ANGLES = TURN_ANGLES[::3]
-NONE = Friction(**dict.fromkeys(CONTACTS, 0.0))
+NONE = Friction(**dict.fromkeys(CONTACTS, 0.0), seals=0.0, grease=0.0)
 
 
 def ground(reducer):
@@ -174,6 +174,29 @@ def test_without_friction_the_branches_are_the_loop_without():
     np.testing.assert_allclose(loop.hysteresis_loss, 0.0, atol=1e-15)
     assert loop.rated.efficiency[0] == 1.0
     assert loop.no_load.friction_torque[0] == 0.0
+
+
+def test_what_holds_the_output_is_the_gap_of_a_reversal_without_load():
+    """A seal of 5 N·m alone: the loop without torque is as wide as the one without friction at ±5 N·m."""
+    held = replace(NONE, seals=5.01)  # 3 % of the rated 167 N·m, at which the loop is solved
+    model, errors = ground(replace(load_reducer("rv20e"), friction=held))
+    loop = friction_loop(model, errors, ANGLES)
+    assert loop.hysteresis_loss[0] == pytest.approx(loop.plain.lost_motion[0], rel=1e-9)
+    still = friction_loop(ground(replace(load_reducer("rv20e"), friction=NONE))[0], errors, ANGLES)
+    assert still.hysteresis_loss[0] == pytest.approx(0.0, abs=1e-15)
+    # Little friction leaves the middles of the width, and with them the lost motion of a maker.
+    assert friction_loop(
+        ground(replace(load_reducer("rv20e"), friction=replace(NONE, seals=0.5)))[0], errors, ANGLES
+    ).lost_motion[0] == pytest.approx(loop.plain.lost_motion[0], rel=0.01)
+
+
+def test_grease_of_the_cranks_holds_what_the_meshes_yield():
+    idle = IdleTorque.of(load_reducer("rv160e"))
+    assert idle.at_output + idle.at_cranks == pytest.approx(idle.turning)
+    assert idle.at_cranks > 4 * idle.grease_of_carrier
+    slower = IdleTorque.of(load_reducer("rv160e"), 1.0)
+    assert slower.grease < 0.5 * idle.grease
+    assert slower.seals == idle.seals
 
 
 @pytest.mark.parametrize("size", ["rv20e", "rv40e", "rv80e", "rv110e", "rv160e"])

@@ -246,9 +246,8 @@ class Scene:
     turns: Mapping[str, float]  # Turns of carrier, cranks, discs, planets and sun per output turn, with their sign [-]
     # Angles at θc = 0, one entry per crank, disc, pin or planet, and of the sun's first tooth [rad]
     start: Mapping[str, list[float]]
-    coordinates: Mapping[
-        str, list[int]
-    ]  # First coordinate of sun, planets, discs, carrier and, if it gives, the ring [-]
+    # First coordinate of sun, planets, discs, carrier and, if it gives, the ring at every disc [-]
+    coordinates: Mapping[str, list[int]]
     output_turns: int  # Turns of the carrier after which every part is where it was [-]
     carrier_angle: Float[np.ndarray, " angle"]  # θc of the equilibria, over one output turn [rad]
     forward: States  # Equilibria while the carrier turns counter-clockwise against the torque

@@ -18,6 +18,7 @@ from tolalloc.reducers.equivalent.outputs import MESHES, AtPins, Forces, Solved,
 from tolalloc.reducers.equivalent.springs import AtAngles
 from tolalloc.reducers.reducer.bearings import CRANK_BEARINGS, FrictionDimensions, loss_factor
 from tolalloc.reducers.reducer.design import Mesh, Reducer
+from tolalloc.reducers.reducer.idle_torque import IdleTorque
 
 Levels = Float[np.ndarray, " level"]
 """Torques of the levels, ascending [N·m]."""
@@ -213,17 +214,18 @@ def friction_loop(model: EquivalentModel, errors: Errors, carrier_angle: AtAngle
 def _followed(levels: Levels, twist: AtLevels, solved: list[Solved], path: Float[np.ndarray, " step"]) -> AtSteps:
     """Return the twist along a path of torque that starts where the torque has just risen.
 
-    The carrier bearing holds back the whole twist, the pins what the discs move, and all that turns with the cranks
+    Carrier bearing and seal hold back the whole twist, the pins what the discs move, and all that turns with the cranks
     what the meshes yield.
     """
+    idle = IdleTorque.of(solved[0].equilibria.reducer)
     by_level = [friction_torques(each) for each in solved]
     turning = {name: np.stack([found[name].mean(axis=1) for found in by_level], axis=1) for name in by_level[0]}
     shares = twist_of_friction(solved)
-    outside = PlayOperator.of(levels, turning["carrier_bearing"]).follow(
+    outside = PlayOperator.of(levels, turning["carrier_bearing"] + idle.at_output).follow(
         np.broadcast_to(path, (twist.shape[0], path.size))
     )
     discs = PlayOperator.of(levels, shares.sliding).follow(outside)
-    with_cranks = np.sum([turning[name] for name in (PINS, *CRANK_BEARINGS)], axis=0)
+    with_cranks = np.sum([turning[name] for name in (PINS, *CRANK_BEARINGS)], axis=0) + idle.at_cranks
     cranks = PlayOperator.of(levels, with_cranks).follow(outside)
     return np.asarray(
         _interpolated(outside, levels, twist - shares.discs - shares.cranks)

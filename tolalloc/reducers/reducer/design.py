@@ -188,6 +188,9 @@ class Load:
 
     test_torque: Annotated[float, Field(alias="test_torque_nm", ge=-1e5, le=1e5)]
     rated_torque: Annotated[float, Field(alias="rated_torque_nm", gt=0, le=1e5)]
+    # What the output turns besides the reducer [kg·m²], and the largest speed of the input [rpm]; for its resonance
+    inertia: Annotated[float | None, Field(alias="inertia_kgm2", gt=0, le=1e6)] = None
+    input_speed: Annotated[float | None, Field(alias="input_speed_rpm", gt=0, le=1e5)] = None
 
 
 @dataclass(frozen=True, kw_only=True)

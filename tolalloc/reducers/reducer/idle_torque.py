@@ -9,7 +9,7 @@ from tolalloc.reading.units import MILLIMETRE
 from tolalloc.reducers.reducer.bearings import CRANK_BEARINGS, RollingBearing
 from tolalloc.reducers.reducer.design import Reducer
 
-_OUTPUT_SPEED = 15.0
+OUTPUT_SPEED = 15.0
 """Speed of the output at which catalogues state the rated torque; the grease is churned at it [1/min]."""
 _LIP_FORCE, _LIP_COEFFICIENT = 100.0, 0.4
 """Force of a seal's lip over its circumference [N/m] and its coefficient of friction in grease [-]; assumptions."""
@@ -32,27 +32,40 @@ class IdleTorque:
     seals: float | None  # None where no carrier bearing says how large the seal is
     grease: float
     preload: float
+    grease_of_carrier: float  # The part of the grease in the carrier bearing; of a stated one by the same rule
 
     @classmethod
-    def of(cls, reducer: Reducer) -> IdleTorque:
-        """Return the torques of a reducer; those that its file states as they are stated."""
+    def of(cls, reducer: Reducer, speed: float = OUTPUT_SPEED) -> IdleTorque:
+        """Return the torques of a reducer at a speed of its output [1/min]; those that its file states as stated."""
         stated, dimensions = reducer.friction, reducer.friction_dimensions
         bearings = {name: (getattr(dimensions, name), *number_and_turns(reducer, name)) for name in _LUBRICATION}
         known = {name: own for name, own in bearings.items() if own[0] is not None}
         main = dimensions.carrier_bearing
+        grease = {
+            name: count * bearing.rows * turns * grease_torque(_LUBRICATION[name], bearing, turns * speed)
+            for name, (bearing, count, turns) in known.items()
+        }
+        by_rule = sum(grease.values())
+        taken = by_rule if stated.grease is None else stated.grease
         return cls(
             seals=stated.seals if stated.seals is not None or main is None else _seal_torque(main.pitch_diameter),
-            grease=sum(
-                count * bearing.rows * speed * grease_torque(_LUBRICATION[name], bearing, speed * _OUTPUT_SPEED)
-                for name, (bearing, count, speed) in known.items()
-            )
-            if stated.grease is None
-            else stated.grease,
+            grease=taken,
             preload=sum(
-                getattr(stated, name) * count * bearing.rows * bearing.idle_load * bearing.pitch_diameter / 2.0 * speed
-                for name, (bearing, count, speed) in known.items()
+                getattr(stated, name) * count * bearing.rows * bearing.idle_load * bearing.pitch_diameter / 2.0 * turns
+                for name, (bearing, count, turns) in known.items()
             ),
+            grease_of_carrier=taken * grease.get("carrier_bearing", 0.0) / by_rule if by_rule else 0.0,
         )
+
+    @property
+    def at_output(self) -> float:
+        """What holds the output itself: its seal, as far as it is known, and the grease of its bearing [N·m]."""
+        return (self.seals or 0.0) + self.grease_of_carrier
+
+    @property
+    def at_cranks(self) -> float:
+        """What the grease in the bearings of the cranks takes, at the output [N·m]."""
+        return self.grease - self.grease_of_carrier
 
     @property
     def turning(self) -> float:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,7 +22,9 @@ from tolalloc.reducers.equivalent.hysteresis import HysteresisLoop
 from tolalloc.reducers.equivalent.model import OUTCOMES, Equilibria
 from tolalloc.reducers.equivalent.outputs import turn_orders
 from tolalloc.reducers.equivalent.perfect import twist_shares
+from tolalloc.reducers.equivalent.resonance import orders_of, resonance_of
 from tolalloc.reducers.families.known import family_of
+from tolalloc.reducers.load_case import at
 from tolalloc.reducers.model import ReducerModel
 from tolalloc.reducers.reducer.design import CycloidStage, Modification, Reducer
 from tolalloc.reducers.reducer.idle_torque import IdleTorque
@@ -67,6 +70,12 @@ FACTOR = 1.5
 
 USUAL_TWIST = 3.6
 """Rated torque over torsional rigidity of RV reducers in catalogues, 2.9 to 4.0 over all sizes [arcmin]."""
+
+_FELT = 1.0
+"""Least peak-to-peak of exact parts of which a sentence says that it is elastic [arcsec]."""
+
+_MET = 5
+"""Orders at most that a sentence says to meet a resonance, the slowest first [-]."""
 
 _WITHOUT = "without radial clearance"
 _ERROR = "transmission error, output side [arcsec]"
@@ -134,9 +143,25 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Rigidity and lost motion beside the catalogue's."""
-        sentence, _ = against_catalogue(self.model.reducer, self.model.exact_loop_in_force)
-        return (sentence,) if sentence else ()
+        """Rigidity and lost motion beside the catalogue's, what of an error under load is elastic, the resonance."""
+        model = self.model
+        sentence, _ = against_catalogue(model.reducer, model.exact_loop_in_force)
+        own = model.reducer_in_force
+        resonance = resonance_sentence(own, -own.load.rated_torque, orders_of(own), own.load.input_speed)
+        return tuple(said for said in (sentence, *self._elastic, resonance) if said)
+
+    @property
+    def _elastic(self) -> Iterator[str]:
+        """Say how much of a peak-to-peak exact parts have under a load, as a ring that gives makes it."""
+        model, torques = self.model, {PEAK_TO_PEAK: self.model.kernel.torque}
+        torques |= {at(PEAK_TO_PEAK, case): case.torque for case in model.load_cases if case.torque is not None}
+        exact = model.reading(tuple(torques))(np.zeros((1, len(model.columns)))).values[0].tolist()
+        for torque, value in zip(torques.values(), exact, strict=True):
+            if value >= _FELT:
+                yield (
+                    f"{value:.3g}″ of the peak-to-peak at {abs(torque):,.5g} N·m is elastic: exact parts have it too, "
+                    "so no tolerance takes it away."
+                )
 
     @property
     def not_included(self) -> str:
@@ -322,6 +347,32 @@ def _examination(portrait: ReducerPortrait, figures: Mapping[str, float]) -> Exa
     means = f" {_MEANS} {_no_load(model, figures)}" if preloaded else ""
     fault = f"{what}: of {count:,} simulated reducers {' and '.join(reasons)}.{means} {trust}".strip()
     return Examination(sentences, f"of its units {' and '.join(reasons)}: {_advice(model)}", fault, counted)
+
+
+def resonance_sentence(reducer: Reducer, torque: float, orders: Iterable[float], fastest: float | None) -> str:
+    """Return the first resonance with the load's inertia and which orders meet it up to a speed of the input [rpm].
+
+    Empty where the file states no inertia; without a speed all orders are told.
+    """
+    if (inertia := reducer.load.inertia) is None:
+        return ""
+    found = resonance_of(reducer, torque, inertia)
+    said = f"With {inertia:.4g} kg·m² at the output the first resonance is at {found.frequency:.3g} Hz"
+    met = found.met(orders, inf if fastest is None else fastest)
+    if not met:
+        return f"{said}; no order that the train makes meets it up to {fastest:,.5g} rpm of the input."
+    shown = list(met.items())[:_MET]
+    which, speeds = (
+        _listed(own) for own in zip(*((f"{order:.6g}", f"{speed:,.0f}") for order, speed in shown), strict=True)
+    )
+    if len(shown) == 1:
+        return f"{said}; order {which} of the output meets it at {speeds} rpm of the input."
+    return f"{said}; orders {which} of the output meet it at {speeds} rpm of the input."
+
+
+def _listed(own: Sequence[str]) -> str:
+    """Return names or numbers as a sentence lists them."""
+    return f"{', '.join(own[:-1])} and {own[-1]}" if len(own) > 1 else own[0]
 
 
 def _no_load(model: ReducerModel, figures: Mapping[str, float]) -> str:

@@ -23,7 +23,7 @@ from tolalloc.reducers.reducer.idle_torque import IdleTorque
 from tolalloc.reducers.transmission_error import TransmissionErrorResult
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
-from tolalloc.reports.portraits.reducer import against_catalogue, linear_model_warnings, twist_table
+from tolalloc.reports.portraits.reducer import against_catalogue, linear_model_warnings, resonance_sentence, twist_table
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.templates import Sentences
 
@@ -57,7 +57,7 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """Span and strongest orders, friction, and rigidity beside the catalogue's."""
+        """Span and strongest orders, friction, rigidity beside the catalogue's, and where orders meet the resonance."""
         found, friction = self.summary, self.summary["friction"]
         strongest = ", ".join(_say("order", **wave) for wave in found["main_orders"][:3])
         orders = _say("strongest", orders=strongest) if strongest else _say("flat")
@@ -65,7 +65,9 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
         stated = self.result.reducer.friction
         assumed = "" if None not in (stated.seals, stated.grease) else _say("assumed")
         rubbing = _say("friction", **friction, assumed=assumed) if friction else ""
-        said = (_say("spans", **found | {"orders": orders}), rubbing, rigidity)
+        load, orders_met = self.result.reducer.load, [order for order, *_ in self._main_orders if order > 0]
+        resonance = resonance_sentence(self.result.reducer, self.result.torque, orders_met, load.input_speed)
+        said = (_say("spans", **found | {"orders": orders}), rubbing, rigidity, resonance)
         return tuple(sentence for sentence in said if sentence)
 
     @property

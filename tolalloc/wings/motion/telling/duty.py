@@ -6,9 +6,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from tolalloc.reading.units import ARCMINUTE
+from tolalloc.reducers.equivalent.resonance import orders_of
 from tolalloc.reports.columns import Column, Table
 from tolalloc.reports.document import Section
 from tolalloc.reports.figure import Figure, Series
+from tolalloc.reports.portraits.reducer import resonance_sentence
 from tolalloc.reports.teller import Teller
 from tolalloc.reports.templates import Sentences
 from tolalloc.wings.motion.duty import MAIN, BearingLife, CaseLoads, DutyResult
@@ -63,7 +65,7 @@ class DutyTeller(Teller[DutyResult]):
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """Life, pressure, heat and tilt."""
+        """Life, pressure, heat, tilt and resonance."""
         result = self.result
         pressed = max(result.loads, key=lambda own: own.pressure)
         said = [
@@ -74,7 +76,16 @@ class DutyTeller(Teller[DutyResult]):
         if result.tilt is not None:
             moment = max(abs(own.case.moment) for own in result.loads)
             said.append(_say("tilt", moment=moment, tilt=result.tilt / ARCMINUTE))
-        return tuple(said)
+        return (*said, *self._resonance)
+
+    @property
+    def _resonance(self) -> tuple[str, ...]:
+        """Which orders meet the resonance of the load up to the fastest load case, under the largest torque."""
+        reducer, cases = self.result.reducer, [own.case for own in self.result.loads]
+        torque = max((own.torque or 0.0 for own in cases), key=abs) or reducer.load.rated_torque
+        fastest = abs(reducer.ratio) * max(own.speed or 0.0 for own in cases)
+        said = resonance_sentence(reducer, torque, orders_of(reducer), fastest)
+        return (said,) if said else ()
 
     @property
     def _life(self) -> tuple[str, ...]:
