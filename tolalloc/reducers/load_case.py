@@ -41,6 +41,14 @@ _WINDOW = Rule(
     "two angles of the output in degrees, the smaller one first and at most a turn apart, such as (-90, 90)",
     lambda value: is_range(value, 360.0) and 0 < value[1] - value[0] <= 360,
 )
+_ORDERS = Rule(
+    "whole orders of the output's turn from 1 to 200, such as (1, 2)",
+    lambda value: (
+        isinstance(value, tuple | list)
+        and all(isinstance(own, int) and not isinstance(own, bool) and 1 <= own <= 200 for own in value)
+        and len({*value}) == len(value)
+    ),
+)
 _UNITS = {"torque": "N·m", "speed": "rpm", "share": "%", "disc_temperature": "K", "moment": "N·m"}
 
 
@@ -61,6 +69,9 @@ class LoadCase(NamedFields):
         Of the discs less that of the ring [K].
     output_angles
         Part of the output turn within which the transmission error counts, all of it unless given [°].
+    compensated
+        Orders of the output's turn that a controller takes out of the transmission error, unit by unit, before it
+        counts; none unless given.
     speed
         Of the output, which lives of bearings, wear and heat follow from [rpm].
     moment
@@ -80,6 +91,7 @@ class LoadCase(NamedFields):
     torque: Annotated[float | None, or_none(_TORQUE)] = None
     disc_temperature: Annotated[float | None, or_none(TEMPERATURE)] = None
     output_angles: Annotated[tuple[float, float] | None, or_none(_WINDOW)] = None
+    compensated: Annotated[tuple[int, ...], _ORDERS] = ()
     speed: Annotated[float | None, or_none(number("a speed in rpm above 0", above=0, most=1e4))] = None
     moment: Annotated[float, number("a moment in N·m")] = 0.0
     share: Annotated[float, number("a share of the time above 0", above=0, most=1e6)] = 1.0
@@ -90,13 +102,18 @@ class LoadCase(NamedFields):
         """Part of the output turn within which the transmission error counts [rad]."""
         return None if self.output_angles is None else tuple(DEGREE * own for own in self.output_angles)  # type: ignore[return-value]
 
+    @property
+    def is_of_part(self) -> bool:
+        """Whether a part of the transmission error counts, of the turn or of its orders."""
+        return self.output_angles is not None or bool(self.compensated)
+
     def felt_by(self, output: str) -> bool:
         """Return whether an output may differ from that in force."""
         return (
             self.disc_temperature is not None
             or self.hours is not None
             or (self.torque is not None and (output == PEAK_TO_PEAK or _RATED in output))
-            or (self.output_angles is not None and output == PEAK_TO_PEAK)
+            or (self.is_of_part and output == PEAK_TO_PEAK)
         )
 
 
@@ -214,6 +231,9 @@ def require_load_cases(place: str, cases: Any) -> tuple[LoadCase, ...]:
     if not good:
         allowed = "a list of load cases, such as [ta.LoadCase('warm', disc_temperature=5)]"
         raise InputError.of_argument(place, "load_cases", cases, allowed)
+    for case in cases:
+        if case.compensated and case.output_angles:
+            raise InputError.of_argument(place, "compensated", case.compensated, "orders, or output_angles: not both")
     names = [case.name for case in cases]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:

@@ -151,14 +151,14 @@ class ReducerModel(Model):
     def _everywhere(self, outputs: tuple[str, ...]) -> tuple[str, ...]:
         """Return outputs under the conditions in force, under load cases, and over all of them.
 
-        The transmission error of a part of the turn is searched without derivatives, and wear follows its errors by
-        steps that have none.
+        The transmission error of a part of the turn or of its orders is searched without derivatives, and wear follows
+        its errors by steps that have none.
         """
         cases = [
             name
             for case, names in self._under_cases.items()
             for name, own in names.items()
-            if own in outputs and not case.hours and not (case.output_angles and own == PEAK_TO_PEAK)
+            if own in outputs and not case.hours and not (case.is_of_part and own == PEAK_TO_PEAK)
         ]
         combined = [name for name, own in self._combined.items() if {*own.of} <= {*outputs, *cases}]
         return (*outputs, *cases, *combined)

@@ -11,16 +11,18 @@ from jaxtyping import Float
 from tolalloc.exceptions import SolveError
 from tolalloc.reducers.equivalent.friction import FrictionLoop, friction_loop
 from tolalloc.reducers.equivalent.hysteresis import (
+    DRAWN,
     LOOP_ANGLES,
     LOST_MOTION,
     TURN_ANGLES,
     HysteresisLoop,
     both_directions,
     hysteresis_loop,
+    loop_torques,
     own_load_loop,
 )
 from tolalloc.reducers.equivalent.model import Equilibria, EquivalentModel, Status, TurnExtremes, count_statuses
-from tolalloc.reducers.equivalent.outputs import Attribution, Orders, Solved, attribute, turn_orders
+from tolalloc.reducers.equivalent.outputs import Attribution, Orders, Solved, attribute, fitted_waves, turn_orders
 from tolalloc.reducers.equivalent.perfect import Preload, exact_unit, preload, rated_pin_force
 from tolalloc.reducers.equivalent.springs import HARMONICS
 from tolalloc.reducers.reducer.design import Reducer, at_torque
@@ -50,6 +52,21 @@ class TransmissionErrorResult:
     def solved(self) -> Solved:
         """What outputs are read off."""
         return Solved.of(self.equilibria)
+
+    def orders_over_torque(self, count: int) -> list[tuple[float, float, float, float]]:
+        """Return torque [N·m], order, amplitude and phase [rad] of the strongest orders in both directions.
+
+        What a controller takes out of the error by feedforward; a negative torque resists the forward rotation. Waves
+        are cosines, by least squares at the angles of the turn.
+        """
+        unit, order = self.equilibria, np.array([own for own, *_ in self.orders.main(count)])
+        drawn = EquivalentModel(unit.reducer, orders=self.unit.orders or HARMONICS)
+        found = []
+        for torque in loop_torques(unit.reducer, DRAWN).tolist():
+            curve = drawn.at_torque(torque).equilibria(unit.errors, torque, unit.carrier_angle).transmission_error
+            wave = fitted_waves(unit.carrier_angle, curve, order)[0]
+            found += [(torque, *own) for own in zip(order, np.abs(wave), np.angle(wave), strict=True)]
+        return found
 
     @property
     def statuses(self) -> dict[str, int]:

@@ -43,8 +43,8 @@ class Bolts:
         --------
         >>> steel = Material(elastic_modulus=206e9, poisson_ratio=0.3)
         >>> found = Bolts(count=16, size=0.008, circle=0.2, grip=0.015).stiffnesses(steel)
-        >>> f"{found['turn'] * ARCMINUTE:.3g}"  # [N·m/arcmin]
-        '54600'
+        >>> round(found["turn"] * ARCMINUTE / 1e3, 1)  # [kN·m/arcmin]
+        58.5
         """
         outer, hole = _HEAD * self.size + _CONE * self.grip, _HOLE * self.size
         area, radius = pi * (outer**2 - hole**2) / 4, self.circle / 2

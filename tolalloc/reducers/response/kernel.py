@@ -19,6 +19,7 @@ from tolalloc.models.model import Evaluation, Observer, Response, Samples, unobs
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers import PEAK_TO_PEAK
 from tolalloc.reducers.equivalent.model import EquivalentModel, TurnExtremes, cached_model
+from tolalloc.reducers.equivalent.outputs import compensated_peak_to_peak
 from tolalloc.reducers.equivalent.wear import Wear
 from tolalloc.reducers.load_case import LoadCase
 from tolalloc.reducers.reducer.design import Modification, Reducer, at_torque, thermal_shift
@@ -62,6 +63,7 @@ class KernelResponse:
     load: float | None = None  # Torque of what pins and bearings carry, the rated one as the torque unless given [N·m]
     # Part of the output turn that the peak-to-peak is taken of, all of it unless given [rad]
     window: tuple[float, float] | None = None
+    compensated: tuple[int, ...] = ()  # Orders that are taken out of the error before its peak-to-peak counts [-]
     wear: Wear | None = None  # What hours have taken off the parts, none of new ones
     observe: Observer = unobserved  # Told the statuses of each chunk
     mapper: Mapper = map  # What solves the chunks, `tolalloc.running.chunks.map_chunks`
@@ -90,7 +92,7 @@ class KernelResponse:
     def under(self, case: LoadCase) -> KernelResponse:
         """Return the response of the same reducer under a load case, which keeps what it does not state."""
         warmer = self.disc_temperature if case.disc_temperature is None else case.disc_temperature
-        kernel = replace(self, window=case.window, disc_temperature=warmer)
+        kernel = replace(self, window=case.window, compensated=case.compensated, disc_temperature=warmer)
         if case.torque is None:
             return kernel
         own = self.model
@@ -161,6 +163,9 @@ class KernelResponse:
 
     def peak_to_peak(self, errors: Float[np.ndarray, "chunk all_columns"]) -> Answer:
         """Return the peak-to-peak at errors in the order of the model's columns [arcsec], and the statuses."""
+        if self.compensated:
+            span, status = compensated_peak_to_peak(self.model, errors, self.torque, self.compensated)
+            return span[:, np.newaxis] / ARCSECOND, status
         found = self.extremes(errors)
         return found.peak_to_peak[:, np.newaxis] / ARCSECOND, found.status
 

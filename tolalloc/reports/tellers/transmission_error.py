@@ -63,7 +63,7 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
         orders = _say("strongest", orders=strongest) if strongest else _say("flat")
         rigidity, _ = self._rigidity
         stated = self.result.reducer.friction
-        assumed = "" if None not in (stated.seals, stated.grease) else _say("assumed")
+        assumed = "" if None not in (stated.seals, stated.grease) else f" {_say('assumed')}"
         rubbing = _say("friction", **friction, assumed=assumed) if friction else ""
         load, orders_met = self.result.reducer.load, [order for order, *_ in self._main_orders if order > 0]
         resonance = resonance_sentence(self.result.reducer, self.result.torque, orders_met, load.input_speed)
@@ -187,7 +187,7 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
         return turn, (shown.map(_tenths), _say("sources_on_terminal"))
 
     def add_files(self, folder: Path) -> None:
-        """Add the curve at the equally spaced angles, which `diagnose` and `lot` read."""
+        """Add the curve at equally spaced angles, which `diagnose` and `lot` read, and its orders over the torque."""
         from tolalloc.reports.writer import write_csv, write_json
 
         found = self.result.equilibria
@@ -196,6 +196,13 @@ class TransmissionErrorTeller(Teller[TransmissionErrorResult]):
         curve["torque [N·m]"] = self.result.torque
         write_csv(curve, folder / "curve.csv")
         write_json({str(name): values.tolist() for name, values in curve.items()}, folder / "curve.json")
+        heads = ("torque [N·m]", "order [-]", "amplitude [arcsec]", "phase of the cosine [deg]")
+        scale = (1.0, 1.0, 1 / ARCSECOND, 1 / DEGREE)
+        rows = np.array(self.result.orders_over_torque(_MAIN)).reshape(-1, len(heads)) * scale
+        over = pd.DataFrame(rows, columns=list(heads))
+        over[heads[1]] = [int(own) if own.is_integer() else own for own in over[heads[1]].tolist()]
+        write_csv(over, folder / "orders_over_torque.csv")
+        write_json({str(name): values.tolist() for name, values in over.items()}, folder / "orders_over_torque.json")
 
     @cached_property
     def turn_table(self) -> pd.DataFrame:

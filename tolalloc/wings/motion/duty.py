@@ -113,9 +113,9 @@ def require_cycle(cases: Sequence[LoadCase], reducer: Reducer) -> None:
         for name in ("torque", "speed"):
             if getattr(case, name) is None:
                 raise InputError(f"{place}: {name} is missing; a duty cycle needs torque and speed of every load case.")
-        if case.output_angles is not None:
-            allowed = "none in a duty cycle, which takes the turn"
-            raise InputError.at(place, "output_angles", case.output_angles, allowed)
+        for name in ("output_angles", "compensated"):
+            if given := getattr(case, name):
+                raise InputError.at(place, name, given, "none in a duty cycle, which takes the whole error")
         reducer.torque_on_carrier(case.torque, place)
 
 
