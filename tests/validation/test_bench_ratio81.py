@@ -16,6 +16,7 @@ import pytest
 from scipy.optimize import root
 
 from tests.builders import drawn_units
+from tests.verification.test_ring import on
 from tolalloc.drawings.drawing import load_drawing
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES, hysteresis_loop
@@ -85,13 +86,13 @@ def with_ring() -> Reducer:
     asked = elastic(1800.0)
 
     def missed(numbers: np.ndarray) -> np.ndarray:
-        found = waves(replace(preset(), housing=housing_of(numbers)), 1800.0)
+        found = waves(on(preset(), housing_of(numbers)), 1800.0)
         return np.array([part for order in (39, 78) for part in _parts(found[order] - asked[order])])
 
     for start in 2 * np.pi * np.arange(4) / 4:
         found = root(missed, [2 * np.cos(start), 2 * np.sin(start), 0.01, 0.01], options={"eps": 1e-4})
         if found.success and np.abs(found.fun).max() < 1e-3:
-            return replace(preset(), housing=housing_of(found.x))
+            return on(preset(), housing_of(found.x))
     raise AssertionError("no ring makes both orders")
 
 

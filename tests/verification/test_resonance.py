@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 import tolalloc as ta
 from tests.builders import at_constant_contact
+from tests.verification.test_ring import on
 from tolalloc.cli.main import app
 from tolalloc.exceptions import TolallocError
 from tolalloc.reducers.equivalent.model import EquivalentModel
@@ -40,7 +41,7 @@ def test_it_falls_with_the_root_of_the_inertia_and_with_a_ring_that_gives():
     one, four = (resonance_of(reducer, -167.0, inertia).frequency for inertia in (1.0, 4.0))
     assert one == pytest.approx(2 * four)
     # Two springs in series: 1/f² adds.
-    soft = resonance_of(replace(reducer, housing=Housing(turn=1e5)), -167.0, 1.0)
+    soft = resonance_of(on(reducer, Housing(turn=1e5)), -167.0, 1.0)
     ring = np.sqrt(1e5) / (2 * np.pi)
     assert soft.frequency == pytest.approx((one**-2 + ring**-2) ** -0.5, rel=0.02)
 

@@ -21,10 +21,17 @@ from tolalloc.reducers.equivalent.ring import ring_motion
 from tolalloc.reducers.equivalent.springs import Positions
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.files import PRESETS, load_reducer
-from tolalloc.reducers.reducer.housing import GIVES, Bolts, Housing
+from tolalloc.reducers.reducer.housing import GIVES, Bolts, Housing, ways_of
 from tolalloc.reducers.scene import scene_of
 from tolalloc.reports.scene_record import Pose, scene_record
 from tolalloc.wings.motion.motion import SpeedProfile, motion_of
+
+
+def on(reducer: Reducer, housing: Housing) -> Reducer:
+    """The reducer on a ring that gives as a file would state it."""
+    springs = housing.springs(reducer.disc_material, reducer.cycloid_stage.pin_circle_radius)
+    held = dict.fromkeys((f"ring_{way}" for way in GIVES), np.inf)
+    return replace(reducer, housing=housing, stiffness=replace(reducer.stiffness, **(held | springs)))
 
 
 def soft_housing(seed: int, reducer: Reducer) -> Housing:
@@ -51,7 +58,7 @@ def twin_of(case: Case, angle: float) -> DenseModel:
     feels θ − t·τ.
     """
     reducer, housing = case.reducer, case.reducer.housing
-    rigid = replace(reducer, housing=Housing())
+    rigid = on(reducer, Housing())
     at = Positions(rigid, np.array([angle]))
     turned = np.exp(1j * housing.direction)
     pins = reducer.cycloid_stage.pin_circle_radius * np.exp(1j * at.pin_direction)
@@ -71,7 +78,7 @@ def twin_of(case: Case, angle: float) -> DenseModel:
     size = found[0].displacement.shape[2]
     along = np.array([turned.real, turned.imag])
     across = np.array([-turned.imag, turned.real])
-    for number, (way, stiffness) in enumerate(housing.stiffnesses.items()):
+    for number, (way, stiffness) in enumerate((way, getattr(housing, way)) for way in GIVES):
         row = np.zeros((1, 1, size))
         if way == "turn":
             row[0, 0, -3] = 1.0
@@ -88,7 +95,7 @@ def twin_of(case: Case, angle: float) -> DenseModel:
 @pytest.mark.parametrize("seed", range(12))
 def test_a_ring_agrees_with_the_dense_twin(seed):
     case = random_case(seed)
-    case = replace(case, reducer=replace(case.reducer, housing=soft_housing(seed, case.reducer)))
+    case = replace(case, reducer=on(case.reducer, soft_housing(seed, case.reducer)))
     model = EquivalentModel(case.reducer, orders=case.orders)
     errors = np.array([[case.units[0].get(column, 0.0) for column in model.columns]])
     angle = float(case.carrier_angle[0])
@@ -97,7 +104,7 @@ def test_a_ring_agrees_with_the_dense_twin(seed):
     least = least_energy(twin)
     assert twin.imbalance(least) < 1e-9
     assert abs(found - least[-6]) < 1e-6 * ARCSECOND
-    stiff = EquivalentModel(replace(case.reducer, housing=Housing()), orders=case.orders)
+    stiff = EquivalentModel(on(case.reducer, Housing()), orders=case.orders)
     rigid = float(stiff.equilibria(errors, case.torque, case.carrier_angle[:1]).transmission_error[0, 0])
     assert abs(found - rigid) > 1e-3 * ARCSECOND
 
@@ -108,7 +115,7 @@ def test_pins_of_a_ring_are_felt_as_a_disc_that_moves_the_other_way(name):
     reducer = load_reducer(name)
     stage = reducer.cycloid_stage
     housing = replace(soft_housing(3, reducer), direction=0.0, turn_per_tilt_along=0.3, turn_per_tilt_across=-0.7)
-    at = Positions(replace(reducer, housing=housing), np.linspace(0.1, 6.0, 7))
+    at = Positions(on(reducer, housing), np.linspace(0.1, 6.0, 7))
     moved, contact = ring_motion(at), pin_contact(at)
     pins = stage.pin_circle_radius * np.stack([np.cos(at.pin_direction), np.sin(at.pin_direction)])
     for disc in range(reducer.disc_count):
@@ -124,9 +131,9 @@ def test_pins_of_a_ring_are_felt_as_a_disc_that_moves_the_other_way(name):
 def test_a_ring_that_does_not_give_is_not_there():
     reducer = load_reducer("rv20e")
     bare = condense(reducer, (1, 2, 4), np.linspace(0.0, 1.0, 5))
-    same = condense(replace(reducer, housing=Housing(direction=1.0)), (1, 2, 4), np.linspace(0.0, 1.0, 5))
+    same = condense(on(reducer, Housing(direction=1.0)), (1, 2, 4), np.linspace(0.0, 1.0, 5))
     assert all(np.array_equal(one, other) for one, other in zip(bare, same, strict=True))
-    softer = condense(replace(reducer, housing=Housing(turn=1e6)), (1, 2, 4), np.linspace(0.0, 1.0, 5))
+    softer = condense(on(reducer, Housing(turn=1e6)), (1, 2, 4), np.linspace(0.0, 1.0, 5))
     assert softer.stiffness.shape == bare.stiffness.shape  # so a unit takes no longer
 
 
@@ -136,7 +143,7 @@ def test_one_disc_on_two_unequal_springs(torque):
     reducer = replace(load_reducer("cd29"), disc_count=1)
     stage, model = reducer.cycloid_stage, EquivalentModel(reducer)
     along, across, direction = 2e11, 5e11, 0.4  # so stiff that they do not change the force
-    soft = EquivalentModel(replace(reducer, housing=Housing(along=along, across=across, direction=direction)))
+    soft = EquivalentModel(on(reducer, Housing(along=along, across=across, direction=direction)))
     count = 8 * stage.pin_count
     angle = 2 * np.pi * np.arange(count) / count
     by_disc = pin_contact(Positions(reducer, angle)).by_disc[:, 0, :2]
@@ -162,7 +169,7 @@ def test_one_disc_on_two_unequal_springs(torque):
 
 
 def test_what_a_ring_adds_grows_with_the_torque():
-    reducer = replace(load_reducer("rv160e"), housing=Housing(turn=2e7, tilt_along=5e5, turn_per_tilt_along=0.03))
+    reducer = on(load_reducer("rv160e"), Housing(turn=2e7, tilt_along=5e5, turn_per_tilt_along=0.03))
     count = 4 * 39 * 40
     at = 2 * np.pi * np.arange(count) / count
     found = []
@@ -180,17 +187,18 @@ def test_what_a_ring_adds_grows_with_the_torque():
 def test_bolts_give_alike_all_around_and_numbers_stand_before_them():
     reducer = load_reducer("rv20e")
     bolts = Bolts(count=12, size=0.006, circle=0.13, grip=0.012)
-    filled = Housing(bolts=bolts, turn=1e7).filled(reducer.disc_material)
-    assert filled.turn == 1e7
-    assert filled.along == filled.across and filled.tilt_along == filled.tilt_across
-    assert set(filled.stiffnesses) == set(GIVES)
-    twice = Housing(bolts=replace(bolts, count=24)).filled(reducer.disc_material)
-    assert twice.along == pytest.approx(2 * filled.along)
+    filled = on(reducer, Housing(bolts=bolts, turn=1e7)).stiffness
+    assert filled.ring_turn == pytest.approx(1e7 / reducer.cycloid_stage.pin_circle_radius**2)
+    assert filled.ring_along == filled.ring_across
+    assert filled.ring_tilt_along == filled.ring_tilt_across
+    assert list(ways_of(filled)) == list(GIVES)
+    twice = on(reducer, Housing(bolts=replace(bolts, count=24))).stiffness
+    assert twice.ring_along == pytest.approx(2 * filled.ring_along)
 
 
 def test_a_picture_shows_discs_in_the_housing_and_the_ring_where_it_is():
     reducer = load_reducer("rv20e")
-    soft = replace(reducer, housing=soft_housing(5, reducer))
+    soft = on(reducer, soft_housing(5, reducer))
     model = EquivalentModel(soft)
     scene = scene_of(model, exact_unit(model)[0], -100.0, per_crank_turn=4)
     ring, states = scene.coordinates["ring"], scene.forward
@@ -211,7 +219,7 @@ def test_a_picture_shows_discs_in_the_housing_and_the_ring_where_it_is():
 
 
 def test_forces_in_the_ring_do_the_work_that_its_way_takes():
-    reducer = replace(load_reducer("rv20e"), housing=Housing(turn=3e6, tilt_along=1e5, direction=0.3))
+    reducer = on(load_reducer("rv20e"), Housing(turn=3e6, tilt_along=1e5, direction=0.3))
     shares = {own.part: own.share for own in twist_shares(reducer)}
     assert shares["ring turn"] > 0.01
     assert shares["ring tilt along"] > 0.001
@@ -222,7 +230,7 @@ def test_forces_in_the_ring_do_the_work_that_its_way_takes():
 
 
 def test_a_ring_that_gives_is_not_moved_in_time():
-    reducer = replace(load_reducer("rv40e_xi2015"), housing=Housing(turn=1e7))
+    reducer = on(load_reducer("rv40e_xi2015"), Housing(turn=1e7))
     speed, torque = SpeedProfile.constant(1.0), SpeedProfile.constant(-572.0)
     with pytest.raises(InputError, match="a ring that gives is not moved in time"):
         motion_of(reducer, speed, torque, duration=0.1, steps=1)
@@ -250,7 +258,8 @@ def test_a_file_states_the_ring_in_its_units(tmp_path):
     assert found.housing.turn == pytest.approx(4000 / ARCMINUTE)
     assert found.housing.direction == pytest.approx(np.pi / 6)
     assert found.housing.tilt_along == pytest.approx(150.0 / ARCMINUTE)
-    assert found.housing.along == found.housing.across > 1e9
+    assert found.stiffness.ring_along == found.stiffness.ring_across > 1e9
+    assert found.stiffness.ring_turn == pytest.approx(found.housing.turn / 0.052**2)
     assert any("bolts" in said for said in found.assumptions)
 
 

@@ -16,14 +16,16 @@ from studies.published.liu2020_tables import BiasOnly, improvement
 from studies.published.recovery import recovery
 from studies.published.simulated_bench import Bench, random_units, simulated_bench
 from tests.builders import baseline_errors, says
+from tests.verification.test_ring import on
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.exceptions import InputError
+from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.hysteresis import hysteresis_loop
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.springs import HARMONICS
 from tolalloc.reducers.families.rv import RV
 from tolalloc.reducers.reducer.files import load_reducer
+from tolalloc.reducers.reducer.housing import Housing
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness
 from tolalloc.sensitivity.surrogate.regression import fit_box_polynomial, total_degrees
 from tolalloc.wings.bench.information import information
@@ -438,3 +440,43 @@ def test_curves_and_loops_find_the_truth_again():
 
 def test_the_gain_of_table_7_is_a_share_of_the_difference():
     np.testing.assert_allclose(improvement(np.array([2.0, 4.0]), np.array([1.0, 3.0])), [0.5, 0.25])
+
+
+@pytest.mark.slow
+def test_curves_at_several_torques_tell_how_a_ring_tilts_and_not_how_it_shifts():
+    """Two discs in balance tilt the ring and do not shift it; a turn is the same at every angle, so a curve without
+    its mean does not show it, and a loop does."""
+    preset = load_reducer("rv160e")
+    housing = Housing(along=2e10, turn=3e7, tilt_along=5e5, tilt_across=1.5e6, direction=0.4)
+    names = ("ring_tilt_along", "ring_tilt_across", "ring_turn", "ring_along")
+    true = on(preset, housing)
+    start = replace(
+        true,
+        stiffness=replace(true.stiffness, **{name: 1.4 * getattr(true.stiffness, name) for name in names}),
+    )
+    plan = bench(
+        peak_to_peak_torque=0.0,
+        curve_torques=(-400.0, -1000.0, -1600.0, 1600.0),
+        curve_angles=2 * np.pi * np.arange(156) / 156,
+        loop_torques=np.array([-1568.0, -784.0, 784.0, 1568.0]),
+    )
+    units = random_units(ERRORS, 2, SeedTree(8))
+    measured = simulated_bench(true, units, plan).measured(SeedTree(5))
+    data = data_of(measured, "test")
+    parameters = tuple(parameter(name, start) for name in names)
+    problem = IdentificationProblem(
+        parameters=parameters,
+        data=data,
+        predictor=KernelPredictor(start, parameters, measured, data),
+        weight=np.ones(2),
+    )
+    found = gauss_newton(problem, np.zeros((1, len(names)))).coordinates
+    own = information(problem, problem.predictor(found), found)
+    error = np.sqrt(np.diag(own.covariance))
+    true_at = np.array([item.coordinate(getattr(true.stiffness, item.name)) for item in parameters])
+    told = np.abs(found - true_at)[:3]
+    assert (told < 4 * error[:3]).all()
+    assert (error[:3] < (0.1, 0.3, 0.1)).all()  # of ln K
+    assert error[3] > 5 * error[0]
+    with pytest.raises(UnknownNameError, match="ring_across"):
+        parameter("ring_across", start)  # does not give

@@ -12,10 +12,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from tolalloc.reducers.equivalent.interfaces import PinContact, pin_contact
-from tolalloc.reducers.equivalent.ring import ROTATIONS, on_ring, ring_supports
+from tolalloc.reducers.equivalent.ring import on_ring, ring_supports
 from tolalloc.reducers.equivalent.springs import AtAngles, Coordinates, Positions, SpringGroup, harmonic_waves
 from tolalloc.reducers.families.known import family_of
 from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.housing import ANGLES
 
 _ANGLES_AT_ONCE = 64
 
@@ -70,7 +71,7 @@ def rotation_scale(reducer: Reducer, coordinates: Coordinates) -> Float[np.ndarr
     for disc in range(reducer.disc_count):
         scale[coordinates.disc(disc) + 2] = 1 / reducer.cycloid_stage.disc_pitch_radius
     scale[coordinates.carrier + 2] = 1 / reducer.carrier_radius
-    for way in set(coordinates.ring) & set(ROTATIONS):
+    for way in set(coordinates.ring) & set(ANGLES):
         scale[coordinates.of_ring(way)] = 1 / reducer.cycloid_stage.pin_circle_radius
     return scale
 

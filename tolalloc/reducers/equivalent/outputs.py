@@ -27,12 +27,12 @@ from tolalloc.reducers.equivalent.springs import AtAngles, Positions, harmonic_w
 from tolalloc.reducers.families.known import INTERFACES, family_of
 from tolalloc.reducers.reducer.design import Reducer
 from tolalloc.reducers.reducer.form import PartForm
-from tolalloc.reducers.reducer.housing import GIVES
+from tolalloc.reducers.reducer.housing import GIVES, RING
 
 AtPins = Float[np.ndarray, "sample angle disc pin"]
 """A number of every pin on every disc, at every angle of every sample."""
 MESHES = tuple(own.stiffness for own in INTERFACES if own.is_mesh)
-_SINGLE = (*MESHES, *(f"ring_{way}" for way in GIVES))
+_SINGLE = (*MESHES, *(f"{RING}{way}" for way in GIVES))
 """Interfaces that carry along one direction, named as in `Stiffness`; the others carry x and y."""
 _ROUNDING = 1e-4
 """Amplitude over the largest one below which an order is not named [-]."""
@@ -134,8 +134,8 @@ def compensated_peak_to_peak(
     """Return the peak-to-peak that is left once orders of the output's turn are taken out, and the worst status [rad].
 
     max(y − Σ waves) − min(y − Σ waves) at the coarse angles of the search, and what finer angles add to the whole
-    error, which may be more by up to 1 % of the whole than they add to what is left; own derivation. Each unit's own waves are taken
-    out, as a controller does that has learnt them.
+    error, which may be more by up to 1 % of the whole than they add to what is left; own derivation. Each unit's own
+    waves are taken out, as a controller does that has learnt them.
 
     Examples
     --------

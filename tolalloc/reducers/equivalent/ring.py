@@ -13,9 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.reducers.equivalent.springs import Positions, SpringGroup
-
-ROTATIONS = ("turn", "tilt_along", "tilt_across")
-"""Ways of the ring that are angles."""
+from tolalloc.reducers.reducer.housing import ANGLES, RING, ways_of
 
 
 def ring_motion(at: Positions) -> Float[np.ndarray, "angle disc 2 way"]:
@@ -61,30 +59,30 @@ def on_ring(groups: list[SpringGroup], at: Positions) -> list[SpringGroup]:
 def ring_supports(at: Positions) -> list[SpringGroup]:
     """Return what holds the ring, one spring for each way that it has, at the pin circle where it is an angle.
 
-    δ = u, R_p·θ, R_p·τ [m]; stiffness k, k/R_p², k/R_p² [N/m]; own derivation, theory page (107).
+    δ = u, R_p·θ, R_p·τ [m]; own derivation, theory page (107).
 
     Examples
     --------
     >>> from tolalloc.reducers.reducer.files import load_reducer
-    >>> from tolalloc.reducers.reducer.housing import Housing
-    >>> reducer = replace(load_reducer("rv20e_liu2020"), housing=Housing(turn=1e7))
+    >>> reducer = load_reducer("rv20e_liu2020")
+    >>> reducer = replace(reducer, stiffness=replace(reducer.stiffness, ring_turn=4e9))
     >>> (own,) = ring_supports(Positions(reducer, np.zeros(1)))
-    >>> own.name, round(float(own.displacement[0, 0, -1]), 3), f"{own.stiffness[0, 0]:.3g}"
-    ('ring turn', 0.052, '3.7e+09')
+    >>> own.name, round(float(own.displacement[0, 0, -1]), 3)
+    ('ring turn', 0.052)
     """
-    coordinates, radius, housing = at.coordinates, at.reducer.cycloid_stage.pin_circle_radius, at.reducer.housing
+    coordinates, radius = at.coordinates, at.reducer.cycloid_stage.pin_circle_radius
     found = []
-    for way, stiffness in housing.stiffnesses.items():
-        lever = radius if way in ROTATIONS else 1.0
+    for way, stiffness in ways_of(at.reducer.stiffness).items():
+        lever = radius if way in ANGLES else 1.0
         displacement = np.zeros((at.carrier_angle.size, 1, coordinates.count))
         displacement[:, 0, coordinates.of_ring(way)] = lever
         group = SpringGroup(
             name=f"ring {way.replace('_', ' ')}",
-            stiffness_name=f"ring_{way}",
+            stiffness_name=f"{RING}{way}",
             displacement=displacement,
             error=np.zeros((at.carrier_angle.size, 1, 0)),
             columns=(),
-            stiffness=np.full((at.carrier_angle.size, 1), stiffness / lever**2),
+            stiffness=np.full((at.carrier_angle.size, 1), stiffness),
         )
         found.append(group)
     return found

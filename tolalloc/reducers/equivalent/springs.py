@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.housing import ways_of
 
 AtAngles = Float[np.ndarray, " angle"]
 """A number at every carrier angle, such as the angle itself [rad]."""
@@ -36,8 +37,7 @@ class Coordinates:
     @classmethod
     def of(cls, reducer: Reducer) -> Coordinates:
         """Return the layout of a reducer's displacements."""
-        ring = tuple(reducer.housing.stiffnesses)
-        return cls(reducer.crank_count, reducer.disc_count, reducer.input_count, ring)
+        return cls(reducer.crank_count, reducer.disc_count, reducer.input_count, tuple(ways_of(reducer.stiffness)))
 
     @property
     def count(self) -> int:

@@ -19,6 +19,7 @@ from tolalloc.reading.units import MICROMETRE, MICRORADIAN
 from tolalloc.reducers.families.records import RECORDS
 from tolalloc.reducers.reducer.design import Modification, Reducer
 from tolalloc.reducers.reducer.form import PartForm, load_designed
+from tolalloc.reducers.reducer.housing import GIVES, RING
 from tolalloc.reducers.reducer.records import AnyReducerRecord, NewtonPerMetre, ReducerRecord
 from tolalloc.reducers.reducer.stiffness import IdentifiedStiffness, Stiffness, checked_correlation
 
@@ -54,7 +55,9 @@ class IdentifiedStiffnessRecord(Record):
 
 IDENTIFIABLE = tuple(
     name
-    for name in dict.fromkeys(name for own in RECORDS for name in own.stiffness_fields())
+    for name in dict.fromkeys(
+        (*(name for own in RECORDS for name in own.stiffness_fields()), *(RING + own for own in GIVES))
+    )
     if name in Stiffness.__dataclass_fields__ and name != "pin_contact_law"
 )
 """Fields of `tolalloc.reducers.reducer.stiffness.Stiffness` that a file of identified stiffnesses may hold."""

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf, isfinite, pi
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field
 
 from tolalloc.reading.files import times
 from tolalloc.reading.units import ARCMINUTE, DEGREE, MICROMETRE, MILLIMETRE
-from tolalloc.reducers.reducer.stiffness import Material, shear_modulus
+from tolalloc.reducers.reducer.stiffness import Material, Stiffness, shear_modulus
 
 NewtonPerMetre = Annotated[float, Field(ge=1.0, le=1e7), times(1 / MICROMETRE)]
 """A stiffness that files state in N/µm [N/m]."""
@@ -32,7 +32,7 @@ class Bolts:
     grip: Annotated[float, Field(alias="grip_mm", ge=1, le=500), times(MILLIMETRE)]  # Clamped thickness [m]
 
     def stiffnesses(self, material: Material) -> dict[str, float]:
-        """Return those of `Housing` that the clamped flange has, alike in all directions [N/m, N·m/rad].
+        """Return the stiffnesses of `Housing` that the clamped flange has, alike in all directions [N/m, N·m/rad].
 
         Every bolt clamps a cone of the flange, here a hollow cylinder of its mean diameter D: E·A/l along its axis,
         G·A/l across it; n of them on a circle of radius R. k = n·G·A/l across, k·R² about the axis, n·E·A/l·R²/2 as
@@ -81,17 +81,22 @@ class Housing:
     turn_per_tilt_across: Annotated[float, Field(ge=-1, le=1)] = 0.0
     bolts: Bolts | None = None
 
-    def filled(self, material: Material) -> Housing:
-        """Return the same with what its bolts give where no number is stated."""
-        found: dict[str, Any] = dict(self.bolts.stiffnesses(material)) if self.bolts else {}
-        return replace(self, **{name: value for name, value in found.items() if not isfinite(getattr(self, name))})
-
-    @property
-    def stiffnesses(self) -> dict[str, float]:
-        """What gives → its stiffness [N/m, N·m/rad]."""
-        given = {name: getattr(self, name) for name in GIVES}
-        return {name: value for name, value in given.items() if isfinite(value)}
+    def springs(self, material: Material, radius: float) -> dict[str, float]:
+        """Return the fields of `Stiffness` that it states, or its bolts where it does not, at a pin circle [N/m]."""
+        stated = {way: getattr(self, way) for way in GIVES}
+        found = (self.bolts.stiffnesses(material) if self.bolts else {}) | {
+            way: value for way, value in stated.items() if isfinite(value)
+        }
+        return {f"{RING}{way}": value / radius**2 if way in ANGLES else value for way, value in found.items()}
 
 
-GIVES = ("along", "across", "turn", "tilt_along", "tilt_across")
-"""Ways in which a ring may give, in the order of the model's coordinates."""
+def ways_of(stiffness: Stiffness) -> dict[str, float]:
+    """Return the ways in which a ring gives and their stiffness, in the order of the model's coordinates [N/m]."""
+    found = {way: float(getattr(stiffness, f"{RING}{way}")) for way in GIVES}
+    return {way: value for way, value in found.items() if isfinite(value)}
+
+
+GIVES, ANGLES = ("along", "across", "turn", "tilt_along", "tilt_across"), ("turn", "tilt_along", "tilt_across")
+"""Ways in which a ring may give, and which of them are angles."""
+RING = "ring_"
+"""What the fields of `Stiffness` begin with that hold the ring."""

@@ -325,13 +325,18 @@ class AnyReducerRecord(Record):
             "disc_material": self.material,
             "pin_material": self.pin_material or self.material,
             "modification": Modification.from_convention(given.convention, *amounts),
-            "housing": self.housing.filled(self.material),
+            "housing": self.housing,
             "assumptions": (
                 *self.assumptions,
                 *([CROWNING] if self.cycloid_stage.crowning else []),
                 *([BOLTED] if self.housing.bolts else []),
             ),
         }
+
+    def on_ring(self, stiffness: Stiffness) -> Stiffness:
+        """Return the stiffnesses with those that hold the ring of pins."""
+        springs: dict[str, Any] = self.housing.springs(self.material, self.cycloid_stage.pin_circle_radius)
+        return replace(stiffness, **springs)
 
     def require_catalogue(self, reducer: Reducer) -> None:
         """Raise where a catalogue states a rigidity that no reducer has, or no room for seals and grease."""
@@ -383,7 +388,8 @@ class ReducerRecord(AnyReducerRecord):
 
     def _stiffness(self) -> Stiffness:
         disc = self.material
-        return self.stiffness.stiffness(disc, self.pin_material or disc, self.first_stage, self.cycloid_stage)
+        found = self.stiffness.stiffness(disc, self.pin_material or disc, self.first_stage, self.cycloid_stage)
+        return self.on_ring(found)
 
     def _clearances(self) -> Clearances:
         """Return the clearances, those of bearings that are given by their dimensions included."""

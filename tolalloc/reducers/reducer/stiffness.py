@@ -54,6 +54,12 @@ class Stiffness:
     pin_contact_law: str = "constant"
     # One pin between its supports, in series with its contact; infinite where it rests in a half groove [N/m]
     pin_bending: float = inf
+    # The ring of pins against what holds it, angles as arcs at the pin circle; infinite where it does not give [N/m]
+    ring_along: float = inf
+    ring_across: float = inf
+    ring_turn: float = inf
+    ring_tilt_along: float = inf
+    ring_tilt_across: float = inf
 
 
 @dataclass(frozen=True, kw_only=True)

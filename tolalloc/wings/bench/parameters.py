@@ -14,9 +14,11 @@ from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.families.known import INTERFACES
 from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.housing import GIVES, RING
 
 SYMBOLS = {
     **{own.stiffness: own.symbol for own in INTERFACES if own.symbol},
+    **{f"{RING}{way}": f"ring {way.replace('_', ' ')}" for way in GIVES},
     "pin_contact": "C",
     "torque": "torque",
     "bias": "bias",
@@ -86,7 +88,8 @@ def parameter(
     Bounds are half to double a stiffness, ±60 arcsec, a tenth to ten times the torque unless given; the prior is a
     relative standard deviation, of the bias one in arcseconds.
     """
-    known = [own for own in SYMBOLS if own in (BIAS, TORQUE) or getattr(reducer.stiffness, own)]
+    # What a reducer lacks has no stiffness, and what does not give an infinite one.
+    known = [own for own in SYMBOLS if own in (BIAS, TORQUE) or 0.0 < getattr(reducer.stiffness, own) < inf]
     UnknownNameError.require(place, "parameter", name, known)
     starts = {BIAS: 0.0, TORQUE: 1.0}
     start = starts[name] if name in starts else float(getattr(reducer.stiffness, name))

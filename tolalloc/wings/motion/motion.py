@@ -14,6 +14,7 @@ from numpy.polynomial import Polynomial
 from tolalloc.exceptions import InputError
 from tolalloc.reducers.equivalent.springs import Coordinates, Positions, SpringGroup
 from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.housing import ways_of
 
 BLENDS = {"linear": Polynomial([0, 1]), "step": Polynomial([0, 0, 3, -2])}
 """From 0 to 1 between two given times: along a straight line, or by the cubic that starts and ends level."""
@@ -137,7 +138,7 @@ def motion_of(
 
 def _require_motion(reducer: Reducer) -> None:
     """Raise where a part of the reducer moves as no equation of motion says, such as a centre gear."""
-    if unmoved := reducer.unmoved or ("a ring that gives" if reducer.housing.stiffnesses else ""):
+    if unmoved := reducer.unmoved or ("a ring that gives" if ways_of(reducer.stiffness) else ""):
         raise InputError(f"reducer {reducer.name}: {unmoved} is not moved in time; this needs one without it.")
 
 

@@ -156,7 +156,9 @@ class SingleStageRecord(AnyReducerRecord):
         """Return the reducer in SI units."""
         stated = self.stated() | {"output_pins": self.output_pins}
         return self.design(
-            stiffness=self.stiffness.stiffness(stated["disc_material"], stated["pin_material"], self.cycloid_stage),
+            stiffness=self.on_ring(
+                self.stiffness.stiffness(stated["disc_material"], stated["pin_material"], self.cycloid_stage)
+            ),
             friction_dimensions=SingleStageFriction(),
             clearances=self.clearances,
             **stated,
