@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Float, Int, UInt8
 
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reducers.equivalent.condensation import bilateral_groups
@@ -14,6 +14,7 @@ from tolalloc.reducers.equivalent.interfaces import pin_contact
 from tolalloc.reducers.equivalent.model import EquivalentModel, Status
 from tolalloc.reducers.equivalent.outputs import fitted_waves, forces
 from tolalloc.reducers.equivalent.springs import Positions, vector_columns
+from tolalloc.reducers.reducer.housing import ways_of
 from tolalloc.wings.motion.motion import Damping, Inertia, Integrator, SpeedProfile, motion_of
 from tolalloc.wings.motion.stepping import simulate
 
@@ -37,35 +38,45 @@ def _check_linear(model: EquivalentModel, errors: Float[np.ndarray, " column"]) 
     for interface, clearance in vars(reducer.clearances).items():
         if clearance != 0.0:
             raise InputError.at("modes", f"clearance of {interface}", clearance, "0, for play has no single stiffness")
-    if reducer.stiffness.pin_contact_law == "logarithmic":
-        raise InputError.at("modes", "pin_contact_law", "logarithmic", "a law of constant stiffness")
+    if ways_of(reducer.stiffness):
+        raise InputError.at("modes", "housing", "a ring that gives", "a rigid one, for its mass is not stated")
     for disc in range(reducer.disc_count):
         for column in vector_columns(f"disc{disc + 1}.tilt"):
-            tilt = float(errors[model.columns.index(column)])
+            tilt = float(errors[model.columns.index(column)]) if column in model.columns else 0.0
             if tilt != 0.0:
                 raise InputError.at("modes", column, tilt, "0, for a tilted tooth has no single stiffness")
 
 
-def _carrying(
+def _pushing(
     model: EquivalentModel, errors: Float[np.ndarray, " column"], torque: float, angle: Float[np.ndarray, " angle"]
-) -> Bool[np.ndarray, "angle disc pin"]:
-    """Return which pins carry in the static equilibrium."""
+) -> Float[np.ndarray, "angle disc pin"]:
+    """Return the stiffness of the pins that carry in the static equilibrium under their forces, 0 of others [N/m].
+
+    By the logarithmic law δ = F/c·ln(cλ/F) it is c/(ln(cλ/F) − 1), c from where its tangent goes on, theory page (30).
+    """
     equilibria = model.equilibria(errors[np.newaxis], torque, angle)
     worst = Status(int(equilibria.status.max()))
     if worst != Status.CONVERGED:
         raise SolveError(f"Modes: at {int((equilibria.status > 0).sum())} of {angle.size} angles {worst.sentence}.")
-    return np.asarray(forces(equilibria).pins[0] > 0.0)
+    force = forces(equilibria).pins[0]
+    stiffness, length = (
+        own.reshape(force.shape) for own in (equilibria.tables.contact_stiffness, equilibria.tables.contact_log_length)
+    )
+    carrying = force > 0.0
+    if model.reducer.stiffness.pin_contact_law == "logarithmic":
+        logarithm = np.log(2 * stiffness) + length - np.log(np.where(carrying, force, 1.0))
+        stiffness = 2 * stiffness / np.maximum(logarithm - 1.0, 1.0)
+    return np.asarray(np.where(carrying, stiffness, 0.0))
 
 
 def _stiffness(
-    at: Positions, carrying: Bool[np.ndarray, "angle disc pin"]
+    at: Positions, pushing: Float[np.ndarray, "angle disc pin"]
 ) -> Float[np.ndarray, "angle coordinate coordinate"]:
     """Return Σk·aaᵀ over all springs that push [N/m, N/rad, N·m/rad]."""
     coordinates, contact = at.coordinates, pin_contact(at)
     stiffness = np.zeros((at.carrier_angle.size, coordinates.count, coordinates.count))
     for group in bilateral_groups(at):
         stiffness += np.swapaxes(group.displacement * group.stiffness[..., np.newaxis], 1, 2) @ group.displacement
-    pushing = np.where(carrying, contact.stiffness, 0.0)
     for disc in range(coordinates.disc_count):
         own, by_disc = slice(coordinates.disc(disc), coordinates.disc(disc) + 3), contact.by_disc[:, disc]
         stiffness[:, own, own] += (by_disc * pushing[:, disc, np.newaxis]) @ np.swapaxes(by_disc, 1, 2)
@@ -81,10 +92,10 @@ def modes(
 ) -> Modes:
     """Return the natural frequencies and modes of one unit, linearised about its static equilibrium.
 
-    K·φ = ω²·M·φ with the pins that carry. The sun's rotation is prescribed, so with pins that carry nothing moves
-    freely and all frequencies are positive; where no pin carries, discs and carrier turn without resistance and the
-    first one is zero. The modes hold for vibrations under which the same pins keep touching, at speeds whose forces of
-    inertia are small beside the load.
+    K·φ = ω²·M·φ with the pins that carry, each as stiff as it is under its force. The sun's rotation is prescribed, so
+    with pins that carry nothing moves freely and all frequencies are positive; where no pin carries, discs and carrier
+    turn without resistance and the first one is zero. The modes hold for vibrations under which the same pins keep
+    touching, at speeds whose forces of inertia are small beside the load.
 
     Theory page (64).
 
@@ -101,7 +112,7 @@ def modes(
     at = Positions(model.reducer, carrier_angle, model.orders)
     mass = inertia.diagonal(at.coordinates)
     unit = 1 / np.sqrt(mass)
-    stiffness = _stiffness(at, _carrying(model, errors, torque, carrier_angle))
+    stiffness = _stiffness(at, _pushing(model, errors, torque, carrier_angle))
     square, vector = np.linalg.eigh(stiffness * np.outer(unit, unit))
     shape = vector * unit[:, np.newaxis]
     rotation = at.coordinates.carrier + 2
