@@ -98,9 +98,9 @@ def test_te_of_table_4(tmp_path):
 def test_the_curve_that_te_writes_is_read_by_diagnose_and_lot_as_it_stands(tmp_path):
     model = EquivalentModel(load_reducer("rv40e_xi2015"))
     found, path = model.equilibria(exact_unit(model), -1.0), tmp_path / "curve.csv"
-    TransmissionErrorTeller(SimpleNamespace(equilibria=found, torque=-1.0), Header(name="", model="")).add_files(
-        tmp_path
-    )
+    TransmissionErrorTeller(
+        SimpleNamespace(equilibria=found, torque=-1.0, orders_over_torque=lambda _: []), Header(name="", model="")
+    ).add_files(tmp_path)
     curve = clean_curve(load_readings(path, "angle", "transmission error"))
     assert curve.repairs == ()
     np.testing.assert_allclose(curve.along, found.carrier_angle, atol=1e-12)

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 NAMES = (
     "sun_support, gear_mesh, crank_disc_bearing, crank_carrier_bearing, carrier_bearing, shaft_support, "
-    "eccentric_bearing, output_pin, pin_contact, ring_along, ring_across, ring_turn, ring_tilt_along, "
-    "ring_tilt_across, torque, bias"
+    "eccentric_bearing, output_pin, ring_along, ring_across, ring_turn, ring_tilt_along, ring_tilt_across, "
+    "pin_contact, torque, bias"
 )
 """Names of `tolalloc.wings.bench.parameters.SYMBOLS`, written out so that help need not import them."""
 
