@@ -11,12 +11,14 @@ from typer.testing import CliRunner
 
 import tolalloc as ta
 from tolalloc.cli.main import app
+from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers.equivalent.model import EquivalentModel, Status
 from tolalloc.reducers.equivalent.outputs import compensated_peak_to_peak
 from tolalloc.reducers.reducer.files import load_reducer
 from tolalloc.reducers.unit_file import load_unit
+from tolalloc.sensitivity.measures import Measures
 from tolalloc.study.commands import check
 from tolalloc.study.prepared import Prepared
 
@@ -81,6 +83,7 @@ def test_part_of_the_turn_and_of_the_orders_do_not_go_together():
         ta.reducer("rv20e", load_cases=[case])
 
 
+@pytest.mark.slow
 def test_a_run_of_one_unit_leaves_the_table_of_a_controller(tmp_path):
     out = tmp_path / "run"
     arguments = ["te", "--reducer", "rv20e_liu2020", "--unit", "table4", "--out", str(out)]
@@ -98,3 +101,29 @@ def test_a_run_of_one_unit_leaves_the_table_of_a_controller(tmp_path):
     assert float(at["amplitude [arcsec]"]) == pytest.approx(abs(wave), rel=0.01)
     phase = float(at["phase of the cosine [deg]"])
     assert np.cos(np.radians(phase) - np.angle(wave)) > 0.999
+
+
+@pytest.mark.slow
+def test_no_products_of_hundreds_of_columns_stand_in_for_an_output_under_load():
+    """Minutes went into them where a load case leads; the linear one is judged as any candidate."""
+    case = ta.LoadCase("loaded", torque=-300.0)
+    study = ta.Study(
+        ta.reducer("rv20e", load_cases=[case]),
+        ta.drawing("rv20e_drawing"),
+        limits={ta.at(ta.PEAK_TO_PEAK, case): ta.Limit(upper=30)},
+        name="own",
+    )
+    prepared = Prepared(study=study.with_effort("quick"))
+    asked = Measures(
+        model=prepared.model,
+        errors=prepared.errors,
+        limits={own.output: own.limits for own in prepared.requirements},
+        target=prepared.target,
+        effort=prepared.ranking_effort,
+        seeds=SeedTree(1),
+        largest_failed_share=0.01,
+        by="dimension",
+    )
+    assert len(asked.response.columns) > 100
+    sample = asked.sample()
+    assert [own.name for own in asked.choice(sample).scores] == ["linear regression"]

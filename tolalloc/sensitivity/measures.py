@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 from tolalloc.capability.experiment import Experiment, Given
 from tolalloc.capability.indices import Limits
@@ -27,6 +28,7 @@ from tolalloc.sensitivity.surrogate.control_variate import MOST_CONTROLLED, chea
 from tolalloc.sensitivity.surrogate.regression import (
     Regression,
     RegressionCandidate,
+    linear_regression,
     quadratic_regression,
     sparse_quadratic_regression,
 )
@@ -180,14 +182,16 @@ class Measures:
         """Return which surrogate has earned its place on the first units of a sample."""
         columns, outputs = self.response.columns, self.response.outputs
         candidates: list[Candidate] = list(self.model.stand_ins()) if self.leading == self.model.outputs[0] else []
-        if len(columns) <= _MOST_COLUMNS or not candidates:
-            candidates += [
-                RegressionCandidate(name=name, columns=columns, outputs=outputs, estimator=estimator)
-                for name, estimator in (
-                    ("quadratic regression", quadratic_regression),
-                    ("sparse quadratic regression", sparse_quadratic_regression),
-                )
-            ]
+        regressions: dict[str, Callable[[], Any]] = {}
+        if len(columns) <= _MOST_COLUMNS:
+            quadratic = {"quadratic regression": quadratic_regression}
+            regressions = quadratic | {"sparse quadratic regression": sparse_quadratic_regression}
+        elif not candidates:  # the products of so many columns would take minutes, and say no more
+            regressions = {"linear regression": linear_regression}
+        candidates += [
+            RegressionCandidate(name=name, columns=columns, outputs=outputs, estimator=estimator)
+            for name, estimator in regressions.items()
+        ]
         few, evaluation = self.effort.surrogate_units, sample.evaluation
         return choose(
             self.response,
