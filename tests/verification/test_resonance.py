@@ -87,3 +87,20 @@ def test_commands_say_it(tmp_path):
 def test_a_wrong_load_is_refused_by_name(tmp_path, line):
     with pytest.raises(TolallocError, match=f"load.{line.split(' ')[0]}"):
         load_reducer(with_load(tmp_path, line))
+
+
+def test_what_is_elastic_of_an_error_under_load_is_said_and_what_is_not_is_not(tmp_path):
+    case = ta.LoadCase("loaded", torque=-167.0)
+    path = tmp_path / "soft.reducer.toml"
+    text = (PRESETS / "rv20e.reducer.toml").read_text()
+    path.write_text(f"{text}\n[housing]\ntilt_along_nm_per_arcmin = 10\n")
+    for reducer, said in ((str(path), True), ("rv20e", False)):
+        study = ta.Study(
+            ta.reducer(reducer, load_cases=[case]),
+            ta.drawing("rv20e_drawing"),
+            limits={ta.PEAK_TO_PEAK: ta.Limit(upper=70), ta.at(ta.PEAK_TO_PEAK, case): ta.Limit(upper=70)},
+            name="own",
+        )
+        sentences = check(study).teller.sentences
+        assert any("at 167 N·m is elastic" in own for own in sentences) is said
+        assert not any("at 1 N·m is elastic" in own for own in sentences)

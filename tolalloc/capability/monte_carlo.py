@@ -517,6 +517,26 @@ def kept_at_once(
     return found.widened_by(uncertain(largest_excess(known, limits)), ANY_LIMIT)
 
 
+_DECIDES = 0.01
+"""Share of the units that more must miss a limit than miss the first one, for it to decide [-]."""
+
+
+def deciding(beyond: Mapping[str, float]) -> str:
+    """Return the output whose limits decide, from the share of the units beyond those of each, the first one first.
+
+    The first, unless beyond another lie more than twice as many units, and more than a hundredth of them all: two that
+    are missed alike must not change places with the seed.
+
+    Examples
+    --------
+    >>> deciding({"error": 0.10, "lost motion": 0.19}), deciding({"error": 0.10, "lost motion": 0.21})
+    ('error', 'lost motion')
+    """
+    leading = next(iter(beyond))
+    worst, first = max(beyond, key=lambda output: beyond[output]), beyond[leading]
+    return worst if beyond[worst] > 2 * first and beyond[worst] - first > _DECIDES else leading
+
+
 @dataclass(frozen=True, kw_only=True)
 class KeptLimits:
     """Which share of random units keeps each limit, and all of them at once."""

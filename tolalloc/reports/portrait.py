@@ -114,6 +114,11 @@ class Portrait(Generic[Own]):
         return self._said("remarks", ())
 
     @property
+    def risks(self) -> tuple[str, ...]:
+        """What no tolerance of the drawing helps against, in sentences; nothing unless a model knows of any."""
+        return ()
+
+    @property
     def not_included(self) -> str:
         """What may move the outputs of a part in use and is not computed, as the end of a sentence."""
         return "wear and temperature"

@@ -10,7 +10,7 @@ from typing import Any
 from tolalloc.capability.experiment import Experiment, Given
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.limit_state import ResponseLimit
-from tolalloc.capability.monte_carlo import MonteCarlo, OneSided, monte_carlo
+from tolalloc.capability.monte_carlo import MonteCarlo, OneSided, deciding, monte_carlo
 from tolalloc.capability.yield_at_limit import YieldAtLimit, yield_at_limit
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
@@ -38,9 +38,6 @@ from tolalloc.sensitivity.uncertain import UncertainEffect, uncertain_effect
 
 _MOST_COLUMNS = 100
 """Columns beyond which all products of two are more than the samples can tell apart [-]."""
-
-_DECIDES = 0.01
-"""Share of all units that more must lie beyond another limit than beyond the first one until that leads [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,18 +87,15 @@ class Measures:
     def led_by(self, sample: MonteCarlo) -> tuple[Measures, MonteCarlo]:
         """Return the same with the limit first that decides, and a sample with its output first.
 
-        The first limit, unless beyond another lie more than twice as many units, and more than a hundredth of them all:
-        two that are missed alike must not change places with the seed. A limit that the model has of its own never
-        leads.
+        A limit that the model has of its own never leads.
         """
         values, own = sample.evaluation.values, self.model.own_limits
         beyond = {
-            output: limits.outside(values[:, self.outputs.index(output)])
+            output: limits.outside(values[:, self.outputs.index(output)]) / len(values)
             for output, limits in self.limits.items()
             if output == self.leading or output not in own
         }
-        worst, first = max(beyond, key=lambda output: beyond[output]), beyond[self.leading]
-        if beyond[worst] <= 2 * first or beyond[worst] - first <= _DECIDES * len(values):
+        if (worst := deciding(beyond)) == self.leading:
             return self, sample
         led = replace(self, limits={worst: self.limits[worst], **self.limits})
         order = [self.outputs.index(name) for name in led.outputs]

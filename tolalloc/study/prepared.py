@@ -18,7 +18,7 @@ from tolalloc.allocation.space.effort import AllocationEffort
 from tolalloc.allocation.space.joint_yield import JointRequirement
 from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, Guarantee, OwnLimit, Requirement
 from tolalloc.capability.indices import Limits
-from tolalloc.capability.monte_carlo import KeptLimits, ProcessUncertainty
+from tolalloc.capability.monte_carlo import KeptLimits, ProcessUncertainty, deciding
 from tolalloc.drawings.compensators import Compensator, all_choices, choice_label, in_force
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
@@ -38,6 +38,8 @@ _SHARED = "Rows without a group are one line where identical parts have the same
 """What is said of the lines that `Prepared.errors` made, with the number of rows of each."""
 
 
+JUDGED = 1024
+"""Random units that say how a drawing stands as it is [-]."""
 _TRIED = 5
 """Values over the range of each setting at which parts in the middle of their zones are tried [-]."""
 
@@ -157,9 +159,21 @@ class Prepared:
     @property
     def requirements_with_joint(self) -> tuple[Requirement, ...]:
         """What the study limits, and last that a share of the units keeps all limits at once, if it asks for that."""
-        if len(self.requirements) == 1 or self.joint is None:
-            return self.requirements
-        return (*self.requirements, JointRequirement.of(self.requirements, self.joint))
+        return self._with_joint(self.requirements)
+
+    @property
+    def led_by_what_decides(self) -> tuple[Requirement, ...]:
+        """The same with the limit first that decides for the drawing as it is, one of those that the study states."""
+        stated = [own.output for own in self.requirements if own.output in self.study.limits]
+        if self.joint is None or len(stated) < 2:
+            return self.requirements_with_joint
+        first = deciding({output: 1.0 - self.judged.each[output].estimate for output in stated})
+        return self._with_joint(tuple(sorted(self.requirements, key=lambda own: own.output != first)))
+
+    def _with_joint(self, requirements: tuple[Requirement, ...]) -> tuple[Requirement, ...]:
+        if len(requirements) == 1 or self.joint is None:
+            return requirements
+        return (*requirements, JointRequirement.of(requirements, self.joint))
 
     @property
     def target(self) -> float:
@@ -279,6 +293,11 @@ class Prepared:
         response = self.model.reading(tuple(limits))
         x = self.random_units(units)
         return KeptLimits.of(response(x), response.outputs, limits, ProcessUncertainty.about(self.errors, x))
+
+    @cached_property
+    def judged(self) -> KeptLimits:
+        """Those of enough units to say how the drawing stands as it is."""
+        return self.kept_limits(JUDGED)
 
     @property
     def header(self) -> Header:

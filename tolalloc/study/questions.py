@@ -167,7 +167,10 @@ class Allocation(Question):
         question = DrawingQuestion(
             model=prepared.model.observed(record.observe),
             space=prepared.space,
-            requirements=prepared.requirements_with_joint,
+            # What a unit beyond a limit costs is stated for the first limit.
+            requirements=prepared.requirements_with_joint
+            if self.unit_price or self.quality_loss
+            else prepared.led_by_what_decides,
             effort=prepared.allocation_effort,
             seed=study.seed,
             largest_failed_share=study.largest_failed_share,

@@ -18,7 +18,7 @@ from tolalloc.running.chunks import Mapper
 from tolalloc.running.progress import SILENT, Progress, RunRecord
 from tolalloc.running.result_cache import ResultCache
 from tolalloc.study.answer import Answer
-from tolalloc.study.prepared import Prepared
+from tolalloc.study.prepared import JUDGED, Prepared
 from tolalloc.study.problem import Effort, Problem
 from tolalloc.study.questions import Allocation, Calculation, Question, Ranking, questions_of
 
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from tolalloc.sensitivity.result import RankingResult
 
 _READ_BY_ALL = frozenset({"name", "questions", "effort", "title_block"})
-_JUDGED = 1024
-"""Random units that say how the drawing stands as it is [-]."""
 _SHORT = 10.0
 """Time up to which nobody is told how long it takes [s]."""
 
@@ -277,10 +275,10 @@ def _answers(
 
 def _tell_today(prepared: Prepared, progress: Progress) -> None:
     """Say how the drawing stands as it is, some seconds after the start; what is asked takes minutes."""
-    progress.begin("the drawing as it is", _JUDGED)
+    progress.begin("the drawing as it is", JUDGED)
     for sentence in prepared.missed:
         progress.tell(sentence)
-    kept = prepared.kept_limits(_JUDGED)
+    kept = prepared.judged
     progress.advance(kept.joint.units)
     progress.tell(today_sentence(kept))
     from tolalloc.reports.tellers.check import in_words

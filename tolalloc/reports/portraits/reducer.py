@@ -74,6 +74,9 @@ USUAL_TWIST = 3.6
 _FELT = 1.0
 """Least peak-to-peak of exact parts of which a sentence says that it is elastic [arcsec]."""
 
+_LOADED = 0.1
+"""Torque over rated torque from which on what exact parts have of it is the load's [-]."""
+
 _MET = 5
 """Orders at most that a sentence says to meet a resonance, the slowest first [-]."""
 
@@ -143,20 +146,27 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Rigidity and lost motion beside the catalogue's, what of an error under load is elastic, the resonance."""
-        model = self.model
-        sentence, _ = against_catalogue(model.reducer, model.exact_loop_in_force)
-        own = model.reducer_in_force
+        """Rigidity and lost motion beside the catalogue's."""
+        sentence, _ = against_catalogue(self.model.reducer, self.model.exact_loop_in_force)
+        return (sentence,) if sentence else ()
+
+    @property
+    def risks(self) -> tuple[str, ...]:
+        """What of an error under load is elastic, and where orders meet the resonance of what the output turns."""
+        own = self.model.reducer_in_force
         resonance = resonance_sentence(own, -own.load.rated_torque, orders_of(own), own.load.input_speed)
-        return tuple(said for said in (sentence, *self._elastic, resonance) if said)
+        return (*self._elastic, *([resonance] if resonance else []))
 
     @property
     def _elastic(self) -> Iterator[str]:
         """Say how much of a peak-to-peak exact parts have under a load, as a ring that gives makes it."""
         model, torques = self.model, {PEAK_TO_PEAK: self.model.kernel.torque}
         torques |= {at(PEAK_TO_PEAK, case): case.torque for case in model.load_cases if case.torque is not None}
-        exact = model.reading(tuple(torques))(np.zeros((1, len(model.columns)))).values[0].tolist()
-        for torque, value in zip(torques.values(), exact, strict=True):
+        loaded = {name: own for name, own in torques.items() if abs(own) >= _LOADED * model.reducer.load.rated_torque}
+        if not loaded:
+            return
+        exact = model.reading(tuple(loaded))(np.zeros((1, len(model.columns)))).values[0].tolist()
+        for torque, value in zip(loaded.values(), exact, strict=True):
             if value >= _FELT:
                 yield (
                     f"{value:.3g}″ of the peak-to-peak at {abs(torque):,.5g} N·m is elastic: exact parts have it too, "
@@ -318,7 +328,7 @@ def _examination(portrait: ReducerPortrait, figures: Mapping[str, float]) -> Exa
     if not solved:
         none = f"None of {count:,} simulated reducers has an equilibrium without torque."
         but = f"none of its units has an equilibrium: {_advice(model)}"
-        sentences = (*model.mismatches, none, *portrait.remarks)
+        sentences = (*model.mismatches, none, *portrait.remarks, *portrait.risks)
         return Examination(sentences, but, f"Cannot be built as drawn: {none}")
     counted = {name: figures[name] for name in _COUNTED}
     unsolved = "" if solved == count else f" ({count - solved} have no equilibrium)"
@@ -336,6 +346,7 @@ def _examination(portrait: ReducerPortrait, figures: Mapping[str, float]) -> Exa
         _no_load(model, figures),
         f"The tightest of these reducers has {number(least, '.2g')} µm of radial clearance.",
         *portrait.remarks,
+        *portrait.risks,
         *cautions,
     )
     reasons = _reasons(model, counted)

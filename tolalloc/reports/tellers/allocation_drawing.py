@@ -244,6 +244,7 @@ def risks(result: AllocationResult) -> Iterator[str]:
         said = {key: with_unit(f"{value:.2g}", result.leading) for key, value in moved.items()}
         key = "risk_driver" if "left" in said else "risk_driver_spent"
         yield _say(key, name=driver, step=_STEP, output=short(result.leading), **said)
+    yield from portrait_of(result.model.at(result.chosen.settings)).risks
     yield _say("risk_not_included", what=portrait_of(result.model).not_included)
 
 

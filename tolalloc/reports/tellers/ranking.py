@@ -94,6 +94,7 @@ class RankingTeller(Teller[RankingResult]):
             self._opening(),
             chosen_surrogate(found.choice),
             *self._portrait.remarks,
+            *self._portrait.risks,
         )
 
     @property
