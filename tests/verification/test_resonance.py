@@ -83,6 +83,17 @@ def test_commands_say_it(tmp_path):
     assert any("the first resonance is at" in line for line in check(study).teller.sentences)
 
 
+def test_a_duty_cycle_says_which_orders_meet_it_up_to_its_fastest_load_case(tmp_path):
+    path, cycle = with_load(tmp_path, "inertia_kgm2 = 5"), tmp_path / "cycle.csv"
+    cycle.write_text("case,torque [N·m],speed [rpm],share [%]\nwork,-100,20,100\n", encoding="utf-8")
+    said = CliRunner().invoke(app, ["duty", str(cycle), "--reducer", path]).output.replace("\n", " ")
+    reducer = load_reducer(path)
+    found, fastest = resonance_of(reducer, -100.0, 5.0), 20.0 * reducer.ratio
+    slowest = next(iter(found.met(orders_of(reducer), fastest).values()))
+    assert f"{found.frequency:.3g} Hz" in said
+    assert f"meet it at {slowest:,.0f}" in said
+
+
 @pytest.mark.parametrize("line", ["inertia_kgm2 = -1", "inertia_kgm2 = 'heavy'", "input_speed_rpm = 0"])
 def test_a_wrong_load_is_refused_by_name(tmp_path, line):
     with pytest.raises(TolallocError, match=f"load.{line.split(' ')[0]}"):

@@ -17,7 +17,7 @@ from tolalloc.reducers.reducer.design import Reducer
 
 _STEP = 0.02
 """Change of the torque over itself between which the stiffness is taken [-]."""
-_MULTIPLES, _OF_INPUT = 6, 3
+_MULTIPLES, _OF_INPUT = 6, 2
 """Multiples of pins and teeth, and of the turns of the input, that a train makes as orders [-]."""
 
 
