@@ -12,7 +12,7 @@ import tolalloc as ta
 from tests.builders import at_constant_contact
 from tests.verification.test_ring import on
 from tolalloc.cli.main import app
-from tolalloc.exceptions import TolallocError
+from tolalloc.exceptions import SolveError, TolallocError
 from tolalloc.reducers.equivalent.model import EquivalentModel
 from tolalloc.reducers.equivalent.perfect import exact_unit
 from tolalloc.reducers.equivalent.resonance import Resonance, orders_of, resonance_of
@@ -63,6 +63,15 @@ def test_a_sentence_says_which_orders_and_where_or_that_there_is_none():
     assert f"order 78 of the output meets it at {speed:,.0f} rpm" in said
     assert "no order that the train makes meets it up to 10 rpm" in resonance_sentence(loaded, -167.0, (39, 78), 10.0)
     assert "orders 78 and 39 of the output meet it at" in resonance_sentence(loaded, -167.0, (39, 78), None)
+
+
+def test_exact_parts_without_a_stiffness_are_said_and_end_no_report():
+    """Under a hundred thousand times the rated torque no equilibrium lies within small displacements."""
+    reducer = load_reducer("rv20e_liu2020")
+    with pytest.raises(SolveError, match="no stiffness"):
+        resonance_of(reducer, -1.67e7, 5.0)
+    loaded = replace(reducer, load=replace(reducer.load, inertia=5.0))
+    assert resonance_sentence(loaded, -1.67e7, (39,), None).startswith("The first resonance is not known: ")
 
 
 def with_load(tmp_path, lines: str) -> str:

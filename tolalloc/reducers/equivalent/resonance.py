@@ -6,8 +6,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from math import pi, sqrt
 
-import numpy as np
-
 from tolalloc.exceptions import SolveError
 from tolalloc.reading.units import RPM
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES
@@ -59,7 +57,7 @@ def resonance_of(reducer: Reducer, torque: float, inertia: float) -> Resonance:
     Raises
     ------
     SolveError
-        The stiffness is none: exact parts have no equilibrium under the torque.
+        Exact parts have no equilibrium under the torque, or do not twist further under more of it.
 
     Examples
     --------
@@ -68,11 +66,12 @@ def resonance_of(reducer: Reducer, torque: float, inertia: float) -> Resonance:
     >>> round(found.frequency, 1), round(found.input_speed(162))  # [Hz, rpm]
     (52.7, 2985)
     """
-    twists = []
-    for level in (torque * (1 - _STEP), torque * (1 + _STEP)):
-        model = EquivalentModel(reducer).at_torque(torque)
-        twists.append(float(model.equilibria(exact_unit(model), level, TURN_ANGLES).transmission_error.mean()))
-    stiffness = 2 * _STEP * torque / (twists[1] - twists[0])
-    if not np.isfinite(stiffness):
-        raise SolveError(f"reducer {reducer.name}: exact parts have no equilibrium under {torque:g} N·m.")
+    model = EquivalentModel(reducer).at_torque(torque)
+    less, more = (
+        float(model.equilibria(exact_unit(model), level, TURN_ANGLES).transmission_error.mean())
+        for level in (torque * (1 - _STEP), torque * (1 + _STEP))
+    )
+    if not (more - less) * torque > 0:  # nor where one of them is not a number
+        raise SolveError(f"reducer {reducer.name}: exact parts have no stiffness under {torque:g} N·m.")
+    stiffness = 2 * _STEP * torque / (more - less)
     return Resonance(frequency=sqrt(stiffness / inertia) / (2 * pi), stiffness=stiffness, ratio=reducer.ratio)

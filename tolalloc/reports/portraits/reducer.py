@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from tolalloc.allocation.space.requirement import USUAL_YIELD
-from tolalloc.exceptions import InputError
+from tolalloc.exceptions import InputError, SolveError
 from tolalloc.models.model import Units
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE, MEGAPASCAL, MICROMETRE, MICRORADIAN
 from tolalloc.reducers import DISC_TEMPERATURE, FRICTION_TORQUE, PEAK_TO_PEAK, PRELOAD, RADIAL_CLEARANCE
@@ -367,7 +367,10 @@ def resonance_sentence(reducer: Reducer, torque: float, orders: Iterable[float],
     """
     if (inertia := reducer.load.inertia) is None:
         return ""
-    found = resonance_of(reducer, torque, inertia)
+    try:
+        found = resonance_of(reducer, torque, inertia)
+    except SolveError as fault:  # what else a report says stands
+        return f"The first resonance is not known: {fault}"
     said = f"With {inertia:.4g} kg·m² at the output the first resonance is at {found.frequency:.3g} Hz"
     met = found.met(orders, inf if fastest is None else fastest)
     if not met:
