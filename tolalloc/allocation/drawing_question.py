@@ -37,7 +37,7 @@ from tolalloc.allocation.search.zone_allocation import (
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import AllocationEffort
 from tolalloc.allocation.space.joint_yield import JointRequirement
-from tolalloc.allocation.space.requirement import Requirement
+from tolalloc.allocation.space.requirement import AtYield, Requirement
 from tolalloc.allocation.verify.acceptance import (
     AS_GOOD_AS,
     FIRST,
@@ -52,6 +52,8 @@ from tolalloc.capability.experiment import Experiment
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import KeptLimits
 from tolalloc.drawings.compensators import Compensator, assembly_cost, choice_label
+from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.population import EVENLY, populated
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import ConstantOutputError, FailedUnitsError, InputError
 from tolalloc.models.model import Model, is_fast
@@ -390,6 +392,25 @@ class DrawingQuestion:
             return None
         return best_yield(lambda target: cost_at_yield(space, free, target), price, self.effort.yields)
 
+    def kept_with(self, design: VerifiedDesign, errors: ErrorModel, name: str, units: int) -> KeptLimits:
+        """Return which random units of a design keep its limits where its parts come in another way."""
+        limits = {own.output: own.limits for own in (check.requirement for check in design.checks_alone)}
+        drawn = replace(design.space, errors=errors).units(design.design, self.seeds(name), units)
+        response = self.model.at(design.settings).reading(tuple(limits))
+        return KeptLimits.of(response(drawn), response.outputs, limits)
+
+    def evenly(self, design: VerifiedDesign) -> KeptLimits | None:
+        """Return which units keep the limits whose parts only keep their zones; none where no yield is promised.
+
+        Nor where the drawing promises for such parts already.
+        """
+        errors = populated(design.space.errors, EVENLY)
+        promises = any(isinstance(check.requirement.guarantee, AtYield) for check in design.checks)
+        if errors.sources == design.space.errors.sources or not promises:
+            return None
+        units = self.effort.verification_units if is_fast(self.model) else _EXAMINED
+        return self.kept_with(design, errors, "evenly", units)
+
     def shares(self, drawn: VerifiedDesign) -> SourceIndices | None:
         """Return the indices of the leading output by dimension of the drawing, at the zones and settings of a design.
 
@@ -466,7 +487,7 @@ def allocate_drawing(question: DrawingQuestion, record: RunRecord, name: str) ->
             chosen = Candidates(fixed=fixed, free=free, graded=graded).drawn
             shares = question.shares(chosen)
         with record.stage("units of the drawing"):
-            examination = question.examined(chosen)
+            examination, evenly = question.examined(chosen), question.evenly(chosen)
     return AllocationResult(
         name=name,
         model=question.model,
@@ -484,6 +505,7 @@ def allocate_drawing(question: DrawingQuestion, record: RunRecord, name: str) ->
         error=question.effort.error,
         examination=examination,
         proven=proven,
+        evenly=evenly,
     )
 
 
@@ -515,15 +537,9 @@ class AssembledQuestion:
 
     def as_they_come(self, found: AllocationResult) -> KeptLimits:
         """Return which random units of a drawing keep its limits if nothing is chosen."""
-        design, question = found.chosen, self.question
-        errors = replace(design.space.errors, compensators=())
-        asked = (check.requirement for check in design.checks_alone)
-        limits = {own.output: own.limits for own in asked}
-        units = replace(design.space, errors=errors).units(
-            design.design, question.seeds("as they come"), question.effort.verification_units
-        )
-        response = question.model.at(design.settings).reading(tuple(limits))
-        return KeptLimits.of(response(units), response.outputs, limits)
+        errors = replace(found.drawn.errors, compensators=())
+        units = self.question.effort.verification_units
+        return self.question.kept_with(found.chosen, errors, "as they come", units)
 
 
 def allocate_assembled(asked: AssembledQuestion, record: RunRecord, name: str) -> AllocationResult:

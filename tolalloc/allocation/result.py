@@ -113,6 +113,8 @@ class AllocationResult:
     # What was compared of the ways to choose parts at assembly, if the question names any
     assembled: AssembledDrawing | None = None
     proven: ProvenBound | None = None  # What no drawing with free zones costs less than on the real model, if asked for
+    # Units of the drawing whose parts only keep their zones, spread evenly over them; none where more is promised
+    evenly: KeptLimits | None = None
 
     @property
     def leading(self) -> str:

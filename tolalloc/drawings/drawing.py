@@ -13,6 +13,8 @@ from tolalloc.drawings.correlation import Correlation, load_correlations
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.fields import COLUMNS, ToleranceRow
 from tolalloc.drawings.heads import split_header
+from tolalloc.drawings.population import STATED, Population, populated, require_population
+from tolalloc.drawings.returned_table import TableFile
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.table_file import (
     DATA,
@@ -39,10 +41,13 @@ from tolalloc.drawings.tolerance_table import (
 from tolalloc.exceptions import InputError
 from tolalloc.reading.file_content import is_file, other_encoding
 from tolalloc.reading.files import found_from_here, write_new
-from tolalloc.reading.units import COST_UNITS, currency_in
+from tolalloc.reading.units import COST_UNITS, MICROMETRE, currency_in
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_LARGEST_RATIO = 100.0
+"""Largest zone over the uncertainty of its gauge that may be asked for as the smallest [-]."""
 
 Costs = str | Path | Mapping[str, Any]
 """Process cost table by shipped name or path, or source → ways to make it; empty: what the table says, as 1/zone."""
@@ -67,6 +72,13 @@ class Drawing:
     settings
         Settings of the model that belong to it, such as the clearances of a tooth modification: a study of the drawing
         takes them instead of its model's own [units of their names].
+    population
+        For which parts a drawing promises its yield: those that the table states, row by row, unless given; ``uniform``
+        for parts spread evenly over their zones; ``none`` for parts anywhere in them, which only the worst unit tells;
+        or one Cp for all, about the middle of each zone [-].
+    gauge_ratio
+        Smallest zone that may be asked for, over the uncertainty of its gauge, where the table states one; 10 by the
+        rule of many shops, 0 to leave it to the table. A zone of the table below that is opened to it [-].
     """
 
     name: str
@@ -75,6 +87,13 @@ class Drawing:
     notes: tuple[str, ...] = ()
     currency: str = ""
     settings: Mapping[str, float] = field(default_factory=dict)
+    population: Population = STATED
+    gauge_ratio: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_population(self.population, self.name)
+        if not 0 <= self.gauge_ratio <= _LARGEST_RATIO:
+            raise InputError.at(self.name, "gauge_ratio", self.gauge_ratio, f"0 to {_LARGEST_RATIO:g}")
 
     @classmethod
     def of_rows(
@@ -86,6 +105,8 @@ class Drawing:
         correlations: str | Path | Correlation = "",
         costs: Costs = "",
         currency: str = "",
+        population: Population = STATED,
+        gauge_ratio: float = 0.0,
     ) -> Drawing:
         """Return the drawing of rows written in Python, with the same checks as those of a file.
 
@@ -99,6 +120,8 @@ class Drawing:
             As in `load_drawing`; correlations may also be given as they are.
         currency
             What costs are in, three letters as in EUR or a sign; cost units if empty.
+        population, gauge_ratio
+            As of a `Drawing`.
 
         Raises
         ------
@@ -127,7 +150,15 @@ class Drawing:
         if currency and currency_in(currency) != currency:
             raise InputError.at(place, "currency", currency, "three letters such as EUR, or €, $, £ or ¥")
         errors = ErrorModel(sources, correlation=correlations, table=place)
-        return cls(name=place, errors=errors, costs=_placed(costs), currency=currency, notes=doubts(sources, place))
+        return cls(
+            name=place,
+            errors=errors,
+            costs=_placed(costs),
+            currency=currency,
+            notes=doubts(sources, place),
+            population=population,
+            gauge_ratio=gauge_ratio,
+        )
 
     def __repr__(self) -> str:
         return f"<drawing {self.name}: {len(self.sources)} sources>"
@@ -161,6 +192,35 @@ class Drawing:
         sources = tuple((known | others).values())
         errors = replace(self.errors, sources=sources, table=name or self.name)
         return replace(self, name=name or self.name, errors=errors)
+
+    @property
+    def as_asked(self) -> ErrorModel:
+        """The sources as a study takes them: in the population of the drawing, no zone too fine for its gauge.
+
+        Raises
+        ------
+        InputError
+            A zone whose largest is too fine for its gauge, or whose cost no rule tells where it is opened.
+        """
+        found = populated(self.errors, self.population)
+        if not self.gauge_ratio:
+            return found
+        return replace(found, sources=tuple(self._gauged(own) for own in found.sources))
+
+    def _gauged(self, source: Source) -> Source:
+        """Return a source whose smallest zone its gauge resolves, its cost as 1/zone where its zone is opened."""
+        least = self.gauge_ratio * source.uncertainty
+        if source.locked or least <= source.minimum:
+            return source
+        told = f"{source.uncertainty / MICROMETRE:g} µm of its gauge, and {self.gauge_ratio:g} times as much is asked"
+        if least > source.maximum:
+            allowed = f"{least / MICROMETRE:g} µm or more, for {told}"
+            raise InputError.at(f"{self.name} ({source.name})", "max", f"{source.maximum / MICROMETRE:g} µm", allowed)
+        if least > source.zone and self.costs:
+            allowed = f"{least / MICROMETRE:g} µm or more with process costs, for {told}"
+            raise InputError.at(f"{self.name} ({source.name})", "zone", f"{source.zone / MICROMETRE:g} µm", allowed)
+        zone = max(source.zone, least)
+        return replace(source, minimum=least, zone=zone, cost=source.cost * source.zone / zone)
 
     def to_frame(self) -> pd.DataFrame:
         """Return the tolerance table, units in the headers."""
@@ -198,6 +258,8 @@ def load_drawing(
     folder: Path | None = None,
     sheet: str = "",
     columns: Mapping[str, str] = MappingProxyType({}),
+    population: Population = STATED,
+    gauge_ratio: float = 0.0,
 ) -> Drawing:
     """Return a drawing from its files, each by shipped name or path.
 
@@ -220,6 +282,8 @@ def load_drawing(
         Head of a table as an office writes it, without its unit → name of the column that it is, such as
         ``{"Zeichn.-Nr.": "drawing"}``; a TOML file beside the table, of the same stem, may say it as well, under
         ``[columns]``. Other heads that are no column's are kept with their cells.
+    population, gauge_ratio
+        As of a `Drawing`.
 
     Raises
     ------
@@ -237,13 +301,16 @@ def load_drawing(
     path = found_from_here(beside(folder, table))
     notes, currency = _read_beside(path, sheet, columns)
     called = dict(heads_of(path, columns).called)
+    file = TableFile(path=path.resolve(), sheet=sheet, columns=columns) if path.suffix else None
     return Drawing(
         name=str(table),
-        errors=ErrorModel(sources, correlation=correlation, table=str(table), called=called),
+        errors=ErrorModel(sources, correlation=correlation, table=str(table), called=called, file=file),
         costs=_placed(costs if isinstance(costs, Mapping) else beside(folder, costs)),
         notes=(*notes, *doubts(sources, path.name)),
         currency=currency,
         settings=stated_settings(path if path.suffix else DATA / f"{path.name}.tolerances.csv"),
+        population=population,
+        gauge_ratio=gauge_ratio,
     )
 
 

@@ -12,6 +12,7 @@ from jaxtyping import Float
 from tolalloc.drawings.compensators import Compensator, Standing
 from tolalloc.drawings.correlation import CorrelatedSource, Correlation, symmetric_root
 from tolalloc.drawings.distributions import ABOVE_ZERO, BELOW_ONE, ndtr, ndtri
+from tolalloc.drawings.returned_table import TableFile
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.drawings.sources import Source
 from tolalloc.exceptions import InputError, UnknownNameError
@@ -36,6 +37,8 @@ class ErrorModel:
     compensators: tuple[Compensator, ...] = ()
     # What its user's table calls the columns, head → column, so that it is written again as it was
     called: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
+    # Where this table stands, if it is a user's, so that it can be returned with other zones
+    file: TableFile | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         self.correlation.require_sound(self.sources)

@@ -329,6 +329,17 @@ class ToleranceRow(Record):
             write=lambda source: source.places or None,
         ),
     ] = 0
+    uncertainty: Annotated[
+        float,
+        Field(ge=0, le=LARGEST_ZONE),
+        TableColumn(
+            "expanded uncertainty (k = 2) of its gauge; a zone below ten times as much is named in the report, "
+            "and the inspection plan keeps it off both limits",
+            "unit",
+            "uncertainty",
+            write=lambda source: _written(source, source.uncertainty) or None,
+        ),
+    ] = 0.0
     note: Annotated[str, TableColumn("carried through")] = ""
 
     @property
@@ -537,17 +548,20 @@ def headers_in(
 ) -> dict[str, str]:
     """Return field → header of its column, in a table whose costs are in cost units or a currency.
 
-    Nominal sizes are in inches where all sources are, and state no unit where some are; like places are counted where
-    one source does. What the user's table calls a field comes first.
+    Nominal sizes are in inches where all sources are, and state no unit where some are; like places and gauges have a
+    column where one source states them. What the user's table calls a field comes first.
     """
     lengths = {own.length_name for own in sources} or {"mm"}
     said = {COST_UNITS: cost_unit, "mm": lengths.pop() if len(lengths) == 1 else ""}
     heads = {name: head for head, name in reversed(tuple(called.items()))}  # the first of several
-    counted = not sources or any(own.places for own in sources)
-    units = {name: said.get(own.unit, own.unit) for name, own in COLUMNS.items() if counted or name != "places"}
+    left_out = {name for name in _WHERE_STATED if sources and not any(getattr(own, name) for own in sources)}
+    units = {name: said.get(own.unit, own.unit) for name, own in COLUMNS.items() if name not in left_out}
     return {
         name: f"{heads.get(name, name)} [{unit}]" if unit else heads.get(name, name) for name, unit in units.items()
     }
 
+
+_WHERE_STATED = ("places", "uncertainty")
+"""Columns that a table has where one of its sources states something there."""
 
 HEADERS = headers_in(COST_UNITS)

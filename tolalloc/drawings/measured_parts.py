@@ -5,7 +5,6 @@ Files are tables of deviations or of mean and standard deviation (CSV), and thos
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -25,10 +24,19 @@ from tolalloc.drawings.distributions import (
     smoothed_magnitude,
 )
 from tolalloc.drawings.heads import split_header
+from tolalloc.drawings.qdas_file import (
+    FILE_NAME,
+    NAME,
+    NUMBER,
+    SHORT,
+    VALID,
+    Characteristic,
+    qdas_number,
+    read_characteristics,
+)
 from tolalloc.drawings.table_file import TextTable, plain_number, read_text_table
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
-from tolalloc.reading.file_content import is_file, read_bytes
 from tolalloc.reading.units import MICROMETRE, usual_signs
 
 FEWEST_PARTS, MOST_PARTS = 20, 1_000_000
@@ -45,17 +53,6 @@ _QUARTILES = 1.349
 """Distance of the quartiles of a normal distribution [σ]."""
 _FINEST = 1e-3
 """Spread below which no gauge tells parts apart [half zone]; assumption."""
-_AQDEF = re.compile(r"(.+\.(?:dfq|dfd|dfx))(?::(.*))?", re.IGNORECASE)
-"""Name of a Q-DAS file, and of the characteristic behind it."""
-_KEY = re.compile(r"(K\d{4})(?:/(\d{1,6}))?(?:\s+(.*))?")
-"""Line of such a file that begins with a field: its key, the characteristic that it is about, and its content."""
-_BETWEEN_CHARACTERISTICS, _BETWEEN_FIELDS = "\x0f", "\x14"
-_BEGIN = ("K1001", "K2001")
-"""Fields with which the description of a part, and of a characteristic, begins; behind values it is that of another."""
-_VALID = "0"
-"""Content of K0002 of a value that counts; 129, 255, 256 and 290 mark one that does not."""
-_ATTRIBUTIVE = "1"
-"""Content of K2004 of a characteristic that is counted, not measured."""
 _SAME = 1e-4
 """Difference of nominal sizes or limits up to which they are the same: a tenth of a micrometre [mm]."""
 
@@ -282,7 +279,7 @@ class MadeTo:
 
 def named_file(text: str) -> tuple[str, str]:
     """Return the file that a table names, and the characteristic of a Q-DAS file behind a colon."""
-    found = _AQDEF.fullmatch(text)
+    found = FILE_NAME.fullmatch(text)
     return (found[1], (found[2] or "").strip()) if found else (text, "")
 
 
@@ -299,7 +296,7 @@ def load_measured_parts(path: Path, made_to: MadeTo, characteristic: str = "") -
     InputError, UnknownNameError
         The file, row, column or field and value that are not allowed, or there are too few parts.
     """
-    if _AQDEF.fullmatch(path.name):
+    if FILE_NAME.fullmatch(path.name):
         return _of_characteristic(path, characteristic, made_to)
     table = read_text_table(path)
     names = tuple(split_header(header)[0] for header in table.headers)
@@ -368,86 +365,6 @@ def _column(table: TextTable, at: int) -> list[float]:
     return values
 
 
-@dataclass(frozen=True)
-class _Characteristic:
-    """What a Q-DAS file says of one characteristic."""
-
-    fields: dict[str, str] = field(default_factory=dict)  # K2… → content
-    values: list[tuple[str, str]] = field(default_factory=list)  # Value (K0001) and attribute (K0002), as written
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Number (K2001) and name (K2002), as far as the file has them."""
-        return tuple(self.fields[key] for key in ("K2001", "K2002") if self.fields.get(key))
-
-
-def read_characteristics(path: Path) -> dict[int, _Characteristic]:
-    """Return what a Q-DAS file (AQDEF) says of every characteristic.
-
-    Notes
-    -----
-    Read are the fields of characteristics (K2…) and values with their attribute (K0001, K0002); in lines of values
-    byte 15 separates characteristics and byte 20 the fields of one value. A field with index 0 is about all. This is
-    own code: the library aqdefreader 1.3.0 needs packages that it does not name, prints, leaves `K0001/1 5.001` a
-    text and fails on lines of values with decimal commas or operators, as measuring machines write them.
-
-    References
-    ----------
-    Q-DAS ASCII Transfer Format, version 12 (2015), and Hexagon's lists of the contents of K00xx and K2xxx.
-    """
-    lines = _aqdef_text(path).splitlines()
-    if path.suffix.lower() == ".dfd":
-        beside = [path.with_suffix(end) for end in (".dfx", ".DFX")]
-        found = next((own for own in beside if is_file(own)), beside[0])
-        lines += _aqdef_text(found).splitlines()
-    common, found_by = dict[str, str](), dict[int, _Characteristic]()
-    for number, line in enumerate(lines, start=1):
-        if key := _KEY.fullmatch(line.rstrip()):
-            described = list(found_by.values()) if key[1] == "K1001" else [found_by.get(int(key[2] or 1))]
-            if key[1] in _BEGIN and any(own and own.values for own in described):
-                raise InputError(
-                    f"{path}, line {number}: a second part begins ({line.strip()}), and its characteristics have the "
-                    "numbers of the first one's; allowed is a file a part."
-                )
-            _read_field(key[1], int(key[2] or 1), (key[3] or "").strip(), found_by, common)
-        elif line.strip() and not line.startswith("K"):
-            for at, written in enumerate(line.split(_BETWEEN_CHARACTERISTICS), start=1):
-                _read_value(written.split(_BETWEEN_FIELDS), found_by.setdefault(at, _Characteristic()))
-    for characteristic in found_by.values():
-        characteristic.fields.update({key: own for key, own in common.items() if key not in characteristic.fields})
-    return {at: own for at, own in sorted(found_by.items()) if own.values}
-
-
-def _aqdef_text(path: Path) -> str:
-    """Return the text of a Q-DAS file, which measuring machines write in UTF-8, UTF-16 or Windows-1252."""
-    content = read_bytes(path, "a Q-DAS file")
-    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return content.decode("utf-16", "replace")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return content.decode("cp1252", "replace")
-
-
-def _read_field(key: str, at: int, content: str, found: dict[int, _Characteristic], common: dict[str, str]) -> None:
-    """Take a field of a characteristic, or of all of them."""
-    if key.startswith("K2"):
-        (found.setdefault(at, _Characteristic()).fields if at else common)[key] = content
-    elif key == "K0001" and at:
-        found.setdefault(at, _Characteristic()).values.append((content, _VALID))
-    elif key == "K0002":
-        for own in [found[at]] if at in found else list(found.values()) if not at else []:
-            if own.values:
-                own.values[-1] = (own.values[-1][0], content)
-
-
-def _read_value(fields: list[str], own: _Characteristic) -> None:
-    """Take one value of a line of values; one that is empty was not measured."""
-    if own.fields.get("K2004") != _ATTRIBUTIVE and fields[0].strip():
-        attribute = fields[1].strip() if len(fields) > 1 else ""
-        own.values.append((fields[0].strip(), attribute or _VALID))
-
-
 def _of_characteristic(path: Path, name: str, made_to: MadeTo) -> MeasuredParts:
     """Return the parts of one characteristic of a Q-DAS file, whose unit, nominal size and limits must be the row's."""
     if path.suffix.lower() == ".dfx":
@@ -460,9 +377,9 @@ def _of_characteristic(path: Path, name: str, made_to: MadeTo) -> MeasuredParts:
         raise InputError.at(where, "the unit (K2142)", unit, "µm, um or mm")
     nominal = _nominal(where, own, _FACTORS[unit], made_to)
     _require_limits(where, own, _FACTORS[unit], nominal, made_to)
-    values, faults, valid = list[float](), Faults(), [text for text, attribute in own.values if attribute == _VALID]
+    values, faults, valid = list[float](), Faults(), [text for text, attribute in own.values if attribute == VALID]
     for text in valid:
-        deviation = _aqdef_number(text) * _FACTORS[unit] - nominal
+        deviation = qdas_number(text) * _FACTORS[unit] - nominal
         if not abs(deviation) <= LARGEST_DEVIATION:
             with faults.kept():
                 allowed = f"a number within {LARGEST_DEVIATION:,.0f} µm of the nominal size"
@@ -477,7 +394,7 @@ def _of_characteristic(path: Path, name: str, made_to: MadeTo) -> MeasuredParts:
     return _measured(path, found, made_to, characteristic=name, left_out=len(own.values) - len(valid))
 
 
-def _named(path: Path, name: str, found: dict[int, _Characteristic]) -> _Characteristic:
+def _named(path: Path, name: str, found: dict[int, Characteristic]) -> Characteristic:
     """Return the characteristic of a number or name; the only one where none is named."""
     if not found:
         raise InputError(f"{path}: it has no measured values; a line of values or fields K0001 are needed.")
@@ -487,7 +404,7 @@ def _named(path: Path, name: str, found: dict[int, _Characteristic]) -> _Charact
             allowed = f"{path.name}:NAME with the number or name of one of {', '.join(known[:10])}"
             raise InputError.at(path, "measured", path.name, allowed)
         return next(iter(found.values()))
-    for key in ("K2001", "K2002"):
+    for key in (NUMBER, NAME, SHORT):
         meant = [own for own in found.values() if own.fields.get(key) == name]
         if len(meant) > 1:
             raise InputError(
@@ -498,11 +415,6 @@ def _named(path: Path, name: str, found: dict[int, _Characteristic]) -> _Charact
     raise UnknownNameError.among(path, "characteristic", name, [own for each in found.values() for own in each.names])
 
 
-def _aqdef_number(text: str) -> float:
-    """Return a number with a decimal comma or point, not a number where it is none."""
-    return _number(text.strip().replace(",", "."))
-
-
 def _number(text: str) -> float:
     """Return a number with a decimal point, not a number where it is none."""
     try:
@@ -511,12 +423,12 @@ def _number(text: str) -> float:
         return float("nan")
 
 
-def _nominal(where: str, own: _Characteristic, factor: float, made_to: MadeTo) -> float:
+def _nominal(where: str, own: Characteristic, factor: float, made_to: MadeTo) -> float:
     """Return the nominal size of a characteristic [µm]; a position has none."""
     if made_to.feature is Feature.POSITION:
         return 0.0
     written = own.fields.get("K2101", "")
-    nominal = _aqdef_number(written) * factor
+    nominal = qdas_number(written) * factor
     row = made_to.nominal / MICROMETRE
     if not isfinite(nominal):
         raise InputError.at(where, "the nominal size (K2101)", written, "a number, from which the parts deviate")
@@ -526,7 +438,7 @@ def _nominal(where: str, own: _Characteristic, factor: float, made_to: MadeTo) -
     return nominal
 
 
-def _require_limits(where: str, own: _Characteristic, factor: float, nominal: float, made_to: MadeTo) -> None:
+def _require_limits(where: str, own: Characteristic, factor: float, nominal: float, made_to: MadeTo) -> None:
     """Raise if the file states other limits than those that the row says the parts were made to."""
     is_size = made_to.feature is Feature.SIZE
     half = made_to.zone / 2.0
@@ -538,7 +450,7 @@ def _require_limits(where: str, own: _Characteristic, factor: float, nominal: fl
         written = next((key for key in (allowance, limit) if own.fields.get(key)), "")
         if not written or expected is None:
             continue
-        found = _aqdef_number(own.fields[written]) * factor - (nominal if written == limit else 0.0)
+        found = qdas_number(own.fields[written]) * factor - (nominal if written == limit else 0.0)
         if not isfinite(found):
             raise InputError.at(where, f"the {side} limit ({written})", own.fields[written], "a number")
         if abs(found - expected) > 1e3 * _SAME:

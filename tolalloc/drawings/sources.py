@@ -31,6 +31,8 @@ STEPS = ((1.0, 0.01), (10.0, 0.1), (100.0, 0.5), (np.inf, 1.0))
 """Step of a number on a reducer's drawing up to a size, where its table states none: two or three figures [µm]. An
 assumption: a tenth of a micrometre is what a measuring room tells apart on parts of a reducer; finer numbers need finer
 steps."""
+RESOLVED = 10.0
+"""Zone over the uncertainty of its gauge from which on the gauge is said to resolve it, the rule of many shops [-]."""
 _WHOLE = 1e-6
 """Part of a step that a number may lack and still count as whole [-]."""
 _ROUNDING = 1e-9
@@ -161,6 +163,7 @@ class Source:
     label: str = ""
     own_id: str = ""  # What the user's table calls it, if that is not its name
     note: str = ""
+    uncertainty: float = 0.0  # Expanded uncertainty (k = 2) of its gauge, 0 where nobody says [m]
     # Head and cell of every column of the user's own that is none of a tolerance table; kept, and written again
     own_cells: tuple[tuple[str, str], ...] = ()
     # Unit in which the user's table states its zone: µm, mm, in, or % of the nominal size. It changes nothing that is
@@ -175,6 +178,11 @@ class Source:
     def is_of_places(self) -> bool:
         """Whether it stands for several like places, whose names a model knows."""
         return not self.row and (self.places > 1 or "*" in self.name)
+
+    @property
+    def is_resolved(self) -> bool:
+        """Whether its gauge resolves its zone, as far as one is stated."""
+        return self.zone >= RESOLVED * self.uncertainty * (1 - _ROUNDING)
 
     @property
     def alone(self) -> Source:

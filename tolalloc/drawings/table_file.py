@@ -89,8 +89,7 @@ def sheet_texts(path: Path, sheet: str, heads: Heads) -> list[tuple[str, ...]]:
         _require_small(path, content)
         # Values do not say which cells were formulas, and formulas do not say their values.
         values, formulas = (_loaded(path, content, data_only, sheet) for data_only in (True, False))
-        # A row whose first text begins with # is a comment, as a line of a CSV file.
-        texts = [() if next(filter(None, row), "").startswith("#") else row for row in _texts(path, values, formulas)]
+        texts = _texts(path, values, formulas)
         heads.require_in(path, texts)
         _require_plain_cells(path, values, 1 + heads.row_in(texts), texts)
     except InputError:
@@ -159,7 +158,7 @@ def _loaded(path: Path, content: bytes, data_only: bool, sheet: str) -> Any:
 
 
 def _texts(path: Path, values: Any, formulas: Any) -> list[tuple[str, ...]]:
-    """Return the cells as text."""
+    """Return the cells as text; a row whose first text begins with # is a comment, as a line of a CSV file."""
     place = f"{path}, sheet {values.title!r}"
     if values.sheet_state != "visible":
         raise InputError(f"{place}: the sheet is hidden; allowed is a table in a sheet that is shown.")
@@ -170,13 +169,19 @@ def _texts(path: Path, values: Any, formulas: Any) -> list[tuple[str, ...]]:
         )
     require_believable(path, 1, columns, rows * columns)
     return [
-        tuple(_text(path, cell, written) for cell, written in zip(*pair, strict=True))
+        () if _is_comment(pair[0]) else tuple(_text(path, cell, written) for cell, written in zip(*pair, strict=True))
         for pair in zip(
             values.iter_rows(max_row=rows, max_col=columns),
             formulas.iter_rows(max_row=rows, max_col=columns),
             strict=True,
         )
     ]
+
+
+def _is_comment(cells: Iterable[Any]) -> bool:
+    """Return whether the first text of a row begins with #."""
+    first = next((cell.value for cell in cells if cell.value is not None and str(cell.value).strip()), "")
+    return _plain(str(first)).startswith("#")
 
 
 def _require_plain_cells(path: Path, values: Any, first: int, texts: Sequence[tuple[str, ...]]) -> None:

@@ -226,6 +226,8 @@ def _of_zone(source: Source) -> Iterator[str]:
         if not _FINEST <= factor <= _COARSEST:
             than = "finer than IT01" if factor < _FINEST else "coarser than IT15"
             yield f"the zone of {_length(zone)} is {than} at a nominal size of {_length(source.nominal)}"
+    if not source.is_resolved:
+        yield f"the zone of {_length(zone)} is {zone / source.uncertainty:.2g} times the uncertainty of its gauge"
     if source.over and not _FLAT <= zone / source.over <= _STEEP:
         yield f"a zone of {_length(zone)} over {_length(source.over)} is an angle of {zone / source.over:.2g} rad"
     if not source.locked and source.maximum > _RANGE * zone:

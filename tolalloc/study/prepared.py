@@ -16,11 +16,12 @@ from tolalloc.allocation.cost.process_costs import ProcessesOfSources, currency_
 from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import AllocationEffort
 from tolalloc.allocation.space.joint_yield import JointRequirement
-from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, Guarantee, OwnLimit, Requirement
+from tolalloc.allocation.space.requirement import USUAL_YIELD, AtYield, Guarantee, OwnLimit, Requirement, WorstCase
 from tolalloc.capability.indices import Limits
 from tolalloc.capability.monte_carlo import KeptLimits, ProcessUncertainty, deciding
 from tolalloc.drawings.compensators import Compensator, all_choices, choice_label, in_force
 from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.population import ANYWHERE, STATED, taken_as
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.identity import UnknownIdentityError
@@ -61,7 +62,7 @@ class Prepared:
         """The sources of the drawing as its table states them, each place of a row for several."""
         if self.study.drawing is None:
             raise InputError(f"{self.place}: drawing is missing; give ta.drawing(...), the tolerance table.")
-        errors, model = self.study.drawing.errors, self.study.model
+        errors, model = self.study.drawing.as_asked, self.study.model
         counts = model and any(own.is_of_places for own in errors.sources)
         return errors.at_places(model.source_names) if model and counts else errors
 
@@ -93,8 +94,10 @@ class Prepared:
         shared = ", ".join(f"{line} ({rows})" for line, rows in lines.items() if rows > 1)
         acting, *others = self.assemblies
         asked = " or ".join(choice_label(own) for own in others if own)
+        population = self.study.drawing.population if self.study.drawing else STATED
         return (
             *stated,
+            *((taken_as(population),) if population != STATED else ()),
             *((_SHARED.format(lines=shared),) if shared else ()),
             *((_ASSEMBLED.format(label=choice_label(acting)),) if acting else ()),
             *((_AS_THEY_COME.format(labels=asked),) if asked and not acting else ()),
@@ -132,7 +135,7 @@ class Prepared:
         own_joint = self.study.joint if isinstance(self.study.joint, AtYield) else None
 
         def shown(limit: Limit) -> Guarantee:
-            return limit.show or own_joint or limit.guarantee
+            return WorstCase() if self._promises_worst_unit else limit.show or own_joint or limit.guarantee
 
         stated = (
             Requirement(output=name, limits=limit.limits, guarantee=shown(limit)) for name, limit in asked.items()
@@ -145,11 +148,18 @@ class Prepared:
         return (*stated, *own)
 
     @property
+    def _promises_worst_unit(self) -> bool:
+        """Whether the drawing promises for parts anywhere in their zones, so that only the worst unit tells."""
+        return self.study.drawing is not None and self.study.drawing.population == ANYWHERE
+
+    @property
     def joint(self) -> AtYield | None:
         """What all limits at once must be shown for, unless told otherwise the one yield that all of them ask for.
 
         A limit that the model has of its own, which nobody wrote, is kept at once with them and has no say in it.
         """
+        if self._promises_worst_unit:
+            return None
         if self.study.joint != COMMON:
             return self.study.joint
         stated = [limit.guarantee for limit in self.study.limits.values() if limit is not None]
@@ -246,7 +256,7 @@ class Prepared:
         study = self.study
         content = (
             (study.name, study.seed, study.largest_failed_share, study.effort, study.questions),
-            (dict(study.limits), study.joint),
+            (dict(study.limits), study.joint, *filter(None, [study.drawing and study.drawing.population])),
             self.model.content,
             self.errors.sources,
             self.errors.correlation,

@@ -5,23 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import hypot, inf, sqrt
+from math import hypot, inf, isnan, sqrt
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
+from tolalloc.capability.conformity import COVERAGE
 from tolalloc.capability.indices import ControlLimits, control_limits, holm
 from tolalloc.drawings.distributions import Distribution, ndtri
 from tolalloc.drawings.drawing import Drawing
 from tolalloc.drawings.fields import UNITS
 from tolalloc.drawings.heads import split_header
 from tolalloc.drawings.measured_parts import LARGEST_DEVIATION
+from tolalloc.drawings.qdas_file import FILE_NAME, SHORT, VALID, qdas_number, read_characteristics
 from tolalloc.drawings.sources import Source, known_as
 from tolalloc.drawings.table_file import TextTable, is_workbook, read_table_file, read_text_table
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import Faults, InputError, UnknownNameError
-from tolalloc.reading.units import MICROMETRE
+from tolalloc.reading.units import MICROMETRE, usual_signs
 from tolalloc.wings.bench.lot_orders import LotCurves, LotOrder, judged_orders, predicted_orders, with_sources
 from tolalloc.wings.bench.processes import (
     CONFIDENCE,
@@ -239,7 +241,7 @@ def prepare_lot(
 
 def _measured_places(path: Path, sources: Sequence[Source]) -> list[Source]:
     """Return a row for each place that a file has readings of, and those for several without these."""
-    heads = [split_header(header)[0] for header in _table(path).headers]
+    heads = [split_header(header)[0] for header in _table(path, sources).headers]
     names = {name for head in heads for name in (head, head.rpartition(".")[0])} - {own.name for own in sources}
     found = list[Source]()
     for row in sources:
@@ -266,7 +268,7 @@ def load_lot(path: Path, sources: Sequence[Source]) -> tuple[GaugedColumn, ...]:
     InputError, UnknownNameError
         The file, row, column and value that are not allowed; all such of one file together.
     """
-    (table, stated), faults, columns = _apart(_table(path)), Faults(), list[GaugedColumn]()
+    (table, stated), faults, columns = _apart(_table(path, sources)), Faults(), list[GaugedColumn]()
     for header in table.headers:
         if header.lower() in WORDS:
             continue
@@ -335,9 +337,12 @@ def _without_gauge(path: Path, column: GaugedColumn, names: Sequence[str], state
 
 
 def _stated(column: GaugedColumn, stated: TextTable | None) -> float:
-    """Return the standard deviation of a reading by the row that states it; 0 where none does [m]."""
+    """Return the standard deviation of a reading by the row that states it, else by the tolerance table [m].
+
+    0 where neither does. The table's is that of what its zone limits, of a position a diameter.
+    """
     if stated is None:
-        return 0.0
+        return column.source.uncertainty / COVERAGE * (0.5 if column.source.feature is Feature.POSITION else 1.0)
     factor, (shown,) = column_readings(stated, column.header, _LENGTHS)
     if not (np.isnan(shown) or 0.0 < shown <= LARGEST_DEVIATION * MICROMETRE):
         place, value = f"{stated.path}, row {stated.rows[0]}", float(f"{shown / factor:.9g}")
@@ -346,8 +351,10 @@ def _stated(column: GaugedColumn, stated: TextTable | None) -> float:
     return 0.0 if np.isnan(shown) else float(shown) * part
 
 
-def _table(path: Path) -> TextTable:
-    """Return the cells of a CSV file, or of the first sheet of a workbook."""
+def _table(path: Path, sources: Sequence[Source]) -> TextTable:
+    """Return the cells of a CSV file, of the first sheet of a workbook, or of a measuring room's file (Q-DAS)."""
+    if FILE_NAME.fullmatch(path.name):
+        return _of_measuring_room(path, sources)
     if not is_workbook(path):
         return read_text_table(path)
     (_, headers), *others = read_table_file(path)
@@ -355,6 +362,27 @@ def _table(path: Path) -> TextTable:
         raise InputError(f"{path}: the table has no rows; a line of headers and one row or more are needed.")
     rows, cells = zip(*others, strict=True)
     return TextTable(path=path, headers=headers, rows=rows, cells=cells)
+
+
+def _of_measuring_room(path: Path, sources: Sequence[Source]) -> TextTable:
+    """Return the valid values of a Q-DAS file below the short names, else the names, of its characteristics.
+
+    Of a position a value is a diameter, of any other feature an actual size, as far from nominal as it deviates.
+    """
+    positions = {name for own in sources if own.feature is Feature.POSITION for name in (own.name, own.own_id) if name}
+    columns = dict[str, list[str]]()
+    for at, own in read_characteristics(path).items():
+        name = own.fields.get(SHORT) or (own.names or (str(at),))[-1]
+        where, unit = f"{path}, characteristic {name}", usual_signs(own.fields.get("K2142", ""))
+        if unit not in UNITS:
+            raise InputError.at(where, "the unit (K2142)", unit, "µm, um or mm")
+        nominal = 0.0 if name in positions else qdas_number(own.fields.get("K2101", "") or "0")
+        head = f"{name}.diameter [{unit}]" if name in positions else f"{name} [{unit}]"
+        values = [(qdas_number(text) - nominal, text) for text, attribute in own.values if attribute == VALID]
+        columns[head] = [text if isnan(value) else f"{value:.9g}" for value, text in values]
+    count = max(map(len, columns.values()), default=0)
+    cells = zip(*(own + [""] * (count - len(own)) for own in columns.values()), strict=True)
+    return TextTable(path=path, headers=tuple(columns), rows=tuple(range(1, count + 1)), cells=tuple(cells))
 
 
 def _column(table: TextTable, header: str, sources: Sequence[Source]) -> GaugedColumn:

@@ -28,7 +28,8 @@ class Lot(Inquiry["LotRequest"]):
     by_position: ClassVar[int] = 2
 
     readings: Annotated[
-        Path, Word("CSV or XLSX: a row per part or unit, a column per source, 'disc1.pitch [µm]'; cells may be empty.")
+        Path,
+        Word("CSV or XLSX: a row per part or unit, a column per source, 'disc1.pitch [µm]'; or a Q-DAS file."),
     ]
     tolerances: Annotated[Path, Word("Tolerance table of the drawing: shipped name, CSV or XLSX.")]
     sheet: Annotated[str, Word("Sheet of a workbook that holds the table; the first unless given.")] = ""

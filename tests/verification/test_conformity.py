@@ -1,0 +1,80 @@
+"""Guard bands, risks of measuring and samples against closed forms."""
+
+from math import atan, pi, sqrt
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal, norm
+
+from tolalloc.capability.conformity import capability_bound, guard_band, parts_to_show, risks
+from tolalloc.capability.indices import Limits
+from tolalloc.exceptions import InputError
+
+
+@pytest.mark.parametrize(("conformance", "factor"), [(0.95, 1.6449 / 2), (0.5, 0.0), (0.97725, 1.0)])
+def test_guard_band_is_a_quantile_of_the_error(conformance, factor):
+    assert guard_band(3.0, conformance) == pytest.approx(3.0 * factor, abs=1e-3)
+
+
+@pytest.mark.parametrize("error", [0.1, 0.5, 1.0, 3.0])
+def test_risks_of_a_limit_at_the_mean_are_an_angle(error):
+    """P(x > 0, x + e ≤ 0) = atan(u/σ)/2π, Sheppard (1899)."""
+    found = risks(0.0, 1.0, Limits(upper=0.0), 2 * error)
+    assert found.consumer == pytest.approx(atan(error) / (2 * pi), rel=1e-6)
+    assert found.producer == pytest.approx(found.consumer, rel=1e-6)
+
+
+@pytest.mark.parametrize("guard", [-0.3, 0.0, 0.4])
+@pytest.mark.parametrize(("lower", "upper"), [(-2.0, 2.0), (None, 1.5), (-1.0, None)])
+def test_risks_are_those_of_the_bivariate_normal_distribution(lower, upper, guard):
+    mean, deviation, error = 0.2, 1.1, 0.3
+    found = risks(mean, deviation, Limits(lower=lower, upper=upper), 2 * error, guard)
+    both = multivariate_normal(
+        [mean, mean], [[deviation**2, deviation**2], [deviation**2, deviation**2 + error**2]], abseps=1e-10
+    )
+    low, high = (-40.0 if lower is None else lower), (40.0 if upper is None else upper)
+    inside = (low + guard if lower is not None else low, high - guard if upper is not None else high)
+
+    def rectangle(true, shown):
+        return (
+            both.cdf([true[1], shown[1]])
+            - both.cdf([true[0], shown[1]])
+            - both.cdf([true[1], shown[0]])
+            + both.cdf([true[0], shown[0]])
+        )
+
+    good, accepted = rectangle((low, high), inside), rectangle((-40.0, 40.0), inside)
+    kept = norm.cdf(high, mean, deviation) - norm.cdf(low, mean, deviation)
+    assert found.accepted == pytest.approx(accepted, abs=1e-7)
+    assert found.consumer == pytest.approx(accepted - good, abs=1e-7)
+    assert found.producer == pytest.approx(kept - good, abs=1e-7)
+
+
+def test_exact_gauge_decides_rightly():
+    found = risks(0.0, 1.0, Limits(lower=-2.0, upper=2.0), 0.0)
+    assert found.consumer == 0.0
+    assert found.producer == pytest.approx(0.0, abs=1e-9)
+
+
+def test_bound_of_a_capability_is_kept_by_as_many_samples_as_it_says():
+    generator, parts, true = np.random.default_rng(5), 50, 1.33
+    values = generator.normal(0.0, 1.0, (20_000, parts))
+    mean, deviation = values.mean(axis=1), values.std(axis=1, ddof=1)
+    shown = (3 * true - np.abs(mean)) / (3 * deviation)
+    below = np.mean([capability_bound(own, parts) <= true for own in shown])
+    assert below >= 0.95 - 3 * sqrt(0.05 * 0.95 / 20_000)
+
+
+def test_parts_are_the_fewest_that_show_a_capability():
+    for demanded, shown in ((1.0, 4 / 3), (1.33, 1.6), (0.67, 0.9)):
+        parts = parts_to_show(demanded, shown)
+        assert capability_bound(shown, parts) >= demanded > capability_bound(shown, parts - 1)
+    assert parts_to_show(1.0, 1.001) == 10_000
+    assert parts_to_show(1.0, 9.0) == 5
+
+
+def test_what_shows_nothing_is_refused():
+    with pytest.raises(InputError, match=r"more than the 1\.33"):
+        parts_to_show(1.33, 1.2)
+    with pytest.raises(InputError, match=r"conformance is 1.*0\.5 to below 1"):
+        guard_band(1.0, 1.0)
