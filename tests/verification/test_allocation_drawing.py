@@ -232,7 +232,7 @@ def test_the_workbook_says_what_tolalloc_says_of_another_zone(drawn, factor):
 def test_formulas_hold_plain_numbers_and_the_zones_to_change_are_marked(drawn):
     results, folder = drawn
     sheets = load_workbook(folder / "drawing.xlsx")
-    assert sheets.sheetnames == ["answer", "drawing", "requirements", "modification", "tolerances"]
+    assert sheets.sheetnames == ["answer", "drawing", "requirements", "modification", "tolerances", "inspection plan"]
     formulas = [
         cell.value
         for name in ("drawing", "requirements")
@@ -290,7 +290,7 @@ def test_every_line_of_the_drawing_states_the_one_verified_zone_of_its_members(d
         whole = 2e3 * stated if frame.characteristic == "size" else 1e3 * stated
         assert -1e-6 < zone - whole < 2e-2 + 1e-6
         assert frame.zone.lstrip("±⌀") == f"{stated:.5f}".rstrip("0").rstrip(".")
-    inspected = [row[0] for row in cells(folder / "frames.dxf", "TABLE") if row[1:2] and row[1] in ("Fp", "Fr")]
+    inspected = [row[1] for row in cells(folder / "frames.dxf", "TABLE") if row[2:3] and row[2][:3] in ("Fp ", "Fr ")]
     assert {*frames(folder / "frames.dxf"), *inspected} == {results.line_name(line) for line in results.lines}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from functools import wraps
@@ -19,7 +19,7 @@ from tolalloc.study.script import load_study
 if TYPE_CHECKING:
     from tolalloc.running.chunks import Mapper
     from tolalloc.study.answer import Answer
-    from tolalloc.study.study import Study
+    from tolalloc.study.study import Run, Study
 
 Script = Annotated[Path, typer.Argument(help="Python script that defines study = Study(...).")]
 Quick = Annotated[bool, typer.Option("--quick", help="Small samples, wide intervals; every stage is real.")]
@@ -198,20 +198,7 @@ def _run(study: Study, kinds: tuple[str, ...], ending: str, way: _Way) -> None:
     if way.as_json:
         print_json({"folder": str(folder), **found.document.summary})
     else:
-        # What has a table to show, such as a drawing, comes first.
-        answers = sorted(found.answers.values(), key=lambda own: own.teller.headline_table is None)
-        unsaid = set[str]()
-        for answer in answers:
-            if way.verbose or not answer.teller.headline:
-                _show(answer)
-            else:
-                _show_headline(answer)
-                unsaid.update(answer.warnings)
-        warnings = [warning for warning in found.document.warnings if warning in unsaid]
-        for warning in warnings[:_WARNINGS]:
-            say(warning, warns=True)
-        if (more := len(warnings) - _WARNINGS) > 0:
-            say(f"{more} more {'note' if more == 1 else 'notes'} in the report, or with --verbose.", warns=True)
+        _tell_answers(found, way)
         if before:
             _tell_changes(before, folder)
     note(f"Report: {folder / 'report.html'}")
@@ -226,10 +213,32 @@ def solvers(scheduler: str) -> AbstractContextManager[Mapper]:
     return workers_at(scheduler)
 
 
-def _show_headline(answer: Answer[Any]) -> None:
-    """Print the first sentences of an answer, and its one table."""
+def _tell_answers(found: Run, way: _Way) -> None:
+    """Print the answers in short, what is better done before first, or in full; and the first of their warnings."""
+    # What has a table to show, such as a drawing, comes first.
+    answers = sorted(found.answers.values(), key=lambda own: own.teller.headline_table is None)
+    unsaid, first = set[str](), tuple(sentence for own in answers for sentence in own.teller.before)
+    if not way.verbose:
+        for sentence in first:
+            say(sentence)
+    for answer in answers:
+        if way.verbose or not answer.teller.headline:
+            _show(answer)
+        else:
+            _show_headline(answer, first)
+            unsaid.update(answer.warnings)
+    warnings = [warning for warning in found.document.warnings if warning in unsaid]
+    for warning in warnings[:_WARNINGS]:
+        say(warning, warns=True)
+    if (more := len(warnings) - _WARNINGS) > 0:
+        say(f"{more} more {'note' if more == 1 else 'notes'} in the report, or with --verbose.", warns=True)
+
+
+def _show_headline(answer: Answer[Any], said: Container[str]) -> None:
+    """Print the first sentences of an answer but those that were said, and its one table."""
     for sentence in answer.teller.headline:
-        say(sentence)
+        if sentence not in said:
+            say(sentence)
     if table := answer.teller.headline_table:
         print_table(*table)
 

@@ -73,6 +73,8 @@ class Document:
         Title and sentences of each report that this one joins; none of a report alone.
     headlines
         Title → what the first page says of a report behind another one; its first sentences where nothing stands here.
+    before
+        What is better done before the answer is acted on; of reports that are joined it stands before the first one.
     title_block
         What the first page says beside study and date, as a drawing does: its number, revision and author.
     """
@@ -88,6 +90,7 @@ class Document:
     manifest: dict[str, Any] | None = None
     answers: tuple[tuple[str, tuple[str, ...]], ...] = ()
     headlines: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    before: tuple[str, ...] = ()
     title_block: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -146,18 +149,28 @@ def joined(title: str, subtitle: str, parts: Iterable[tuple[str, Document]], **m
     # The report that has something for the first page comes first.
     leading_first = sorted(reports, key=lambda report: report[0] not in leading)
     sections.sort(key=lambda section: section.part != leading_first[0][1].title)
+    before = tuple(dict.fromkeys(sentence for _, document in reports for sentence in document.before))
+    answers = [
+        (document.title, (*(() if at else before), *(own for own in document.answer if own not in before)))
+        for at, (_, document) in enumerate(leading_first)
+    ]
     return Document(
         title=title,
         subtitle=subtitle,
-        answer=tuple(sentence for _, document in leading_first for sentence in document.answer),
+        answer=tuple(sentence for _, said in answers for sentence in said),
         warnings=_once(sentence for _, document in reports for sentence in document.warnings),
         sections=tuple(sections),
         assumptions=tuple(dict.fromkeys(sentence for _, document in reports for sentence in document.assumptions)),
         summary={part: document.summary for part, document in reports},
         seed=manifest.get("seed"),
         manifest=manifest,
-        answers=tuple((document.title, document.answer) for _, document in leading_first) if len(reports) > 1 else (),
-        headlines={title: said for _, document in reports for title, said in document.headlines.items()},
+        answers=tuple(answers) if len(reports) > 1 else (),
+        headlines={
+            title: tuple(own for own in said if own not in before)
+            for _, document in reports
+            for title, said in document.headlines.items()
+        },
+        before=before,
     )
 
 

@@ -16,7 +16,7 @@ from tolalloc.reports.portrait import SignSketch
 if TYPE_CHECKING:
     from ezdxf.layouts.layout import Modelspace
 
-LAYERS = {"FRAMES": 7, "TEXT": 7, "TABLE": 7, "TITLE_BLOCK": 7, "SIGN_PICTURE": 3}
+LAYERS = {"FRAMES": 7, "BALLOONS": 5, "POPULATION": 5, "TEXT": 7, "TABLE": 7, "TITLE_BLOCK": 7, "SIGN_PICTURE": 3}
 """Layer → colour of the AutoCAD Colour Index; a layer may be frozen without the others."""
 PAPERS = {"A4": (297.0, 210.0), "A3": (420.0, 297.0), "A2": (594.0, 420.0), "A1": (841.0, 594.0), "A0": (1189.0, 841.0)}
 """Sheets of ISO 216 across [mm]; the smallest one that holds everything is taken."""
@@ -41,6 +41,8 @@ _NAMES = 34
 """Letters of a name before it is wrapped [-]."""
 _SKETCH = 30.0
 """Height of a sign picture [mm]."""
+_BALLOON = 9.0
+"""Room of a balloon before the name of its line [mm]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,10 +74,25 @@ class SheetTable:
 
 
 @dataclass(frozen=True, kw_only=True)
+class SheetFrame:
+    """A frame with its balloon."""
+
+    number: int  # In the inspection plan
+    name: str  # Of the dimension
+    frame: FeatureFrame  # What to write
+    demand: str = ""  # What it demands of the population of its parts
+
+    @property
+    def lines(self) -> list[str]:
+        """Lines of text beside it."""
+        return [*wrap(self.name, _NAMES), *wrap(self.demand, _NAMES)]
+
+
+@dataclass(frozen=True, kw_only=True)
 class DrawingSheet:
     """All that stands on the sheet."""
 
-    frames: tuple[tuple[str, FeatureFrame], ...]  # Name of the dimension and what to write
+    frames: tuple[SheetFrame, ...]
     tables: tuple[SheetTable, ...] = ()
     sketches: tuple[SignSketch, ...] = ()
     notes: tuple[str, ...] = ()
@@ -162,10 +179,11 @@ class _Placed:
     """
 
     def __init__(self, sheet: DrawingSheet) -> None:
-        self.names = max((min(len(name), _NAMES) for name, _ in sheet.frames), default=0) * _BROAD * _TEXT + 3.0
-        last = (boxes(frame)[-1] for _, frame in sheet.frames)
+        longest = max((len(line) for own in sheet.frames for line in own.lines), default=0)
+        self.names = _BALLOON + longest * _BROAD * _TEXT + 3.0
+        last = (boxes(own.frame)[-1] for own in sheet.frames)
         self.width = self.names + max(((left + width) * _SCALE for left, width, _ in last), default=0.0) + _GAP
-        self.heights = [max(len(wrap(name, _NAMES)) * _TEXT * _LINE, _TALL) + 3.0 for name, _ in sheet.frames]
+        self.heights = [max(len(own.lines) * _TEXT * _LINE, _TALL) + 3.0 for own in sheet.frames]
         beside = sum(table.height + _GAP for table in sheet.tables) + sum(map(_note_height, sheet.notes))
         beside += _sketches_height(sheet.sketches) + _block_height(sheet) + _GAP
         for paper, (width, height) in PAPERS.items():
@@ -187,25 +205,30 @@ class _Placed:
 
 
 def _frames(space: Modelspace, sheet: DrawingSheet, placed: _Placed) -> None:
-    """Draw all frames, each with its name beside it."""
-    pen = _Pen(space, "TEXT")
-    for number, ((name, frame), (left, top)) in enumerate(zip(sheet.frames, placed.places, strict=True), start=1):
+    """Draw all frames, each with its balloon, its name and what it demands of its parts beside it."""
+    named, demanded, balloons = _Pen(space, "TEXT"), _Pen(space, "POPULATION"), {"layer": "BALLOONS"}
+    for own, (left, top) in zip(sheet.frames, placed.places, strict=True):
         assert space.doc is not None
-        block = space.doc.blocks.new(f"FRAME_{number}")
-        for x, width, text in ((own[0] * _SCALE, own[1] * _SCALE, own[2]) for own in boxes(frame)):
-            if frame.is_framed:
+        block = space.doc.blocks.new(f"FRAME_{own.number}")
+        for x, width, text in ((box[0] * _SCALE, box[1] * _SCALE, box[2]) for box in boxes(own.frame)):
+            if own.frame.is_framed:
                 block.add_lwpolyline([(x, 0), (x + width, 0), (x + width, _TALL), (x, _TALL)], close=True)
             if text:
                 written = block.add_text(text, height=_BIG, dxfattribs={"style": _STYLE})
                 centre(written, (x + width / 2, _TALL / 2))
-        lines, circles = drawn_symbol(frame.characteristic)
+        lines, circles = drawn_symbol(own.frame.characteristic)
         for line in lines:
             block.add_lwpolyline([(x * _TALL, y * _TALL) for x, y in line])
         for radius in circles:
             block.add_circle((_TALL / 2, _TALL / 2), radius * _TALL)
         space.add_blockref(block.name, (left + placed.names, top - _TALL), dxfattribs={"layer": "FRAMES"})
-        for at, line_of_name in enumerate(wrap(name, _NAMES), start=1):
-            pen.text(line_of_name, (left, top - 1.5 - at * _TEXT * _LINE + 0.6))
+        middle = (left + _TALL / 2, top - _TALL / 2)
+        space.add_circle(middle, _TALL / 2, dxfattribs=balloons)
+        centre(space.add_text(str(own.number), height=_TEXT, dxfattribs={**balloons, "style": _STYLE}), middle)
+        count = len(wrap(own.name, _NAMES))
+        for at, text in enumerate(own.lines, start=1):
+            pen = named if at <= count else demanded
+            pen.text(text, (left + _BALLOON, top - 1.5 - at * _TEXT * _LINE + 0.6))
 
 
 def _table(pen: _Pen, table: SheetTable, left: float, top: float) -> float:

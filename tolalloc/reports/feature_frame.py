@@ -175,12 +175,30 @@ def _deviations(source: Source) -> str:
     if source.middle == 0.0:
         return f"±{written(source.zone / 2, unit)}{stated}"
     step, _ = FINEST[unit]
-    upper = floor((source.middle + source.zone / 2) / step + _ROUNDING)
-    lower = ceil((source.middle - source.zone / 2) / step - _ROUNDING)
     ends = (
-        f"{'−' if steps < 0 else '+' if steps else ''}{written(abs(steps) * step, unit)}" for steps in (upper, lower)
+        f"{'−' if steps < 0 else '+' if steps else ''}{written(abs(steps) * step, unit)}"
+        for steps in reversed(_steps(source))
     )
     return " / ".join(ends) + stated
+
+
+def _steps(source: Source) -> tuple[int, int]:
+    """Return both limit deviations of a size in steps of a drawing, inside its zone [-]."""
+    step, _ = FINEST[source.length_name]
+    lower = ceil((source.middle - source.zone / 2) / step - _ROUNDING)
+    return lower, floor((source.middle + source.zone / 2) / step + _ROUNDING)
+
+
+def stated_limits(source: Source, frame: FeatureFrame) -> tuple[float | None, float]:
+    """Return the limits that a drawing states of a source: both deviations, or none and the zone [m].
+
+    As they are written, so no wider than the zone that was verified.
+    """
+    step, _ = FINEST[source.length_name]
+    if not frame.is_deviation:
+        return None, floor(source.zone / step + _ROUNDING) * step
+    lower, upper = _steps(source)
+    return lower * step, upper * step
 
 
 def callout_assumptions(sources: Iterable[Source], kind_of: Callable[[Source], ErrorSource | None]) -> tuple[str, ...]:

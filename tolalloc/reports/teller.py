@@ -95,6 +95,11 @@ class Teller(ABC, Generic[Result]):
         return ()
 
     @property
+    def before(self) -> tuple[str, ...]:
+        """What is better done before another answer is acted on, such as moving a nominal; said first of all."""
+        return ()
+
+    @property
     def headline(self) -> tuple[str, ...]:
         """What a terminal, and a first page behind another answer, says in short; nothing where all is said."""
         return ()
@@ -126,6 +131,7 @@ class Teller(ABC, Generic[Result]):
             seed=self.header.seed,
             manifest={"statuses": dict(self.header.statuses), "stages": dict(self.header.stages)},
             headlines={self.title: self.headline} if self.headline else {},
+            before=self.before,
         )
 
 

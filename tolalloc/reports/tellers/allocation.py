@@ -90,6 +90,7 @@ class AllocationTeller(Teller[AllocationResult]):
         return self.standing(
             self._today,
             self._risks,
+            self._pictures,
             self._front,
             self._dimensions,
             lambda: assembly_sections(self.result, self.header.cost_unit),
@@ -143,11 +144,15 @@ class AllocationTeller(Teller[AllocationResult]):
         result = self.result
         yield Section(
             heading=_say("heading_today"),
-            figures=(figures.units_figure(result), *effects_figure(result)),
             tables=(("today and as drawn", tables.today_frame(result, self.header.cost_unit)),),
             paragraphs=(*texts.today_values(result), *texts.capability_change(result)),
             first=True,
         )
+
+    def _pictures(self) -> Iterator[Section]:
+        """Yield, on the first page, units before and after and what opening a zone adds."""
+        shown = (figures.units_figure(self.result), *effects_figure(self.result))
+        yield Section(heading=_say("heading_pictures"), figures=shown, first=True)
 
     def _front(self) -> Iterator[Section]:
         """Yield, on the first page, what other limits cost."""

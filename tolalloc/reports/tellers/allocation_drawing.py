@@ -12,9 +12,10 @@ from jaxtyping import Float
 
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.allocation.space.requirement import AtYield
-from tolalloc.drawings.sources import Source, by_row, length_unit, zone_in, zone_unit
+from tolalloc.drawings.sources import RESOLVED, Source, by_row, length_unit, zone_in, zone_unit
 from tolalloc.drawings.table_file import setting_line
 from tolalloc.drawings.tolerance_table import heads_file, heads_text, table_frame
+from tolalloc.reading.file_content import is_file
 from tolalloc.reading.units import COST_UNITS, MICROMETRE, unit_of
 from tolalloc.reports.columns import Column, Table, own_words, span
 from tolalloc.reports.drawing_sheet import write_sheet
@@ -24,6 +25,8 @@ from tolalloc.reports.figure import Figure, Series
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.tellers.allocation_assembly import assembly_notes
+from tolalloc.reports.tellers.allocation_inspection import add_plan, plan_lines, write_plan
+from tolalloc.reports.tellers.allocation_population import population_note
 from tolalloc.reports.tellers.allocation_sentences import amounts_convention, drawn_amounts
 from tolalloc.reports.tellers.allocation_sheet import drawing_sheet
 from tolalloc.reports.tellers.allocation_workbook import add_calculator
@@ -238,6 +241,8 @@ def risks(result: AllocationResult) -> Iterator[str]:
         unit = zone_unit(result.space.errors.sources)
         zones = {"before": zone_in(before, unit), "after": zone_in(after, unit), "unit": unit}
         yield _say("risk_tightest", name=name, change=-change / 100, **zones)
+    yield from _too_fine(result)
+    yield from _at_ends(result)
     if result.met and effect > 0:
         left = max(-result.chosen.checks[0].tightest.excess, 0.0)
         moved = {"effect": effect} | ({"left": left} if left > _NOTHING_LEFT * effect else {})
@@ -246,6 +251,31 @@ def risks(result: AllocationResult) -> Iterator[str]:
         yield _say(key, name=driver, step=_STEP, output=short(result.leading), **said)
     yield from portrait_of(result.model.at(result.chosen.settings)).risks
     yield _say("risk_not_included", what=portrait_of(result.model).not_included)
+
+
+def _too_fine(result: AllocationResult) -> Iterator[str]:
+    """Yield which zones their gauges do not resolve, all in one sentence."""
+    lines = [
+        _say(
+            "risk_gauge_line",
+            name=result.line_name(own),
+            zone=first.zone / MICROMETRE,
+            gauge=first.uncertainty / MICROMETRE,
+        )
+        for own in result.lines
+        if not (first := own[1][0]).is_resolved
+    ]
+    if lines:
+        yield _say("risk_gauge", times=RESOLVED, lines=", ".join(lines))
+
+
+def _at_ends(result: AllocationResult) -> Iterator[str]:
+    """Yield which settings lie at an end of what was allowed."""
+    for setting, value in zip(result.space.settings, result.chosen.settings.tolist(), strict=True):
+        for end, word in ((setting.lower, "smallest"), (setting.upper, "largest")):
+            if setting.lower < setting.upper and abs(value - end) < setting.step / 2:
+                name = quantity(setting.name).capitalize()
+                yield _say("risk_bound", name=name, end=word, value=with_unit(f"{value:.3g}", setting.name))
 
 
 def zones_figure(rows: Sequence[_Row]) -> Figure:
@@ -258,9 +288,18 @@ def zones_figure(rows: Sequence[_Row]) -> Figure:
 
 
 def write_drawing(result: AllocationResult, header: Header, folder: Path) -> None:
-    """Write ``allocation.csv``, which is read back, ``drawing.xlsx``, which goes on calculating, and ``frames.dxf``."""
+    """Write the drawing as files.
+
+    ``allocation.csv`` is read back, ``drawing.xlsx`` goes on calculating and has the inspection plan, ``frames.dxf``
+    enters a drawing program and ``inspection.dfd`` a measuring room's.
+    """
     cost_unit, called = header.cost_unit, result.space.errors.called
-    notes = (*drawn_amounts(result), *amounts_convention(result), *assembly_notes(result))
+    notes = (
+        *drawn_amounts(result),
+        *amounts_convention(result),
+        *assembly_notes(result),
+        *population_note(result),
+    )
     write_csv(table_frame(result.drawn_sources, folder, cost_unit, called), folder / "allocation.csv")
     if called:
         heads_file(folder / "allocation.csv").write_text(heads_text(called), encoding="utf-8")
@@ -268,10 +307,16 @@ def write_drawing(result: AllocationResult, header: Header, folder: Path) -> Non
         file.write("".join(f"{line}\n" for line in _table_comments(result, header, notes)))
     book = Book()
     add_calculator(book, result, header, notes)
+    plan = plan_lines(result, _parts(result))
     for name, frame in {**_settings_sheet(result), "tolerances": tolerances_frame(result, cost_unit)}.items():
         book.table(name, frame)
+    add_plan(book, plan)
     (folder / "drawing.xlsx").write_bytes(book.content())
-    write_sheet(drawing_sheet(result, header, date.today()), folder / "frames.dxf")
+    write_sheet(drawing_sheet(result, header, plan, date.today()), folder / "frames.dxf")
+    write_plan(plan, header.name, folder / "inspection.dfd")
+    own = result.space.errors.file
+    if own and is_file(own.path) and own.is_own:
+        own.written(result.drawn_sources, folder)
 
 
 def _table_comments(result: AllocationResult, header: Header, notes: Sequence[str]) -> list[str]:

@@ -24,6 +24,7 @@ from tolalloc.reports.feature_frame import callout_assumptions
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import Examination, portrait_of
 from tolalloc.reports.tellers.allocation_assembly import assembly_cost_sentences
+from tolalloc.reports.tellers.allocation_population import population_sentences
 from tolalloc.reports.tellers.check import MORE_PARTS, few_parts, interval_gaps
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import QUICK_RUN, enumerated, number, quantity, short, with_unit
@@ -84,13 +85,15 @@ def verdict(result: AllocationResult) -> tuple[str, ...]:
 
 def headline(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     """Return the verdict and the cost."""
-    return (*verdict(result), _cost(result, cost_unit), *assembly_cost_sentences(result, cost_unit))
+    costs = (_cost(result, cost_unit), *assembly_cost_sentences(result, cost_unit))
+    return (*verdict(result), *population_sentences(result), *costs)
 
 
 def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     """Return the answer in sentences; the first ones stand in the headline of a report."""
     chosen = result.chosen
-    found = [*verdict(result), *drawn_amounts(result), *zones_changed(result), _cost(result, cost_unit)]
+    found = [*verdict(result), *population_sentences(result), *drawn_amounts(result), *zones_changed(result)]
+    found.append(_cost(result, cost_unit))
     certificate = _certificate(result)
     found += (*assembly_cost_sentences(result, cost_unit), *certificate[:1])
     if len(result.requirements) > 1 and not chosen.jointly:
@@ -184,12 +187,13 @@ def today_values(result: AllocationResult) -> tuple[str, ...]:
     several = len(result.requirements) > 1
     kept = today.joint if several else today.achieved
     names = [short(own.output) for own in result.requirements if isinstance(own, OwnLimit)]
+    own_limit = "own_limit_moves" if result.space.settings else "own_limit"
     said = _say(
         "today_values",
         simulated=portrait_of(result.model).simulated,
         **interval_gaps(kept),
         limits=_say("today_all" if several else "today_one"),
-        own=_say("own_limit", names=" and ".join(names)) if names else "",
+        own=_say(own_limit, names=" and ".join(names), word=portrait_of(result.model).settings_word) if names else "",
     )
     return (said,)
 
@@ -248,7 +252,7 @@ def _required(result: AllocationResult, guarantee: Guarantee, achieved: Yield) -
     """Return what was required beside what was achieved."""
     if not isinstance(guarantee, AtYield):
         return _say("required_other", words=guarantee.words)
-    near = result.met and achieved.estimate < guarantee.target <= achieved.high
+    near = result.met and achieved.low < guarantee.target <= achieved.high
     return _say("required_near" if near else "required_yield", target=guarantee.target)
 
 

@@ -7,13 +7,14 @@ from datetime import date
 from typing import Any
 
 from tolalloc.allocation.result import AllocationResult
-from tolalloc.drawings.sources import Source
 from tolalloc.reading.units import MICROMETRE, unit_of
-from tolalloc.reports.drawing_sheet import DrawingSheet, SheetTable
-from tolalloc.reports.feature_frame import INSPECTED, FeatureFrame
+from tolalloc.reports.drawing_sheet import DrawingSheet, SheetFrame, SheetTable
+from tolalloc.reports.feature_frame import INSPECTED
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import Portrait, portrait_of
 from tolalloc.reports.tellers.allocation_assembly import assembly_notes
+from tolalloc.reports.tellers.allocation_inspection import PlanLine
+from tolalloc.reports.tellers.allocation_population import demands, population_note
 from tolalloc.reports.tellers.allocation_sentences import amounts_convention, drawn_amounts, examined, verdict
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import number, quantity
@@ -22,41 +23,42 @@ _say = Sentences("allocation")
 
 _AXIS = "A"
 """Datum that every frame names, about which pitch and run-out of teeth are measured too."""
-_Line = tuple[str, tuple[Source, ...]]
 
 
-def drawing_sheet(result: AllocationResult, header: Header, today: date) -> DrawingSheet:
-    """Return the sheet of a drawing on a day."""
-    framed, inspected = _lines(result)
+def drawing_sheet(result: AllocationResult, header: Header, plan: Sequence[PlanLine], today: date) -> DrawingSheet:
+    """Return the sheet of a drawing on a day, every line with its number in the inspection plan."""
+    framed, inspected = _lines(result, plan)
     model = portrait_of(result.model)
     return DrawingSheet(
-        frames=tuple(_framed(result.line_name(own), model.frame(own[1][0])) for own in framed),
-        tables=(*_inspection(result, inspected), *_amounts(result), *_datums(model, [*framed, *inspected])),
+        frames=tuple(map(_framed, framed)),
+        tables=(*_inspection(inspected), *_amounts(result, plan), *_datums(model, [*framed, *inspected])),
         sketches=model.sign_sketches if result.amounts else (),
         notes=(
             *drawn_amounts(result),
             *amounts_convention(result),
             *assembly_notes(result),
+            *population_note(result),
             verdict(result)[-1],
         ),
         title_block=_title_block(result, header, today),
     )
 
 
-def _lines(result: AllocationResult) -> tuple[list[_Line], list[_Line]]:
+def _lines(result: AllocationResult, plan: Sequence[PlanLine]) -> tuple[list[PlanLine], list[PlanLine]]:
     """Return the lines with a frame or deviations, and those that are inspection data of gear parts.
 
     Tolerances of the amounts stand beside the amounts.
     """
-    beside, model = set(result.model.drawn_amounts.sources), portrait_of(result.model)
-    lines = [own for own in result.lines if own[1][0].name not in beside]
-    inspected = [own for own in lines if model.frame(own[1][0]).characteristic in INSPECTED]
+    beside = set(result.model.drawn_amounts.sources)
+    lines = [own for own in plan if own.first.name not in beside]
+    inspected = [own for own in lines if own.frame.characteristic in INSPECTED]
     return [own for own in lines if own not in inspected], inspected
 
 
-def _framed(name: str, frame: FeatureFrame) -> tuple[str, FeatureFrame]:
+def _framed(line: PlanLine) -> SheetFrame:
     """Return a frame beside the name of its dimension, which says where the zone holds."""
-    return (f"{name}, {frame.place}" if frame.place else name), frame
+    name = f"{line.name}, {line.frame.place}" if line.frame.place else line.name
+    return SheetFrame(number=line.number, name=name, frame=line.frame, demand=demands(line.members))
 
 
 def _table(key: str, rows: Sequence[tuple[str, ...]], widths: tuple[float, ...]) -> SheetTable:
@@ -65,21 +67,30 @@ def _table(key: str, rows: Sequence[tuple[str, ...]], widths: tuple[float, ...])
     return SheetTable(title=title, header=tuple(header), rows=tuple(rows), widths=widths)
 
 
-def _inspection(result: AllocationResult, lines: list[_Line]) -> tuple[SheetTable, ...]:
+def _inspection(lines: Sequence[PlanLine]) -> tuple[SheetTable, ...]:
     """Return pitch and run-out of the gear parts, and what their single teeth may deviate."""
-    rows, model = [], portrait_of(result.model)
-    for own in lines:
-        frame = model.frame(own[1][0])
-        about = _AXIS if frame.symbol else ""
-        rows.append((result.line_name(own), frame.symbol, frame.characteristic, frame.zone, about))
-    return (_table("table_inspection", rows, (68.0, 16.0, 44.0, 32.0, 20.0)),) if rows else ()
-
-
-def _amounts(result: AllocationResult) -> tuple[SheetTable, ...]:
-    """Return what is made with the zones: amounts with their own tolerance, and the clearances that they leave."""
-    effects = portrait_of(result.model).effects(result.chosen.settings)
     rows = [
         (
+            str(own.number),
+            own.name,
+            " ".join(filter(None, (own.frame.symbol, own.frame.characteristic))),
+            own.frame.zone,
+            _AXIS if own.frame.symbol else "",
+            demands(own.members),
+        )
+        for own in lines
+    ]
+    return (_table("table_inspection", rows, (10.0, 58.0, 40.0, 24.0, 14.0, 34.0)),) if rows else ()
+
+
+def _amounts(result: AllocationResult, plan: Sequence[PlanLine]) -> tuple[SheetTable, ...]:
+    """Return what is made with the zones: amounts with their own tolerance, and the clearances that they leave."""
+    effects, drawn = portrait_of(result.model).effects(result.chosen.settings), result.model.drawn_amounts
+    numbers = {member.name: str(own.number) for own in plan for member in own.members}
+    number_of = {name: numbers.get(source, "") for name, source in zip(drawn.names, drawn.sources, strict=False)}
+    rows = [
+        (
+            number_of.get(own.name, ""),
             quantity(own.name),
             number(own.value, ".2f"),
             number(own.tolerance / MICROMETRE, ".3g") if own.tolerance else "",
@@ -88,14 +99,14 @@ def _amounts(result: AllocationResult) -> tuple[SheetTable, ...]:
         )
         for own in result.amounts
     ]
-    return (_table("table_amounts", rows, (40.0, 18.0, 32.0, 12.0, 78.0)),) if rows else ()
+    return (_table("table_amounts", rows, (10.0, 40.0, 18.0, 32.0, 12.0, 68.0)),) if rows else ()
 
 
-def _datums(model: Portrait[Any], lines: list[_Line]) -> tuple[SheetTable, ...]:
+def _datums(model: Portrait[Any], lines: Sequence[PlanLine]) -> tuple[SheetTable, ...]:
     """Return the datum of every kind of part that something refers to; the feature that carries it is left free."""
     parts: dict[str, list[str]] = {}
-    for _, members in lines:
-        for own in members:
+    for line in lines:
+        for own in line.members:
             frame = model.frame(own)
             if frame.datums or frame.characteristic in INSPECTED:
                 alike = parts.setdefault(own.part.rstrip("0123456789"), [])

@@ -71,6 +71,12 @@ def _limit(row: _Limited) -> str:
     return said.removesuffix(" -")
 
 
+def _moved_limit(before: OneSidedConstraint, drawn: OneSidedConstraint) -> str:
+    """Return a limit as a table shows it: both, where it moves with the settings."""
+    sign, limits = "≤" if drawn.sign > 0 else "≥", [f"{own.limit:.4g}" for own in (before, drawn)]
+    return f"{sign} {' → '.join(dict.fromkeys(limits))}"
+
+
 def today_frame(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
     """Return cost, limits and amounts of the drawing as it is beside the drawing as drawn, and which limits bind.
 
@@ -89,7 +95,7 @@ def today_frame(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
             {
                 "drawing": f"{portrait.display_name(asked.output)} [{unit_of(asked.output)}]",
                 "shown for": "" if after.jointly else asked.guarantee.words,
-                "limit": f"{'≤' if drawn.sign > 0 else '≥'} {drawn.limit:.4g}",
+                "limit": _moved_limit(side, drawn),
                 "as it is": side.value,
                 "as drawn": drawn.value,
                 "yield [%]": 100 * before.yield_of(check.requirement, side.sign).estimate,
@@ -108,7 +114,8 @@ def today_frame(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
                 "yield as drawn [%]": 100 * after.joint.estimate,
             }
         )
-    rows += [{"drawing": own.name, "as it is": own.before, "as drawn": own.value} for own in result.amounts]
+    beside = [own for own in result.amounts if own.name not in result.model.drawn_amounts.names]
+    rows += [{"drawing": own.name, "as it is": own.before, "as drawn": own.value} for own in beside]
     words = ("shown for", "limit", "binds")
     frame = pd.DataFrame([{**dict.fromkeys(words, ""), **row} for row in rows])
     numbers = ("as it is", "as drawn", "yield [%]", "yield as drawn [%]")

@@ -98,6 +98,11 @@ class RankingTeller(Teller[RankingResult]):
         )
 
     @property
+    def before(self) -> tuple[str, ...]:
+        """What moving one nominal brings, which costs nothing."""
+        return tuple(self._centre())
+
+    @property
     def headline(self) -> tuple[str, ...]:
         """The first drivers, in one sentence."""
         return (*self._led(), *self._centre(), _named_drivers(self.result.indices, self._output))
@@ -159,7 +164,8 @@ class RankingTeller(Teller[RankingResult]):
         if first != leading:
             miss, miss_first = (1 - self.result.yields[name].estimate for name in (leading, first))
             gaps = {"output": self._output.capitalize(), "first": self._portrait.display_name(first)}
-            yield self._told("led", miss=miss, miss_first=miss_first, **gaps)
+            decides = self._portrait.display_name(leading)
+            yield self._told("led", miss=miss, miss_first=miss_first, decides=decides, **gaps)
 
     def _centre(self) -> Iterator[str]:
         """Yield what moving one nominal brings; nothing where the mean is in the middle."""

@@ -88,7 +88,7 @@ class MountingTeller(Teller[MountingResult]):
 
     @property
     def sections(self) -> tuple[Section, ...]:
-        """Who goes where, and what that is worth beside chance."""
+        """Which part goes where, and what that is worth beside chance."""
         chance = Figure(
             name="chance",
             title=_say("chance_figure"),
