@@ -155,3 +155,64 @@ def test_zones_that_their_gauges_do_not_resolve_are_named_at_once_on_page_1(told
     named = [text for text in said if "uncertainty of its gauge" in text]
     assert len(named) == bool(fine)
     assert all(name in named[0] for name in fine)
+
+
+@pytest.mark.parametrize(
+    ("status", "note", "known"),
+    [
+        ("", "", {}),
+        ("", "assumed: as alike", dict.fromkeys(("zone", "range", "cost"), "assumed")),
+        ("", "zone, range and cost assumed: scaled", dict.fromkeys(("zone", "range", "cost"), "assumed")),
+        ("supplier", "assumed: old", dict.fromkeys(("zone", "range", "cost"), "supplier")),
+        ("zone:measured cost:estimated", "", {"zone": "measured", "cost": "estimated"}),
+        ("cost:measured", "assumed: rest", {"zone": "assumed", "range": "assumed", "cost": "measured"}),
+    ],
+)
+def test_status_of_a_row_is_what_it_states_or_what_its_note_begins_with(status, note, known):
+    own = ta.Drawing.of_rows([{"id": "bore", "plus": 5, "minus": -5, **ROW, "status": status, "note": note}]).sources[0]
+    assert own.known_from == known
+
+
+@pytest.mark.parametrize(
+    "bad", ["guessed", "zone:guessed", "price:assumed", "zone:assumed zone:measured", "assumed cost:measured"]
+)
+def test_unknown_statuses_are_refused_with_what_is_allowed(bad):
+    with pytest.raises(InputError, match="allowed is one of measured, standard, supplier, estimated, assumed for all"):
+        ta.Drawing.of_rows([{"id": "bore", "plus": 5, "minus": -5, **ROW, "status": bad}])
+
+
+def said_of(statuses, **changed):
+    rows = [own | {"status": status} for own, status in zip(ROWS, statuses, strict=True)]
+    model = ta.model(
+        lambda bore, ring, small: 1000 * (bore - ring - small) - 33_000,
+        inputs={"bore": 42.0, "ring": 6.0, "small": 3.0},
+        outputs=(GAP,),
+    )
+    limits = {GAP: ta.Limit(lower=-60.0, upper=30.0)}
+    study = ta.Study(
+        model, ta.Drawing.of_rows(rows), limits=limits, questions=[ta.Allocation(front=False, what_if=False)]
+    )
+    answer = study.allocate(effort="quick")
+    return answer, [text for own in answer.teller.sections if own.first for text in own.paragraphs]
+
+
+def test_study_of_assumed_numbers_alone_says_so_first():
+    answer, paragraphs = said_of(["assumed"] * 3)
+    assert answer.teller.sentences[0].startswith("Every zone, range and cost of this table is assumed")
+    assert answer.teller.before == answer.teller.sentences[:1]
+    assert not any(text.startswith("Assumed, not measured") for text in paragraphs)
+
+
+def test_assumed_prices_are_counted_with_what_they_make_of_the_change_of_cost():
+    answer, paragraphs = said_of(["assumed", "supplier", "zone:measured cost:assumed"])
+    (said,) = [text for text in paragraphs if text.startswith("Assumed, not measured")]
+    drawn = answer.result.drawn_sources
+    moved = [abs(own.cost - 10.0) for own in drawn]
+    share = (moved[0] + moved[2]) / sum(moved)
+    assert "1 of 3 zones, 1 of 3 ranges and 2 of 3 costs" in said
+    assert f"costs make {100 * share:.0f}" in said
+
+
+def test_table_that_says_nothing_of_its_numbers_gets_no_count(told):
+    assert not any("ssumed, not measured" in text for own in told.teller.sections for text in own.paragraphs)
+    assert told.teller.before == ()

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, replace
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -420,3 +422,33 @@ def test_a_cost_that_is_not_convex_is_refused_by_name():
         Stack(name="up", worst_case=np.array([-1.0]), root_sum_square=np.ones(1), budget=1.0)
     with pytest.raises(InputError, match="loss"):
         replace(problem.features[0], loss=-1.0)
+
+
+def test_program_of_a_reducer_whose_first_solves_end_in_rounding_is_solved():
+    """Five limits, one of which hardly leaves room: the interior-point solver broke off with all usual settings."""
+    held = json.loads((Path(__file__).parent / "hard_program.json").read_text(encoding="utf-8"))
+    features = tuple(
+        PricedFeature(
+            name=str(at),
+            processes=(
+                Process(
+                    name="as today",
+                    cost=Reciprocal(factor=own["cost"][0], fixed=own["cost"][1]),
+                    minimum=own["minimum"],
+                    maximum=own["maximum"],
+                ),
+            ),
+        )
+        for at, own in enumerate(held["features"])
+    )
+    stacks = tuple(
+        Stack(**{name: np.array(value) if isinstance(value, list) else value for name, value in own.items()})
+        for own in held["stacks"]
+    )
+    names, bounds = tuple(held["shared"]["names"]), held["shared"]
+    shared = Shared(names=names, lower=np.array(bounds["lower"]), upper=np.array(bounds["upper"]))
+    found = ConvexProgram(features, np.zeros(len(features), int), len(stacks), shared).solve(stacks)
+    assert found is not None
+    assert found.gap < 1e-6
+    for stack in stacks:
+        assert stack.load(found.zones, found.shared) <= stack.budget + 1e-6 * abs(stack.budget)

@@ -18,6 +18,7 @@ from tolalloc.drawings.measured_parts import (
     load_measured_parts,
     named_file,
 )
+from tolalloc.drawings.provenance import STATUSES, parsed_status
 from tolalloc.drawings.sources import INCHES, LENGTHS, PERCENT, Source, is_angular, like_places
 from tolalloc.drawings.zones import Feature, parsed_spectrum, parsed_systematic, spectrum_text, systematic_text
 from tolalloc.reading.files import Record
@@ -123,6 +124,12 @@ def shapes_cell(shapes: tuple[float, ...]) -> Cell:
 def _known_shapes(text: str) -> str:
     """Return the shapes of a row, as they were stated."""
     parsed_shapes(text)
+    return text
+
+
+def _known_status(text: str) -> str:
+    """Return the status of a row, as it was stated."""
+    parsed_status(text)
     return text
 
 
@@ -340,7 +347,15 @@ class ToleranceRow(Record):
             write=lambda source: _written(source, source.uncertainty) or None,
         ),
     ] = 0.0
-    note: Annotated[str, TableColumn("carried through")] = ""
+    status: Annotated[
+        str,
+        AfterValidator(_known_status),
+        TableColumn(
+            f"how its numbers are known: {_alternatives(f'`{word}`' for word in STATUSES)}, for zone, range and cost "
+            "or each as in `zone:measured cost:assumed`; unless given, what the note says before a colon",
+        ),
+    ] = ""
+    note: Annotated[str, TableColumn("carried through; `assumed: …` states how the numbers are known")] = ""
 
     @property
     def name(self) -> str:
@@ -548,8 +563,8 @@ def headers_in(
 ) -> dict[str, str]:
     """Return field → header of its column, in a table whose costs are in cost units or a currency.
 
-    Nominal sizes are in inches where all sources are, and state no unit where some are; like places and gauges have a
-    column where one source states them. What the user's table calls a field comes first.
+    Nominal sizes are in inches where all sources are, and state no unit where some are; like places, uncertainties and
+    statuses have a column where one source states them. What the user's table calls a field comes first.
     """
     lengths = {own.length_name for own in sources} or {"mm"}
     said = {COST_UNITS: cost_unit, "mm": lengths.pop() if len(lengths) == 1 else ""}
@@ -561,7 +576,7 @@ def headers_in(
     }
 
 
-_WHERE_STATED = ("places", "uncertainty")
+_WHERE_STATED = ("places", "uncertainty", "status")
 """Columns that a table has where one of its sources states something there."""
 
 HEADERS = headers_in(COST_UNITS)

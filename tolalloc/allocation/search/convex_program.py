@@ -23,13 +23,18 @@ from tolalloc.allocation.space.problem import (
 )
 from tolalloc.exceptions import SolveError
 
-_ATTEMPTS = (
-    # Gap, violation, both where it may stop if it must [-]; whether rows are scaled
-    (1e-12, 1e-10, 1e-8, True),
-    (1e-9, 1e-9, 1e-8, True),
-    (1e-9, 1e-9, 1e-8, False),
-    (1e-8, 1e-8, 1e-8, True),
-    (1e-8, 1e-8, 1e-6, True),
+_REFINED = {"iterative_refinement_max_iter": 50, "iterative_refinement_reltol": 1e-14}
+_SHORTER = {"equilibrate_enable": False, "max_step_fraction": 0.8, "max_iter": 1000}
+_ATTEMPTS: tuple[tuple[float, float, float, dict[str, float]], ...] = (
+    # Gap, violation, both where it may stop if it must [-]; what else is set: rows unscaled, every linear system solved
+    # more exactly, shorter steps
+    (1e-12, 1e-10, 1e-8, {}),
+    (1e-9, 1e-9, 1e-8, {}),
+    (1e-9, 1e-9, 1e-8, {"equilibrate_enable": False}),
+    (1e-8, 1e-8, 1e-8, {}),
+    (1e-9, 1e-9, 1e-8, _REFINED),
+    (1e-9, 1e-9, 1e-8, _SHORTER),
+    (1e-8, 1e-8, 1e-6, {}),
 )
 """What the solver aims at first, on the scaled program, and then where rounding keeps it from that."""
 _NEGLIGIBLE = 1e-6
@@ -178,7 +183,7 @@ class ConvexProgram:
         import cvxpy as cp
 
         said = ""
-        for gap, violation, reduced, equilibrate in _ATTEMPTS:
+        for gap, violation, reduced, more in _ATTEMPTS:
             settings = {
                 "tol_gap_abs": gap,
                 "tol_gap_rel": gap,
@@ -186,7 +191,8 @@ class ConvexProgram:
                 "reduced_tol_gap_abs": reduced,
                 "reduced_tol_gap_rel": reduced,
                 "reduced_tol_feas": reduced,
-                "equilibrate_enable": equilibrate,
+                "equilibrate_enable": True,
+                **more,
             }
             try:
                 with warnings.catch_warnings():

@@ -30,6 +30,7 @@ from tolalloc.reports.tellers.allocation_drawing import (
     write_drawing,
     zones_figure,
 )
+from tolalloc.reports.tellers.allocation_population import assumed_alone
 from tolalloc.reports.tellers.ranking_tables import sobol_table, work_table
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import short
@@ -67,6 +68,11 @@ class AllocationTeller(Teller[AllocationResult]):
     def assumptions(self) -> tuple[str, ...]:
         """What no source states."""
         return texts.assumptions(self.result, self.header)
+
+    @property
+    def before(self) -> tuple[str, ...]:
+        """That every number of the table is assumed, if so."""
+        return assumed_alone(self.result)
 
     @property
     def headline(self) -> tuple[str, ...]:

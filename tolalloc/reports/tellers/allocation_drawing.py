@@ -26,7 +26,7 @@ from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.tellers.allocation_assembly import assembly_notes
 from tolalloc.reports.tellers.allocation_inspection import add_plan, plan_lines, write_plan
-from tolalloc.reports.tellers.allocation_population import population_note
+from tolalloc.reports.tellers.allocation_population import assumed_sentences, population_note
 from tolalloc.reports.tellers.allocation_sentences import amounts_convention, drawn_amounts
 from tolalloc.reports.tellers.allocation_sheet import drawing_sheet
 from tolalloc.reports.tellers.allocation_workbook import add_calculator
@@ -250,6 +250,7 @@ def risks(result: AllocationResult) -> Iterator[str]:
         key = "risk_driver" if "left" in said else "risk_driver_spent"
         yield _say(key, name=driver, step=_STEP, output=short(result.leading), **said)
     yield from portrait_of(result.model.at(result.chosen.settings)).risks
+    yield from assumed_sentences(result)
     yield _say("risk_not_included", what=portrait_of(result.model).not_included)
 
 

@@ -1,4 +1,4 @@
-"""What a drawing promises for the parts that the shop makes, and what each of its lines demands of them for that."""
+"""What an answer rests on: the parts that it is promised for, what lines demand of them, and how numbers are known."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ from collections.abc import Sequence
 
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.drawings.population import demand, demanded_capabilities
+from tolalloc.drawings.provenance import ASSUMED, CELLS
 from tolalloc.drawings.sources import Source
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.tellers.check import interval_gaps
 from tolalloc.reports.templates import Sentences
+from tolalloc.reports.wording import enumerated
 
 _say = Sentences("allocation")
 
@@ -41,6 +43,30 @@ def population_sentences(result: AllocationResult) -> tuple[str, ...]:
             **interval_gaps(result.evenly.joint),
         ),
     )
+
+
+def assumed_alone(result: AllocationResult) -> tuple[str, ...]:
+    """Return that every number of the table is assumed, if so: the first thing to know of the answer."""
+    known = [own.known_from for own in result.drawn_sources if own.zone > 0.0]
+    every = all(own.get(cell) == ASSUMED for own in known for cell in CELLS)
+    return (_say("assumed_all"),) if known and every else ()
+
+
+def assumed_sentences(result: AllocationResult) -> tuple[str, ...]:
+    """Return how many zones, ranges and costs are assumed, and how much of the changes of cost rests on them."""
+    drawn, before = [own for own in result.drawn_sources if own.zone > 0.0], result.space.errors.sources
+    costs = {own.name: own.cost for own in before}
+    found = {cell: [own for own in drawn if own.known_from.get(cell) == ASSUMED] for cell in CELLS}
+    if assumed_alone(result) or not any(found.values()):
+        return ()
+    moved = {own.name: abs(own.cost - costs[own.name]) for own in drawn}
+    changed, share = sum(moved.values()), ""
+    if changed > 0.0 and found["cost"]:
+        share = _say("assumed_share", share=sum(moved[own.name] for own in found["cost"]) / changed)
+    cells = enumerated(
+        _say("assumed_cells", count=len(own), all=len(drawn), cell=cell) for cell, own in found.items() if own
+    )
+    return (_say("assumed_some", cells=cells, share=share),)
 
 
 def population_note(result: AllocationResult) -> tuple[str, ...]:

@@ -24,7 +24,7 @@ from tolalloc.reports.feature_frame import callout_assumptions
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import Examination, portrait_of
 from tolalloc.reports.tellers.allocation_assembly import assembly_cost_sentences
-from tolalloc.reports.tellers.allocation_population import population_sentences
+from tolalloc.reports.tellers.allocation_population import assumed_alone, population_sentences
 from tolalloc.reports.tellers.check import MORE_PARTS, few_parts, interval_gaps
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import QUICK_RUN, enumerated, number, quantity, short, with_unit
@@ -92,7 +92,13 @@ def headline(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
 def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     """Return the answer in sentences; the first ones stand in the headline of a report."""
     chosen = result.chosen
-    found = [*verdict(result), *population_sentences(result), *drawn_amounts(result), *zones_changed(result)]
+    found = [
+        *assumed_alone(result),
+        *verdict(result),
+        *population_sentences(result),
+        *drawn_amounts(result),
+        *zones_changed(result),
+    ]
     found.append(_cost(result, cost_unit))
     certificate = _certificate(result)
     found += (*assembly_cost_sentences(result, cost_unit), *certificate[:1])
