@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import csv
 import re
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from io import BytesIO, StringIO
+from io import StringIO
 from math import isclose
 from pathlib import Path
 from types import MappingProxyType
@@ -15,9 +14,9 @@ from types import MappingProxyType
 from tolalloc.drawings.fields import cell_of
 from tolalloc.drawings.heads import Heads, split_header
 from tolalloc.drawings.sources import Source, by_row
-from tolalloc.drawings.table_file import is_workbook, sheet_texts
+from tolalloc.drawings.table_file import is_workbook, sheet_texts, write_changed
 from tolalloc.drawings.tolerance_table import heads_of
-from tolalloc.reading.file_content import read_bytes, read_text
+from tolalloc.reading.file_content import read_text
 
 _CHANGED = ("plus", "minus", "cost", "process")
 """Columns of which a drawing may change the cells."""
@@ -56,7 +55,7 @@ class TableFile:
         heads, path = heads_of(self.path, self.columns), folder / f"{self.path.stem}_allocated{self.path.suffix}"
         if is_workbook(self.path):
             texts = sheet_texts(self.path, self.sheet, heads)
-            self._write_workbook(_changes(texts, heads, sources), path)
+            write_changed(self.path, self.sheet, _changes(texts, heads, sources), _FILL, path)
         else:
             text = read_text(self.path, "a table in CSV")
             rows = [*csv.reader(StringIO(text), delimiter=_separator(text))]
@@ -66,20 +65,6 @@ class TableFile:
             csv.writer(out, delimiter=_separator(text), lineterminator="\n").writerows(rows)
             path.write_text(out.getvalue(), encoding="utf-8-sig", newline="")
         return path
-
-    def _write_workbook(self, changes: Changes, path: Path) -> None:
-        from openpyxl import load_workbook
-        from openpyxl.styles import PatternFill
-
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of pictures and rules that are lost, which `written` says
-            book = load_workbook(BytesIO(read_bytes(self.path, "a workbook (XLSX)")))
-        sheet = book[self.sheet] if self.sheet else book.worksheets[0]
-        for (row, column), text in changes.items():
-            cell = sheet.cell(row + 1, column + 1)
-            cell.value = text if isinstance(cell.value, str) and not cell.value.startswith("=") else float(text)
-            cell.fill = PatternFill("solid", fgColor=_FILL)
-        book.save(path)
 
 
 def _separator(text: str) -> str:

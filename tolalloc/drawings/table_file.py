@@ -121,6 +121,36 @@ def hidden_cells(path: Path, sheet: str = "") -> tuple[str, ...]:
     )
 
 
+def write_changed(path: Path, sheet: str, changes: Mapping[tuple[int, int], str], colour: str, written: Path) -> None:
+    """Write a workbook again with other texts or numbers in some cells, marked by a colour.
+
+    A cell that held text holds text; pictures and charts are lost.
+
+    Parameters
+    ----------
+    path, sheet
+        The workbook, and its sheet, the first unless named.
+    changes
+        Row and column of a cell, from 0 → what stands there now.
+    colour
+        Red, green and blue, two hexadecimal digits each.
+    written
+        The new file.
+    """
+    from openpyxl import load_workbook
+    from openpyxl.styles import PatternFill
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of pictures and rules that are lost
+        book = load_workbook(BytesIO(read_bytes(path, "a workbook (XLSX)")))
+    page = book[sheet] if sheet else book.worksheets[0]
+    for (row, column), text in changes.items():
+        cell = page.cell(row + 1, column + 1)
+        cell.value = text if isinstance(cell.value, str) and not cell.value.startswith("=") else float(text)
+        cell.fill = PatternFill("solid", fgColor=colour)
+    book.save(written)
+
+
 def _require_small(path: Path, content: bytes) -> None:
     """Raise if a workbook unpacks to more than is believed; no part gives more than the archive says of it."""
     with ZipFile(BytesIO(content)) as archive:
