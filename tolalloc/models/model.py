@@ -291,7 +291,7 @@ class Model(ABC):
 
 def derived(model: Model, output: str, deviation: Float[np.ndarray, " column"]) -> ResponseWithDerivatives:
     """Return an output of a model with its derivatives by the columns, whose standard deviations make the steps."""
-    if output in model.exact:
+    if output in (*model.exact, *model.differentiable):
         return _Exact(model=model, output=output)
     return DifferencedResponse(response=model.reading((output,)), output=output, steps=_STEP * deviation)
 
