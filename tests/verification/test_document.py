@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pandas as pd
 
 from tests.builders import page_of
@@ -57,3 +59,15 @@ def test_a_short_page_of_one_question_has_neither(tmp_path):
     page = page_of(tmp_path)
     assert '<h1 class="part">' not in page
     assert '<a href="#section-' not in page
+
+
+def test_what_is_better_done_first_stands_before_the_leading_answer_and_nowhere_else():
+    sentence = "Before any zone is tightened: move the nominal."
+    ranking = replace(report("Ranking", 1.0), answer=(sentence, "Pins drive it."), before=(sentence,))
+    ranking = replace(ranking, headlines={"Ranking": (sentence, "Pins drive it.")})
+    drawing = report("Allocation", 2.0)
+    drawing = replace(drawing, sections=(replace(drawing.sections[0], first=True), *drawing.sections[1:]))
+    found = joined("Both", "", [("ranking", ranking), ("allocation", drawing)])
+    assert found.answers == (("Allocation", (sentence, "Allocation answered.")), ("Ranking", ("Pins drive it.",)))
+    assert found.headlines == {"Ranking": ("Pins drive it.",)}
+    assert joined("One", "", [("ranking", ranking)]).answer == (sentence, "Pins drive it.")

@@ -175,8 +175,12 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
 
     @property
     def not_included(self) -> str:
-        """Wear; temperature too where the study states none."""
-        return "wear" if DISC_TEMPERATURE in self.model.conditions else super().not_included
+        """Wear and temperature, as far as neither the study nor one of its load cases states them."""
+        cases = self.model.load_cases
+        warm = DISC_TEMPERATURE in self.model.conditions or any(own.disc_temperature is not None for own in cases)
+        left = [] if any(own.hours for own in cases) else ["wear"]
+        left += [] if warm else ["temperature"]
+        return " and ".join(left) or "shocks and lubrication"
 
     @property
     def spectra_note(self) -> str:
@@ -193,6 +197,10 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
 
     def display_name(self, output: str) -> str:
         """Return what a sentence calls an output; there is one peak-to-peak, and one friction without load."""
+        name, bracket, unit = output.partition(" [")
+        base, _, case = name.rpartition(", ")
+        if any(case == own.name for own in self.model.load_cases):
+            return f"{self.display_name(f'{base}{bracket}{unit}')}, {case}"
         return _SPOKEN.get(output, super().display_name(output).removesuffix(" transmission error"))
 
     def amounts(self, values: Float[np.ndarray, " setting"]) -> Mapping[str, float]:

@@ -201,7 +201,7 @@ def today_values(result: AllocationResult) -> tuple[str, ...]:
         limits=_say("today_all" if several else "today_one"),
         own=_say(own_limit, names=" and ".join(names), word=portrait_of(result.model).settings_word) if names else "",
     )
-    return (said,)
+    return (said.rstrip(),)
 
 
 def _few_parts(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
