@@ -46,7 +46,7 @@ _BELOW_ALL = 99.99
 _LARGE = (24, 15)
 """Rows and columns beyond which a table is folded [-]."""
 
-_SENTENCES = 7
+_SENTENCES = 5
 """Sentences of the first answer on a first page that shows more than sentences [-]."""
 
 _MOVING = "moving"

@@ -83,10 +83,16 @@ def verdict(result: AllocationResult) -> tuple[str, ...]:
     return (fault, _verdict(result)) if fault else (_verdict(result),)
 
 
+def _promise(result: AllocationResult) -> tuple[str, ...]:
+    """Return the verdict and, in one paragraph with it, for which parts it holds."""
+    *fault, found = verdict(result)
+    return (*fault, " ".join((found, *population_sentences(result))))
+
+
 def headline(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     """Return the verdict and the cost."""
     costs = (_cost(result, cost_unit), *assembly_cost_sentences(result, cost_unit))
-    return (*verdict(result), *population_sentences(result), *costs)
+    return (*_promise(result), *costs)
 
 
 def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
@@ -94,12 +100,11 @@ def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     chosen = result.chosen
     found = [
         *assumed_alone(result),
-        *verdict(result),
-        *population_sentences(result),
+        *_promise(result),
         *drawn_amounts(result),
         *zones_changed(result),
+        _cost(result, cost_unit),
     ]
-    found.append(_cost(result, cost_unit))
     certificate = _certificate(result)
     found += (*assembly_cost_sentences(result, cost_unit), *certificate[:1])
     if len(result.requirements) > 1 and not chosen.jointly:

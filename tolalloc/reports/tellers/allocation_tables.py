@@ -114,7 +114,8 @@ def today_frame(result: AllocationResult, cost_unit: str) -> pd.DataFrame:
                 "yield as drawn [%]": 100 * after.joint.estimate,
             }
         )
-    beside = [own for own in result.amounts if own.name not in result.model.drawn_amounts.names]
+    said = {*result.model.drawn_amounts.names} - {*result.space.shared.names}  # with the zones, in a sentence
+    beside = [own for own in result.amounts if own.name not in said]
     rows += [{"drawing": own.name, "as it is": own.before, "as drawn": own.value} for own in beside]
     words = ("shown for", "limit", "binds")
     frame = pd.DataFrame([{**dict.fromkeys(words, ""), **row} for row in rows])
