@@ -78,3 +78,9 @@ def test_what_shows_nothing_is_refused():
         parts_to_show(1.33, 1.2)
     with pytest.raises(InputError, match=r"conformance is 1.*0\.5 to below 1"):
         guard_band(1.0, 1.0)
+
+
+def test_guard_band_that_leaves_no_room_accepts_nothing():
+    found = risks(0.0, 1.0, Limits(lower=-2.0, upper=2.0), 4.0, guard=2.5)
+    assert (found.consumer, found.accepted) == (0.0, 0.0)
+    assert found.producer == pytest.approx(norm.cdf(2.0) - norm.cdf(-2.0))

@@ -15,6 +15,7 @@ from tolalloc.cli.main import app
 from tolalloc.drawings.drawing import load_drawing
 from tolalloc.drawings.qdas_file import read_description
 from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.wings.bench.lots import load_lot
 
 ROW = {"unit": "µm", "min": 2, "max": 60, "cost": 10.0, "uncertainty": 1.5}
 ROWS = [
@@ -169,7 +170,9 @@ def test_zones_that_their_gauges_do_not_resolve_are_named_at_once_on_page_1(told
     ],
 )
 def test_status_of_a_row_is_what_it_states_or_what_its_note_begins_with(status, note, known):
-    own = ta.Drawing.of_rows([{"id": "bore", "plus": 5, "minus": -5, **ROW, "status": status, "note": note}]).sources[0]
+    own = ta.Drawing.of_rows(
+        [{"id": "bore", "plus": 5, "minus": -5, **ROW, "provenance": status, "note": note}]
+    ).sources[0]
     assert own.known_from == known
 
 
@@ -178,11 +181,11 @@ def test_status_of_a_row_is_what_it_states_or_what_its_note_begins_with(status, 
 )
 def test_unknown_statuses_are_refused_with_what_is_allowed(bad):
     with pytest.raises(InputError, match="allowed is one of measured, standard, supplier, estimated, assumed for all"):
-        ta.Drawing.of_rows([{"id": "bore", "plus": 5, "minus": -5, **ROW, "status": bad}])
+        ta.Drawing.of_rows([{"id": "bore", "plus": 5, "minus": -5, **ROW, "provenance": bad}])
 
 
 def said_of(statuses, **changed):
-    rows = [own | {"status": status} for own, status in zip(ROWS, statuses, strict=True)]
+    rows = [own | {"provenance": status} for own, status in zip(ROWS, statuses, strict=True)]
     model = ta.model(
         lambda bore, ring, small: 1000 * (bore - ring - small) - 33_000,
         inputs={"bore": 42.0, "ring": 6.0, "small": 3.0},
@@ -216,3 +219,41 @@ def test_assumed_prices_are_counted_with_what_they_make_of_the_change_of_cost():
 def test_table_that_says_nothing_of_its_numbers_gets_no_count(told):
     assert not any("ssumed, not measured" in text for own in told.teller.sections for text in own.paragraphs)
     assert told.teller.before == ()
+
+
+def test_line_of_several_sizes_or_gauges_is_parted_in_the_plan_and_a_gauge_too_coarse_is_no_end(tmp_path):
+    rows = [own | {"group": "seats", "max": 60} for own in ROWS[:2]] + [ROWS[2] | {"uncertainty": 40.0}]
+    rows[1] |= {"plus": 25, "minus": -25, "Cp": 1.0}
+    model = ta.model(
+        lambda bore, ring, small: 1000 * (bore - ring - small) - 33_000,
+        inputs={"bore": 42.0, "ring": 6.0, "small": 3.0},
+        outputs=(GAP,),
+    )
+    limits = {GAP: ta.Limit(lower=-60.0, upper=60.0)}
+    study = ta.Study(
+        model, ta.Drawing.of_rows(rows), limits=limits, questions=[ta.Allocation(front=False, what_if=False)]
+    )
+    answer = study.allocate(effort="quick")
+    answer.teller.add_files(tmp_path)
+    plan = plan_of(tmp_path)
+    assert [own["nominal [mm]"] for own in plan] == [42, 6, 3]
+    assert plan[2]["accept to [mm]"] == "no reading can show it"
+    assert [own.fields["K2101"] for own in read_description(tmp_path / "inspection.dfd").values()] == [
+        "42.000000",
+        "6.000000",
+        "3.000000",
+    ]
+
+
+def test_lot_pools_the_values_of_like_places_of_one_name(folder, tmp_path):
+    text = (folder / "inspection.dfd").read_text(encoding="utf-8").replace("K2003/3 small", "K2003/3 bore")
+    text = text.replace("K2101/3 3.000000", "K2101/3 42.000000")
+    generator = np.random.default_rng(1)
+    lines = [
+        "\x0f".join(f"{size + 1e-3 * own:.6f}" for size, own in zip((42.0, 6.005, 42.0), row, strict=True))
+        for row in generator.standard_normal((20, 3))
+    ]
+    lot = tmp_path / "lot.dfq"
+    lot.write_text(text + "\r\n".join(lines), encoding="utf-8")
+    columns = load_lot(lot, load_drawing(folder / "allocation.csv").sources)
+    assert {own.name: own.taken.size for own in columns} == {"bore": 40, "ring": 20}

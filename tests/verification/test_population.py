@@ -113,12 +113,33 @@ def test_demands_of_a_line_are_what_its_row_states():
         return demand(drawing(**row).sources[0])
 
     assert of() == "Cp ≥ 1, centred"
-    assert of(Cp=1.33, shift=-0.2) == "Cp ≥ 1.33, mean 20% of the half zone off at most"
+    assert of(Cp=1.33, shift=-0.2) == "Cp ≥ 1.33, mean 20% of the half zone below its middle"
     assert of(distribution="uniform") == "no more than evenly spread"
     assert of(distribution="triangular") == "Cp ≥ 1, centred, triangular"
     assert of(sorted=True, Cp=0.8) == "Cp ≥ 0.8, centred, all parts inspected"
     position = ta.Drawing.of_rows([{"id": "hole", "feature": "position", **ROW, "minus": 0}])
     assert demand(position.sources[0]) == "Cp ≥ 1"
+
+
+def test_promise_names_a_mean_off_the_middle_only_as_what_lines_demand():
+    answer = study(shift=0.3).allocate(effort="quick")
+    (said,) = [own for own in answer.teller.sentences if "This holds for parts with" in own]
+    assert "the mean and spread that each line demands" in said
+    assert "Cp 1 about the middle" not in said
+
+
+def test_drawing_for_parts_anywhere_in_their_zones_demands_the_zones_alone(tmp_path):
+    answer = study(population=ANYWHERE).allocate(effort="quick")
+    answer.teller.add_files(tmp_path)
+    described = (tmp_path / "inspection.dfd").read_text(encoding="utf-8")
+    assert described.count("K2900") == described.count("the zone alone") == 3
+    assert not any("This holds for parts" in own for own in answer.teller.sentences)
+
+
+def test_zones_opened_for_their_gauges_are_said():
+    notes = Prepared(study=study(limit=30.0, uncertainty=2.5, gauge_ratio=10.0)).notes
+    assert any("a 20 µm → 25 µm" in own for own in notes)
+    assert not any("Opened" in own for own in Prepared(study=study(uncertainty=1.0, gauge_ratio=10.0)).notes)
 
 
 def test_smallest_zones_are_those_that_gauges_resolve_and_open_ones_cost_as_one_over_the_zone():

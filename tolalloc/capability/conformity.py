@@ -93,6 +93,8 @@ def risks(mean: float, deviation: float, limits: Limits, expanded: float, guard:
     error = expanded / COVERAGE
 
     process = norm(mean, deviation)
+    if not lower + guard < upper - guard:  # no reading is accepted
+        return Risks(consumer=0.0, producer=float(process.cdf(upper) - process.cdf(lower)), accepted=0.0)
     if not error > 0.0:
         inside = process.cdf(upper - guard) - process.cdf(lower + guard)
         both = process.cdf(min(upper, upper - guard)) - process.cdf(max(lower, lower + guard))

@@ -207,6 +207,26 @@ class Drawing:
             return found
         return replace(found, sources=tuple(self._gauged(own) for own in found.sources))
 
+    def _has_prices(self, source: Source) -> bool:
+        """Return whether process costs may say what a source costs at another zone."""
+        return (
+            bool({source.name, source.own_id} & {*self.costs}) if isinstance(self.costs, Mapping) else bool(self.costs)
+        )
+
+    @property
+    def opened(self) -> str:
+        """Which zones were too fine for their gauges and were opened, a sentence; nothing where none was."""
+        rows = zip(self.errors.sources, self.as_asked.sources, strict=True)
+        told = [
+            f"{own.own_id or own.name} {own.said(own.zone)} → {new.said(new.zone)}"
+            for own, new in rows
+            if new.zone != own.zone
+        ]
+        if not told:
+            return ""
+        rows_opened = ", ".join(told)
+        return f"Opened to {self.gauge_ratio:g} times the uncertainty of their gauges, before all else: {rows_opened}."
+
     def _gauged(self, source: Source) -> Source:
         """Return a source whose smallest zone its gauge resolves, its cost as 1/zone where its zone is opened."""
         least = self.gauge_ratio * source.uncertainty
@@ -216,7 +236,7 @@ class Drawing:
         if least > source.maximum:
             allowed = f"{least / MICROMETRE:g} µm or more, for {told}"
             raise InputError.at(f"{self.name} ({source.name})", "max", f"{source.maximum / MICROMETRE:g} µm", allowed)
-        if least > source.zone and self.costs:
+        if least > source.zone and self._has_prices(source):
             allowed = f"{least / MICROMETRE:g} µm or more with process costs, for {told}"
             raise InputError.at(f"{self.name} ({source.name})", "zone", f"{source.zone / MICROMETRE:g} µm", allowed)
         zone = max(source.zone, least)

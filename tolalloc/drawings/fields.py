@@ -18,7 +18,7 @@ from tolalloc.drawings.measured_parts import (
     load_measured_parts,
     named_file,
 )
-from tolalloc.drawings.provenance import STATUSES, parsed_status
+from tolalloc.drawings.provenance import STATUSES, parsed_provenance
 from tolalloc.drawings.sources import INCHES, LENGTHS, PERCENT, Source, is_angular, like_places
 from tolalloc.drawings.zones import Feature, parsed_spectrum, parsed_systematic, spectrum_text, systematic_text
 from tolalloc.reading.files import Record
@@ -127,9 +127,9 @@ def _known_shapes(text: str) -> str:
     return text
 
 
-def _known_status(text: str) -> str:
-    """Return the status of a row, as it was stated."""
-    parsed_status(text)
+def _known_provenance(text: str) -> str:
+    """Return the provenance of a row, as it was stated."""
+    parsed_provenance(text)
     return text
 
 
@@ -347,9 +347,9 @@ class ToleranceRow(Record):
             write=lambda source: _written(source, source.uncertainty) or None,
         ),
     ] = 0.0
-    status: Annotated[
+    provenance: Annotated[
         str,
-        AfterValidator(_known_status),
+        AfterValidator(_known_provenance),
         TableColumn(
             f"how its numbers are known: {_alternatives(f'`{word}`' for word in STATUSES)}, for zone, range and cost "
             "or each as in `zone:measured cost:assumed`; unless given, what the note says before a colon",
@@ -576,7 +576,7 @@ def headers_in(
     }
 
 
-_WHERE_STATED = ("places", "uncertainty", "status")
+_WHERE_STATED = ("places", "uncertainty", "provenance")
 """Columns that a table has where one of its sources states something there."""
 
 HEADERS = headers_in(COST_UNITS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from tolalloc.drawings.distributions import Distribution
@@ -99,7 +100,9 @@ def demand(source: Source) -> str:
         return "no more than evenly spread"
     said = [f"Cp ≥ {source.cp:.3g}"]
     if source.feature is Feature.SIZE and not source.distribution.form.is_one_sided and not source.batches:
-        said.append(f"mean {abs(source.shift):.0%} of the half zone off at most" if source.shift else "centred")
+        side = "above" if source.shift > 0 else "below"
+        off = f"mean {abs(source.shift):.0%} of the half zone {side} its middle"
+        said.append(off if source.shift else "centred")
     if source.batches:
         said = ["batches as stated"]
     elif source.distribution is not Distribution.NORMAL:
@@ -109,7 +112,11 @@ def demand(source: Source) -> str:
     return ", ".join(said)
 
 
-def demanded_capabilities(sources: tuple[Source, ...]) -> tuple[float, float]:
-    """Return the smallest and the largest Cp that the lines of a drawing demand [-]."""
-    stated = [own.cp for own in sources if own.zone > 0.0 and not own.measured and not own.batches]
-    return (min(stated), max(stated)) if stated else (0.0, 0.0)
+def demanded_capabilities(sources: Sequence[Source]) -> tuple[float, float] | None:
+    """Return the smallest and the largest Cp that the lines demand, where all demand no more than to be centred [-].
+
+    None where one demands a mean off the middle, another distribution than the normal one, or what was measured.
+    """
+    drawn = [own for own in sources if own.zone > 0.0]
+    plain = all(own.distribution is Distribution.NORMAL and not (own.shift or own.sorted) for own in drawn)
+    return (min(own.cp for own in drawn), max(own.cp for own in drawn)) if drawn and plain else None

@@ -13,7 +13,7 @@ _BY_NOTE = re.compile(rf"\b({'|'.join(STATUSES)})\s*:", re.IGNORECASE)
 """A status at the head of a note, or of a part of it, as in ``assumed: as for like bores``."""
 
 
-def parsed_status(text: str) -> dict[str, str]:
+def parsed_provenance(text: str) -> dict[str, str]:
     """Return cell → status of what a table states: one word for all three, or some as ``zone:measured cost:assumed``.
 
     Raises
@@ -23,7 +23,7 @@ def parsed_status(text: str) -> dict[str, str]:
 
     Examples
     --------
-    >>> parsed_status("zone:measured cost:assumed"), parsed_status("supplier")["range"]
+    >>> parsed_provenance("zone:measured cost:assumed"), parsed_provenance("supplier")["range"]
     ({'zone': 'measured', 'cost': 'assumed'}, 'supplier')
     """
     found = dict[str, str]()
@@ -39,7 +39,7 @@ def parsed_status(text: str) -> dict[str, str]:
     return found
 
 
-def status_of(stated: str, note: str) -> dict[str, str]:
+def provenance_of(stated: str, note: str) -> dict[str, str]:
     """Return cell → status of a row: what it states, else what its note begins with; nothing where neither says it."""
     by_note = _BY_NOTE.search(note)
-    return (dict.fromkeys(CELLS, by_note[1].lower()) if by_note else {}) | parsed_status(stated)
+    return (dict.fromkeys(CELLS, by_note[1].lower()) if by_note else {}) | parsed_provenance(stated)

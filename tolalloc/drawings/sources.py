@@ -16,7 +16,7 @@ from jaxtyping import Float
 
 from tolalloc.drawings.distributions import NORMAL, RAYLEIGH, Batch, Distribution, Marginal, Mixture
 from tolalloc.drawings.measured_parts import MeasuredParts
-from tolalloc.drawings.provenance import status_of
+from tolalloc.drawings.provenance import provenance_of
 from tolalloc.drawings.zones import Feature, Spectrum, Systematic, ZoneMapping
 from tolalloc.reading.units import INCH, MICROMETRE, MILLIMETRE
 
@@ -165,7 +165,7 @@ class Source:
     own_id: str = ""  # What the user's table calls it, if that is not its name
     note: str = ""
     uncertainty: float = 0.0  # Expanded uncertainty (k = 2) of its gauge, 0 where nobody says [m]
-    status: str = ""  # How zone, range and cost are known, as the table states it
+    provenance: str = ""  # How zone, range and cost are known, as the table states it
     # Head and cell of every column of the user's own that is none of a tolerance table; kept, and written again
     own_cells: tuple[tuple[str, str], ...] = ()
     # Unit in which the user's table states its zone: µm, mm, in, or % of the nominal size. It changes nothing that is
@@ -184,7 +184,7 @@ class Source:
     @property
     def known_from(self) -> dict[str, str]:
         """Cell (zone, range, cost) → how it is known, as far as the row or its note says."""
-        return status_of(self.status, self.note)
+        return provenance_of(self.provenance, self.note)
 
     @property
     def is_resolved(self) -> bool:

@@ -142,13 +142,24 @@ def write_changed(path: Path, sheet: str, changes: Mapping[tuple[int, int], str]
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of pictures and rules that are lost
-        book = load_workbook(BytesIO(read_bytes(path, "a workbook (XLSX)")))
+        content = BytesIO(read_bytes(path, "a workbook (XLSX)"))
+        book = load_workbook(content, keep_vba=path.suffix.lower() == ".xlsm")
     page = book[sheet] if sheet else book.worksheets[0]
     for (row, column), text in changes.items():
         cell = page.cell(row + 1, column + 1)
-        cell.value = text if isinstance(cell.value, str) and not cell.value.startswith("=") else float(text)
+        cell.value = _as_before(text, cell)
         cell.fill = PatternFill("solid", fgColor=colour)
     book.save(written)
+
+
+def _as_before(text: str, cell: Any) -> str | float:
+    """Return a text as the value of a cell that held one, or the number that it is in the unit of its format."""
+    was_text = isinstance(cell.value, str) and not cell.value.startswith("=")
+    try:
+        value = plain_number(text.replace(",", "."))
+    except ValueError:
+        return text
+    return text if was_text else value / 100.0 if "%" in str(cell.number_format) else value
 
 
 def _require_small(path: Path, content: bytes) -> None:
@@ -320,11 +331,7 @@ def _without_titles(rows: Sequence[tuple[str, ...]], heads: Heads) -> list[tuple
 def _records(path: Path, heads: Heads = _ANY) -> list[NumberedRow]:
     """Return the records of a CSV file; what separates them is seen from the header, # starts a comment."""
     text = read_text(path, "a table in CSV")
-    lines = _without_comments(StringIO(text))
-    roughly = [[own.strip(' "') for own in re.split(r"[;,\t|]", line.strip())] for line in lines[:MOST_TITLES]]
-    at = heads.row_in(roughly)
-    header = lines[at] if at else next((line for line in lines if line.strip()), "")
-    separator = next((mark for mark in ";\t|" if mark in header), ",")
+    lines, separator = csv_lines(text, heads)
     rows, so_far = list[tuple[str, ...]](), 0
     try:
         for record in csv.reader(lines, delimiter=separator, strict=True):
@@ -347,6 +354,15 @@ def _records(path: Path, heads: Heads = _ANY) -> list[NumberedRow]:
     if separator == "," or not kept:
         return kept
     return kept[:1] + _with_decimal_points(path, kept[1:], [heads.kind(name) for name in kept[0][1]], bool(heads.known))
+
+
+def csv_lines(text: str, heads: Heads = _ANY) -> tuple[list[str], str]:
+    """Return the lines of a CSV file with blank ones for comments, and what separates its cells by its header."""
+    lines = _without_comments(StringIO(text))
+    roughly = [[own.strip(' "') for own in re.split(r"[;,\t|]", line.strip())] for line in lines[:MOST_TITLES]]
+    at = heads.row_in(roughly)
+    header = lines[at] if at else next((line for line in lines if line.strip()), "")
+    return lines, next((mark for mark in ";\t|" if mark in header), ",")
 
 
 def _without_comments(lines: Iterable[str]) -> list[str]:

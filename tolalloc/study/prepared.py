@@ -98,6 +98,7 @@ class Prepared:
         return (
             *stated,
             *((taken_as(population),) if population != STATED else ()),
+            *filter(None, [self.study.drawing and self.study.drawing.opened]),
             *((_SHARED.format(lines=shared),) if shared else ()),
             *((_ASSEMBLED.format(label=choice_label(acting)),) if acting else ()),
             *((_AS_THEY_COME.format(labels=asked),) if asked and not acting else ()),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import date
 from pathlib import Path
+from warnings import warn
 
 import numpy as np
 import pandas as pd
@@ -15,6 +16,7 @@ from tolalloc.allocation.space.requirement import AtYield
 from tolalloc.drawings.sources import RESOLVED, Source, by_row, length_unit, zone_in, zone_unit
 from tolalloc.drawings.table_file import setting_line
 from tolalloc.drawings.tolerance_table import heads_file, heads_text, table_frame
+from tolalloc.exceptions import InputError
 from tolalloc.reading.file_content import is_file
 from tolalloc.reading.units import COST_UNITS, MICROMETRE, unit_of
 from tolalloc.reports.columns import Column, Table, own_words, span
@@ -256,15 +258,16 @@ def risks(result: AllocationResult) -> Iterator[str]:
 
 def _too_fine(result: AllocationResult) -> Iterator[str]:
     """Yield which zones their gauges do not resolve, all in one sentence."""
+    coarsest = [(own, max(own[1], key=lambda member: member.uncertainty)) for own in result.lines]
     lines = [
         _say(
             "risk_gauge_line",
-            name=result.line_name(own),
-            zone=first.zone / MICROMETRE,
-            gauge=first.uncertainty / MICROMETRE,
+            name=result.line_name(line),
+            zone=own.zone / MICROMETRE,
+            gauge=own.uncertainty / MICROMETRE,
         )
-        for own in result.lines
-        if not (first := own[1][0]).is_resolved
+        for line, own in coarsest
+        if not own.is_resolved
     ]
     if lines:
         yield _say("risk_gauge", times=RESOLVED, lines=", ".join(lines))
@@ -315,9 +318,17 @@ def write_drawing(result: AllocationResult, header: Header, folder: Path) -> Non
     (folder / "drawing.xlsx").write_bytes(book.content())
     write_sheet(drawing_sheet(result, header, plan, date.today()), folder / "frames.dxf")
     write_plan(plan, header.name, folder / "inspection.dfd")
+    _return_table(result, folder)
+
+
+def _return_table(result: AllocationResult, folder: Path) -> None:
+    """Write a user's own table with the new zones; one that cannot say them, or is gone, stops no report."""
     own = result.space.errors.file
-    if own and is_file(own.path) and own.is_own:
-        own.written(result.drawn_sources, folder)
+    try:
+        if own and is_file(own.path) and own.is_own:
+            own.written(result.space.errors.sources, result.drawn_sources, folder)
+    except (InputError, OSError) as fault:
+        warn(f"The table is not returned beside the report: {fault}", stacklevel=2)
 
 
 def _table_comments(result: AllocationResult, header: Header, notes: Sequence[str]) -> list[str]:

@@ -13,6 +13,7 @@ from tolalloc.allocation.result import AllocationResult
 from tolalloc.capability.conformity import Risks, guard_band, parts_to_show, risks
 from tolalloc.capability.indices import Limits
 from tolalloc.drawings.distributions import Distribution
+from tolalloc.drawings.population import demand
 from tolalloc.drawings.qdas_file import Described, write_description
 from tolalloc.drawings.sources import Source
 from tolalloc.drawings.zones import Feature
@@ -42,6 +43,7 @@ class PlanLine:
     name: str  # Of the line of the drawing
     members: tuple[Source, ...]  # As drawn, alike
     frame: FeatureFrame
+    demand: str  # What it demands of the population of its parts
     index: float  # Total-effect index of its dimension as drawn [%]
     is_driver: bool  # Whether it is among the lines that make up most of all indices
 
@@ -62,20 +64,18 @@ class PlanLine:
         return Limits(lower=lower, upper=upper)
 
     @property
-    def acceptance(self) -> Limits:
-        """What a reading must keep so that the part keeps the limits with 95 % [m]."""
+    def acceptance(self) -> Limits | None:
+        """What a reading must keep so that the part keeps the limits with 95 %; none where no reading can [m]."""
         guard, own = guard_band(self.first.uncertainty), self.limits
-        return Limits(
-            lower=None if own.lower is None else own.lower + guard,
-            upper=None if own.upper is None else own.upper - guard,
-        )
+        lower, upper = None if own.lower is None else own.lower + guard, (own.upper or 0.0) - guard
+        return Limits(lower=lower, upper=upper) if upper > max(lower or 0.0, 0.0 if lower is None else lower) else None
 
     @property
     def risks(self) -> Risks | None:
         """How often its gauge decides wrongly with this acceptance; not known of vectors and without a gauge."""
         own = self.first
         is_normal = own.feature is Feature.SIZE and own.distribution is Distribution.NORMAL and not own.sorted
-        if not own.uncertainty or not is_normal or not self.frame.is_deviation:
+        if not own.uncertainty or not is_normal or not self.frame.is_deviation or self.acceptance is None:
             return None
         mean, deviation = (number * own.zone for number in own.zone_mapping.moments)
         return risks(mean + own.middle, deviation, self.limits, own.uncertainty, guard_band(own.uncertainty))
@@ -89,23 +89,36 @@ class PlanLine:
 def plan_lines(result: AllocationResult, indices: dict[str, float]) -> tuple[PlanLine, ...]:
     """Return the plan: every line of the drawing in its order, with the indices of its dimensions [%]."""
     portrait, drivers = portrait_of(result.model), {*_drivers(indices)}
+    lines = [(own, members) for own in result.lines for members in _alike(own[1])]
     return tuple(
         PlanLine(
             number=number,
-            name=_name(result, dimension, members),
+            name=_name(result, dimension, every, members),
             members=members,
             frame=portrait.frame(members[0]),
+            demand=demands(result, members),
             index=indices.get(dimension, np.nan),
             is_driver=dimension in drivers,
         )
-        for number, (dimension, members) in enumerate(result.lines, start=1)
+        for number, ((dimension, every), members) in enumerate(lines, start=1)
     )
 
 
-def _name(result: AllocationResult, dimension: str, members: tuple[Source, ...]) -> str:
+def _alike(members: Sequence[Source]) -> list[tuple[Source, ...]]:
+    """Return the members of a line parted by what is measured: nominal size, gauge and population."""
+    found: dict[tuple[object, ...], list[Source]] = {}
+    for own in members:
+        found.setdefault((own.nominal, own.uncertainty, demand(own), own.drawing), []).append(own)
+    return [tuple(own) for own in found.values()]
+
+
+def _name(result: AllocationResult, dimension: str, every: tuple[Source, ...], members: tuple[Source, ...]) -> str:
     """Return what the drawing calls a line: the word that all its members have, else the name of the line."""
     labels = {own.label for own in members}
-    return labels.pop() if len(labels) == 1 and all(labels) else result.line_name((dimension, members))
+    if len(labels) == 1 and all(labels):
+        return labels.pop()
+    name = result.line_name((dimension, every))
+    return name if len(members) == len(every) else f"{dimension}: {', '.join(own.name for own in members)}"
 
 
 def _drivers(indices: dict[str, float]) -> Iterator[str]:
@@ -124,9 +137,12 @@ def plan_table(lines: Sequence[PlanLine]) -> Table[PlanLine]:
     def limit(side: str, of: str) -> Column[PlanLine]:
         head = {"limits": f"{side} limit [mm]", "acceptance": f"accept {'from' if side == 'lower' else 'to'} [mm]"}[of]
 
-        def shown(row: PlanLine) -> float:
-            found = getattr(getattr(row, of), side)
-            return np.nan if found is None else round(found / MILLIMETRE, 6)
+        def shown(row: PlanLine) -> float | str:
+            limits = getattr(row, of)
+            found = None if limits is None else getattr(limits, side)
+            if limits is None and side == "upper":
+                return _say("plan_no_reading")
+            return "" if found is None else round(found / MILLIMETRE, 6)
 
         return Column(head, shown)
 
@@ -143,7 +159,7 @@ def plan_table(lines: Sequence[PlanLine]) -> Table[PlanLine]:
         Column("nominal [mm]", lambda row: row.first.nominal / MILLIMETRE),
         limit("lower", "limits"),
         limit("upper", "limits"),
-        Column("population", lambda row: demands(row.members)),
+        Column("population", lambda row: row.demand),
         Column("gauge U [µm]", lambda row: row.first.uncertainty / MICROMETRE or "", nothing=""),
         *(
             (limit("lower", "acceptance"), limit("upper", "acceptance"))
@@ -181,5 +197,5 @@ def _described(line: PlanLine) -> Described:
         lower=None if line.limits.lower is None else line.limits.lower / MILLIMETRE,
         upper=(line.limits.upper or 0.0) / MILLIMETRE,
         is_driver=line.is_driver,
-        remark=demands(line.members),
+        remark=line.demand,
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from tolalloc.allocation.result import AllocationResult
+from tolalloc.allocation.space.requirement import WorstCase
 from tolalloc.drawings.population import demand, demanded_capabilities
 from tolalloc.drawings.provenance import ASSUMED, CELLS
 from tolalloc.drawings.sources import Source
@@ -16,16 +17,22 @@ from tolalloc.reports.wording import enumerated
 _say = Sentences("allocation")
 
 
-def demands(members: Sequence[Source]) -> str:
-    """Return what a line demands of its parts beside the zone: of all its members, where they differ."""
+def demands(result: AllocationResult, members: Sequence[Source]) -> str:
+    """Return what a line demands of its parts beside the zone: of all its members, where they differ.
+
+    Nothing where the worst unit inside the zones is promised.
+    """
+    if all(isinstance(own.guarantee, WorstCase) for own in result.requirements):
+        return _say("population_none")
     return "; ".join(dict.fromkeys(map(demand, members)))
 
 
 def _capability(result: AllocationResult) -> str:
     """Return what all lines demand in short."""
-    low, high = demanded_capabilities(result.drawn_sources)
-    if not high:
+    found = demanded_capabilities(result.drawn_sources)
+    if found is None:
         return _say("population_stated")
+    low, high = found
     return _say("population_cp" if low == high else "population_cps", low=low, high=high)
 
 

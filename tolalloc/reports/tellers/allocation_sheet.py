@@ -14,7 +14,7 @@ from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import Portrait, portrait_of
 from tolalloc.reports.tellers.allocation_assembly import assembly_notes
 from tolalloc.reports.tellers.allocation_inspection import PlanLine
-from tolalloc.reports.tellers.allocation_population import demands, population_note
+from tolalloc.reports.tellers.allocation_population import population_note
 from tolalloc.reports.tellers.allocation_sentences import amounts_convention, drawn_amounts, examined, verdict
 from tolalloc.reports.templates import Sentences
 from tolalloc.reports.wording import number, quantity
@@ -58,7 +58,7 @@ def _lines(result: AllocationResult, plan: Sequence[PlanLine]) -> tuple[list[Pla
 def _framed(line: PlanLine) -> SheetFrame:
     """Return a frame beside the name of its dimension, which says where the zone holds."""
     name = f"{line.name}, {line.frame.place}" if line.frame.place else line.name
-    return SheetFrame(number=line.number, name=name, frame=line.frame, demand=demands(line.members))
+    return SheetFrame(number=line.number, name=name, frame=line.frame, demand=line.demand)
 
 
 def _table(key: str, rows: Sequence[tuple[str, ...]], widths: tuple[float, ...]) -> SheetTable:
@@ -76,7 +76,7 @@ def _inspection(lines: Sequence[PlanLine]) -> tuple[SheetTable, ...]:
             " ".join(filter(None, (own.frame.symbol, own.frame.characteristic))),
             own.frame.zone,
             _AXIS if own.frame.symbol else "",
-            demands(own.members),
+            own.demand,
         )
         for own in lines
     ]

@@ -367,7 +367,8 @@ def _table(path: Path, sources: Sequence[Source]) -> TextTable:
 def _of_measuring_room(path: Path, sources: Sequence[Source]) -> TextTable:
     """Return the valid values of a Q-DAS file below the short names, else the names, of its characteristics.
 
-    Of a position a value is a diameter, of any other feature an actual size, as far from nominal as it deviates.
+    Those of one name, such as like places, stand in one column. Of a position a value is a diameter, of any other
+    feature an actual size, as far from nominal as it deviates.
     """
     positions = {name for own in sources if own.feature is Feature.POSITION for name in (own.name, own.own_id) if name}
     columns = dict[str, list[str]]()
@@ -379,7 +380,7 @@ def _of_measuring_room(path: Path, sources: Sequence[Source]) -> TextTable:
         nominal = 0.0 if name in positions else qdas_number(own.fields.get("K2101", "") or "0")
         head = f"{name}.diameter [{unit}]" if name in positions else f"{name} [{unit}]"
         values = [(qdas_number(text) - nominal, text) for text, attribute in own.values if attribute == VALID]
-        columns[head] = [text if isnan(value) else f"{value:.9g}" for value, text in values]
+        columns.setdefault(head, []).extend(text if isnan(value) else f"{value:.9g}" for value, text in values)
     count = max(map(len, columns.values()), default=0)
     cells = zip(*(own + [""] * (count - len(own)) for own in columns.values()), strict=True)
     return TextTable(path=path, headers=tuple(columns), rows=tuple(range(1, count + 1)), cells=tuple(cells))
