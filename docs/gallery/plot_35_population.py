@@ -5,8 +5,8 @@ What parts do to a promise
 Share of gaps inside their limits for four populations of the parts of one drawing, all of which keep its zones or what
 it demands of them.
 
-**Read off it:** parts spread evenly obey every zone, yet one gap in twelve is lost, more than at Cp 0.67, where some parts
-lie outside their zones.
+**Read off it:** parts spread evenly obey every zone, yet one gap in twelve is lost, more than at Cp 0.67, where some
+parts lie outside their zones.
 """
 
 import matplotlib.pyplot as plt

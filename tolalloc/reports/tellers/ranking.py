@@ -104,8 +104,12 @@ class RankingTeller(Teller[RankingResult]):
 
     @property
     def headline(self) -> tuple[str, ...]:
-        """The first drivers, in one sentence."""
-        return (*self._led(), *self._centre(), _named_drivers(self.result.indices, self._output))
+        """The first drivers, in one sentence; those of the limit that the study states first in another one."""
+        found, first = self.result, self.result.first_limited
+        drivers = [_named_drivers(found.indices, self._output)]
+        if first != found.leading and first not in found.sobol.constant:
+            drivers.append(_named_drivers(found.sobol.of(first), self._portrait.display_name(first)))
+        return (*self._led(), *self._centre(), *drivers)
 
     @cached_property
     def _portrait(self) -> Portrait[Any]:
