@@ -44,7 +44,10 @@ def test_a_stack_off_the_middle_says_which_nominal_moves_it_there():
     assert found.now == pytest.approx(norm.cdf(0.02 / sigma) - norm.cdf(-0.14 / sigma), abs=0.045)
     assert found.moved == pytest.approx(2 * norm.cdf(0.08 / sigma) - 1, abs=0.035)
     said = answer.sentences[0]
-    assert said.startswith("The mean of gap lies 0.0") and "above the middle of its limits" in said
+    assert (
+        said.startswith("Before any zone is tightened: the mean of gap lies 0.0")
+        and "above the middle of its limits" in said
+    )
     assert f"nominal of {found.source} moved by" in said
     pp, ppk = 0.08 / (3 * sigma), 0.02 / (3 * sigma)
     assert f"Pp {pp:.1f}" in said and f"Ppk {ppk:.1f}" in said

@@ -21,6 +21,8 @@ ROWS = (
     {
         "id": "b",
         "places": "1x",
+        "uncertainty": "0.001",
+        "provenance": "assumed",
         "plus": 12.5,
         "minus": -12.5,
         "unit": "µm",

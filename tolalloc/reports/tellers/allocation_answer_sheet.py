@@ -90,7 +90,7 @@ def add_answer(book: Book, result: AllocationResult, header: Header, watched: pd
     rows.sheet.cell(1, 1, bold=True, font_size=14)
     quick = f" {_say('sheet_quick')}" if header.quick else ""
     rows.across(_say("sheet_study", study=header.name, digest=header.digest[:12] or "not known", quick=quick))
-    rows.across(" ".join(texts.verdict(result)), name=_say("sheet_verdict"))
+    rows.across(" ".join(texts.promise(result)), name=_say("sheet_verdict"))
     rows.sheet.cell(3, 2, **(_GOOD if result.met and not texts.examined(result).fault else _BAD))
     _guard(rows, groups)
     _limits(rows, result, watched)

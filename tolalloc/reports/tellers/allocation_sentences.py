@@ -83,7 +83,7 @@ def verdict(result: AllocationResult) -> tuple[str, ...]:
     return (fault, _verdict(result)) if fault else (_verdict(result),)
 
 
-def _promise(result: AllocationResult) -> tuple[str, ...]:
+def promise(result: AllocationResult) -> tuple[str, ...]:
     """Return the verdict and, in one paragraph with it, for which parts it holds."""
     *fault, found = verdict(result)
     return (*fault, " ".join((found, *population_sentences(result))))
@@ -92,7 +92,7 @@ def _promise(result: AllocationResult) -> tuple[str, ...]:
 def headline(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     """Return the verdict and the cost."""
     costs = (_cost(result, cost_unit), *assembly_cost_sentences(result, cost_unit))
-    return (*_promise(result), *costs)
+    return (*promise(result), *costs)
 
 
 def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
@@ -100,7 +100,7 @@ def sentences(result: AllocationResult, cost_unit: str) -> tuple[str, ...]:
     chosen = result.chosen
     found = [
         *assumed_alone(result),
-        *_promise(result),
+        *promise(result),
         *drawn_amounts(result),
         *zones_changed(result),
         _cost(result, cost_unit),
