@@ -249,9 +249,14 @@ def test_a_setting_outside_what_it_may_become_is_said_until_it_is_moved_inside(s
 
 
 @pytest.mark.slow
-def test_what_a_check_says_of_units_is_what_the_verdict_says_of_them_over_fifty_moves():
+def test_what_a_check_says_of_units_is_what_the_verdict_says_of_them_over_fifty_moves(tmp_path):
     """The share that is preloaded, and the friction torque of 99.73 %: each stands in two places of the page."""
-    desk, rng = desk_of(ROOT / "studies" / "rv20e_allocation.py"), np.random.default_rng(5)
+    text = (ROOT / "studies" / "rv20e_allocation.py").read_text("utf-8")
+    script = tmp_path / "as_warm_as_the_ring.py"
+    script.write_text(text.replace("ta.at(ta.FRICTION_TORQUE, WARM)", "ta.FRICTION_TORQUE"), encoding="utf-8")
+    stiffness = "rv20e_catalogue.stiffness.toml"
+    (tmp_path / stiffness).write_bytes((ROOT / "studies" / stiffness).read_bytes())
+    desk, rng = desk_of(script), np.random.default_rng(5)
     for move in range(50):
         zones = {name: float(rng.uniform(8.0, 16.0)) for name in ("disc1.runout", "disc2.runout")}
         design = {"settings": {"radial clearance [µm]": float(rng.integers(3, 15))}, "zones": zones}
