@@ -243,3 +243,13 @@ def test_grades_come_back_and_a_table_that_cannot_say_a_zone_stops_no_report(tmp
         drawing.sources, [replace(drawing.sources[0], zone=25e-6, grade="IT7")], tmp_path / "out"
     )
     assert written.read_text(encoding="utf-8-sig").splitlines()[1] == "h;42;12.5;-12.5;µm;5;120;10;IT7"
+
+
+def test_row_that_begins_with_an_error_is_no_comment(tmp_path):
+    path = workbook(tmp_path)
+    book = load_workbook(path)
+    book["Toleranzen"]["A4"] = "#N/A"
+    book["Toleranzen"]["A4"].data_type = "e"
+    book.save(path)
+    with pytest.raises(InputError, match="row 4: cell A4 is '#N/A'; allowed is a value and no error"):
+        load_drawing(path, columns=COLUMNS)

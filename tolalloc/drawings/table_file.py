@@ -220,9 +220,9 @@ def _texts(path: Path, values: Any, formulas: Any) -> list[tuple[str, ...]]:
 
 
 def _is_comment(cells: Iterable[Any]) -> bool:
-    """Return whether the first text of a row begins with #."""
-    first = next((cell.value for cell in cells if cell.value is not None and str(cell.value).strip()), "")
-    return _plain(str(first)).startswith("#")
+    """Return whether the first text of a row begins with #, and is no error such as #N/A."""
+    first = next((cell for cell in cells if cell.value is not None and str(cell.value).strip()), None)
+    return first is not None and first.data_type != "e" and _plain(str(first.value)).startswith("#")
 
 
 def _require_plain_cells(path: Path, values: Any, first: int, texts: Sequence[tuple[str, ...]]) -> None:
