@@ -30,7 +30,7 @@ from tolalloc.reading.units import ARCMINUTE, ARCSECOND, MICROMETRE
 from tolalloc.reducers import EFFICIENCY, PRELOAD, TORSIONAL_STIFFNESS
 from tolalloc.reducers.equivalent.hysteresis import TURN_ANGLES
 from tolalloc.reducers.model import ReducerModel
-from tolalloc.reducers.reducer.design import Reducer
+from tolalloc.reducers.reducer.design import THERMAL_EXPANSION, Reducer
 from tolalloc.study.prepared import Prepared
 from tolalloc.study.script import load_study
 
@@ -39,8 +39,6 @@ AT_ONCE = 2_000
 """Reducers that are solved together [-]."""
 FRICTION_UNITS = 1_000
 """Of them those whose efficiency is read, which takes a loop with friction [-]."""
-EXPANSION = 11.5e-6
-"""Thermal expansion of steel [1/K]."""
 LOST_AT = 0.03
 """Share of the rated torque at which catalogues state lost motion [-]."""
 
@@ -85,7 +83,7 @@ def drawn(known: Prepared, model: ReducerModel, units: int, seed: int) -> dict[s
         amounts = {name: amount + named.get(name, 0.0) for name, amount in reducer.modification.deviations.items()}
         part = independent(reducer, {**named, **amounts})
         for case in model.load_cases:
-            shift = EXPANSION * reducer.cycloid_stage.pin_circle_radius * (case.disc_temperature or 0.0)
+            shift = THERMAL_EXPANSION * reducer.cycloid_stage.pin_circle_radius * (case.disc_temperature or 0.0)
             shifted = {**amounts, "modification.shift": amounts["modification.shift"] + shift}
             part |= {ta.at(name, case): own for name, own in independent(reducer, {**named, **shifted}).items()}
             part |= solved(model, x, (ta.at(ta.FRICTION_TORQUE, case),))

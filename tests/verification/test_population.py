@@ -154,8 +154,9 @@ def test_smallest_zones_are_those_that_gauges_resolve_and_open_ones_cost_as_one_
 def test_zones_too_small_for_their_gauges_are_refused_by_name():
     with pytest.raises(InputError, match=r"drawing \(a\): max is '60 µm'; allowed is 70 µm or more"):
         _ = drawing(uncertainty=7.0, gauge_ratio=10.0).as_asked
-    with pytest.raises(InputError, match="gauge_ratio is -1"):
-        drawing(gauge_ratio=-1)
+    for bad in (-1, "10", float("nan"), True, 1000):
+        with pytest.raises(InputError, match=f"gauge_ratio is {bad!r}; allowed is 0 to 100"):
+            drawing(gauge_ratio=bad)
 
 
 @pytest.mark.slow

@@ -41,6 +41,7 @@ from tolalloc.drawings.tolerance_table import (
 from tolalloc.exceptions import InputError
 from tolalloc.reading.file_content import is_file, other_encoding
 from tolalloc.reading.files import found_from_here, write_new
+from tolalloc.reading.named_fields import is_number
 from tolalloc.reading.units import COST_UNITS, MICROMETRE, currency_in
 
 if TYPE_CHECKING:
@@ -92,7 +93,7 @@ class Drawing:
 
     def __post_init__(self) -> None:
         require_population(self.population, self.name)
-        if not 0 <= self.gauge_ratio <= _LARGEST_RATIO:
+        if not (is_number(self.gauge_ratio) and 0 <= self.gauge_ratio <= _LARGEST_RATIO):
             raise InputError.at(self.name, "gauge_ratio", self.gauge_ratio, f"0 to {_LARGEST_RATIO:g}")
 
     @classmethod
