@@ -103,6 +103,7 @@ def test_the_report_is_complete(allocated):
         "allocation.csv",
         "drawing.xlsx",
         "frames.dxf",
+        "inspection.dfd",
     }
     page = page_of(folder)
     for key in ("today", "risks", "dimensions", "requirements", "optimality", "good_unit", "robustness", "work"):
