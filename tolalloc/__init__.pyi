@@ -11,6 +11,8 @@ from tolalloc.allocation.space.requirement import AtCpk as AtCpk
 from tolalloc.allocation.space.requirement import AtYield as AtYield
 from tolalloc.allocation.space.requirement import RootSumSquare as RootSumSquare
 from tolalloc.allocation.space.requirement import WorstCase as WorstCase
+from tolalloc.capability.gauge_choice import Gauge as Gauge
+from tolalloc.capability.gauge_choice import costs_of_gauges as costs_of_gauges
 from tolalloc.cli.main import run_script as run_script
 from tolalloc.cli.start import new as new
 from tolalloc.cli.start import schema as schema

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal, norm
 
+import tolalloc as ta
 from tolalloc.capability.conformity import capability_bound, guard_band, parts_to_show, risks
 from tolalloc.capability.indices import Limits
 from tolalloc.exceptions import InputError
@@ -84,3 +85,47 @@ def test_guard_band_that_leaves_no_room_accepts_nothing():
     found = risks(0.0, 1.0, Limits(lower=-2.0, upper=2.0), 4.0, guard=2.5)
     assert (found.consumer, found.accepted) == (0.0, 0.0)
     assert found.producer == pytest.approx(norm.cdf(2.0) - norm.cdf(-2.0))
+
+
+def best_guard_by_hand(error, rejected, escaped, room=1.5):
+    """A reading is accepted while the part is bad with no more than rejected/escaped; the true values are N(0, 1)."""
+    known = 1 / (1 + error**2)
+    worst_reading = (room - norm.isf(rejected / escaped) * error * sqrt(known)) / known
+    return room - worst_reading
+
+
+@pytest.mark.parametrize(("error", "rejected", "escaped"), [(0.1, 1.0, 20.0), (0.3, 1.0, 5.0), (0.3, 1.0, 1.5)])
+def test_cheapest_guard_band_is_that_by_hand(error, rejected, escaped):
+    gauge = ta.Gauge(name="caliper", uncertainty=2 * error, price=0.1)
+    (found,) = ta.costs_of_gauges([gauge], 0.0, 1.0, upper=1.5, rejected=rejected, escaped=escaped)
+    assert found.guard == pytest.approx(best_guard_by_hand(error, rejected, escaped), abs=1e-4)
+
+
+def test_cheapest_gauge_is_where_another_reading_costs_what_it_saves():
+    """Gauges whose price grows as uncertainty falls: the cheapest of 60 is the one of the closed form's minimum."""
+    gauges = [ta.Gauge(name=f"{u:.3f}", uncertainty=2 * u, price=0.01 / u) for u in np.geomspace(0.02, 0.9, 60)]
+    found = ta.costs_of_gauges(gauges, 0.0, 1.0, upper=1.5, rejected=1.0, escaped=20.0)
+
+    def by_hand(gauge):
+        error = gauge.uncertainty / 2
+        edge = 1.5 - best_guard_by_hand(error, 1.0, 20.0)
+        accepted = norm.cdf(edge / sqrt(1 + error**2))
+        shown = [[1.0, 1.0], [1.0, 1 + error**2]]
+        good = multivariate_normal([0.0, 0.0], shown, abseps=1e-10).cdf([1.5, edge])
+        return gauge.price + (1 - accepted) + 20.0 * (accepted - good)
+
+    assert found[0].gauge == min(gauges, key=by_hand)
+    assert [own.cost for own in found] == pytest.approx(sorted(map(by_hand, gauges)), rel=1e-5)
+    assert gauges[0] != found[0].gauge != gauges[-1]
+
+
+def test_gauges_that_cannot_be_priced_are_refused():
+    with pytest.raises(InputError, match="uncertainty is -1"):
+        ta.Gauge(name="caliper", uncertainty=-1.0, price=0.0)
+    with pytest.raises(InputError, match="gauges is 'none'; allowed is one or more"):
+        ta.costs_of_gauges([], 0.0, 1.0, upper=1.0, rejected=1.0, escaped=2.0)
+    gauge = ta.Gauge(name="exact", uncertainty=0.0, price=0.5)
+    with pytest.raises(InputError, match="escaped is 0"):
+        ta.costs_of_gauges([gauge], 0.0, 1.0, upper=1.0, rejected=1.0, escaped=0.0)
+    (found,) = ta.costs_of_gauges([gauge], 0.0, 1.0, upper=1.0, rejected=2.0, escaped=9.0)
+    assert found.cost == pytest.approx(0.5 + 2.0 * norm.sf(1.0))

@@ -71,6 +71,32 @@ def test_share_of_evenly_spread_parts_beside_the_promise_is_that_of_irwin_and_ha
     assert expected < 0.98 < result.chosen.achieved.estimate
 
 
+def share_inside(limit, half=10.0, **row):
+    """Return the share of sums of three parts of a half zone inside ± a limit [µm], and its standard error [-]."""
+    errors = drawing(plus=half, minus=-half, **row).errors
+    sums = (errors.random_units(20_000, SeedTree(8)) - errors.middles).sum(axis=1) * 1e6
+    inside = float((np.abs(sums) <= limit).mean())
+    return inside, sqrt(inside * (1 - inside) / len(sums))
+
+
+def test_share_of_parts_at_either_limit_is_that_of_three_coins():
+    """All three at one limit in one case of four; the zones of parts anywhere in them keep even those."""
+    at_limits = {"distribution": "mixture", "batches": "0.5:-1:0.01 0.5:1:0.01"}  # σ 1 % of that at Cp 1
+    inside, error = share_inside(20.0, **at_limits)
+    assert abs(inside - 0.75) < 4 * error
+    (half, *_) = (own / 2 for own in zones_of(study(population=ANYWHERE)))
+    assert share_inside(20.0 + 3 * half * 4 * 0.01 / 3, half, **at_limits)[0] == 1.0
+    assert share_inside(19.0, half, **at_limits)[0] < 0.8
+
+
+@pytest.mark.parametrize("limit", [12.0, 15.0, 20.0])
+def test_share_of_triangular_parts_in_the_upper_half_of_their_zones_is_that_of_irwin_and_hall(limit):
+    """A triangular deviation from 0 to 10 µm is the sum of two even ones from 0 to 5."""
+    inside, error = share_inside(limit, distribution="triangular", Cp=2.0, shift=0.5)
+    terms = ((-1) ** k * (limit / 5 - k) ** 6 / (factorial(k) * factorial(6 - k)) for k in range(int(limit / 5) + 1))
+    assert abs(inside - sum(terms)) < 4 * error
+
+
 def test_even_spread_of_every_feature_fills_its_zone_and_no_more():
     errors = populated(load_drawing("rv20e_drawing").errors, EVENLY)
     units = errors.random_units(4000, SeedTree(3))
