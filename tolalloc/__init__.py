@@ -1,8 +1,27 @@
 """Which drawing tolerance drives an output, and which tolerances and settings meet a limit at the lowest cost.
 
+A study asks questions of a model at the zones of a drawing:
+
 >>> import tolalloc as ta
->>> ta.reducer("rv20e").name
-'RV-20E'
+>>> study = ta.Study(
+...     ta.reducer("rv20e", flank_clearance=(1.0, 8.0), radial_clearance=(3.0, 30.0)),
+...     ta.drawing("rv20e_drawing"),
+...     limits={ta.PEAK_TO_PEAK: ta.Limit(upper=60.0, show=ta.AtYield(target=0.9973))},
+...     questions=[ta.Ranking(), ta.Allocation()],
+... )
+
+``study.run("runs/mine", effort="quick")`` writes the report, ``study.rank()`` and ``study.allocate()`` return answers.
+To begin with:
+
+=============================== ====================================================================
+`Study`                         what is asked, of which model, at which drawing, with which limits
+`reducer`, `model`              the model: a reducer, or any function of your own
+`drawing`                       the tolerance table, CSV or Excel
+`Limit`, `AtYield`              a limit, and the share of units that must keep it
+`Ranking`, `Allocation`         which tolerance drives the output; which drawing is cheapest
+`Sorting`, `Shim`, `LoadCase`   parts chosen at assembly; cold, warm, worn, under another load
+`new`                           a folder that runs at once, as the start of your own
+=============================== ====================================================================
 
 Names are loaded when they are first used, so that importing the package takes a fraction of a second.
 """

@@ -430,6 +430,12 @@ def new(
     ------
     InputError, UnknownNameError
         Something is there already, or a name or number that is not allowed.
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> sorted(own.name for own in new(f"{mkdtemp()}/mine", like="rv40e").iterdir())
+    ['README.md', 'reducer.toml', 'schemas', 'study.py', 'zones.csv', 'zones.xlsx']
     """
     place, chosen = Path(folder), Likeness(preset=like, cranks=cranks, discs=discs)
     NewFolder(place=place, like=chosen, samples=chosen.kinds(samples)).write()

@@ -260,6 +260,13 @@ class Shim(_Fitting):
     either way, that leaves the least of it; d becomes d + step·k. Measuring errs by nothing (an assumption).
     Derivatives with respect to zones are those of the sizes chosen, as a unit that changes its size has none (own
     derivation).
+
+    Examples
+    --------
+    A distance ring in five thicknesses, chosen for the measured depth of its housing; two steps to either side:
+
+    >>> Shim("ring", step=10.0, sizes=5, against={"housing": -1.0}).reach
+    2
     """
 
     called: ClassVar[str] = "shim"

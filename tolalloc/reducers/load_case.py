@@ -81,6 +81,13 @@ class LoadCase(NamedFields):
     hours
         Hours of turning after which everything is looked at, parts worn by those load cases that state a speed, each
         for its share of them; parts as new unless given [h].
+
+    Examples
+    --------
+    Lost motion of cold discs is an output of its own, to be limited beside the others:
+
+    >>> at("lost motion [arcmin]", LoadCase("cold", disc_temperature=-5.0))
+    'lost motion, cold [arcmin]'
     """
 
     called: ClassVar[str] = "load case"
