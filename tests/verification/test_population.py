@@ -26,14 +26,14 @@ def drawing(**more):
     return ta.Drawing.of_rows([{"id": name, "nominal": 10.0, **row} for name in NAMES], **own)
 
 
-def study(limit=20.0, signs=(1, 1, 1), **more):
+def study(limit=20.0, signs=(1, 1, 1), show=None, **more):
     model = ta.model(
         lambda a, b, c: 1000 * (signs[0] * (a - 10) + signs[1] * (b - 10) + signs[2] * (c - 10)),
         inputs=dict.fromkeys(NAMES, 10.0),
         outputs=(GAP,),
     )
-    asked = [ta.Allocation(front=False, what_if=False)]
-    return ta.Study(model, drawing(**more), limits={GAP: ta.Limit(lower=-limit, upper=limit)}, questions=asked)
+    asked, shown = [ta.Allocation(front=False, what_if=False)], {"show": show} if show else {}
+    return ta.Study(model, drawing(**more), limits={GAP: ta.Limit(lower=-limit, upper=limit, **shown)}, questions=asked)
 
 
 def beyond_sum_of_even_parts(count, half, limit):
@@ -60,6 +60,14 @@ def test_zones_of_parts_anywhere_in_them_are_those_of_the_worst_case():
 def test_zones_of_one_capability_are_those_of_the_root_sum_square(cp):
     sigma = 20.0 / norm.isf(0.00135) / sqrt(3)
     assert zones_of(study(population=cp)) == pytest.approx([6 * cp * sigma] * 3, rel=2e-3)
+
+
+def test_zones_of_evenly_spread_parts_at_a_cpk_are_those_of_their_variance():
+    """σ of the sum is the half zone, and mean + 3·Cpk·σ lies beyond all that such parts reach."""
+    found = study(population=EVENLY, show=ta.AtCpk(target=1.33)).allocate(effort="quick").result
+    half = 20.0 / (3 * 1.33)
+    assert [own.zone * 1e6 / 2 for own in found.drawn_sources] == pytest.approx([half] * 3, rel=1e-2)
+    assert found.cost == pytest.approx(3 * 10.0 * 10.0 / half, rel=2e-3)
 
 
 def test_share_of_evenly_spread_parts_beside_the_promise_is_that_of_irwin_and_hall():

@@ -365,7 +365,7 @@ def _tail_constraint(sample: OutputSample, bound: QuantileBound, limits: Limits,
     )
     batches = [quantile.batch(first, _BATCHES).gradient for first in range(_BATCHES)]
     by_excess = parts[0].deviation
-    return _with_law(sample, bound, limits, quantile.gradient * by_excess, np.stack(batches) * by_excess)
+    return _with_law(sample, bound, limits, quantile.gradient * by_excess, np.stack(batches) * by_excess, sample.law)
 
 
 def _with_law(
@@ -374,11 +374,12 @@ def _with_law(
     limits: Limits,
     gradient: Float[np.ndarray, " variable"],
     batches: Float[np.ndarray, "batch variable"],
+    law: LinearLaw | None,
 ) -> OneSidedConstraint:
     """Return a constraint with a gradient, that of the scales by the law where the output is linear."""
     excess, groups = bound.turned(sample.values) - bound.sign * bound.limit, sample.groups
-    if sample.law:
-        gradient[:groups] = sample.units.space.by_scale(sample.law.excess_by_zone(limits, excess))
+    if law:
+        gradient[:groups] = sample.units.space.by_scale(law.excess_by_zone(limits, excess))
         batches[:, :groups] = gradient[:groups]
     return OneSidedConstraint(
         sign=bound.sign,
@@ -388,7 +389,7 @@ def _with_law(
         scale=_scale_of(sample, bound.limit),
         stack=root_sum_square_stack(_name_of(sample, bound.sign), sample.design, excess, gradient, groups),
         batches=batches,
-        law=sample.law,
+        law=law,
     )
 
 
@@ -399,7 +400,9 @@ def _moment_constraint(sample: OutputSample, bound: QuantileBound) -> OneSidedCo
     split = (np.array_split(each, min(_BATCHES, weights.size)) for each in (weights, derivative))
     batches = np.stack([own @ slopes / own.size for own, slopes in zip(*split, strict=True)])
     limits = Limits(upper=bound.limit) if bound.sign > 0 else Limits(lower=bound.limit)
-    return _with_law(sample, bound, limits, weights @ derivative / weights.size, batches)
+    # A law says how a quantile moves, and mean + spread·σ is one only where all is normal.
+    law = sample.law if sample.law and sample.law.is_normal else None
+    return _with_law(sample, bound, limits, weights @ derivative / weights.size, batches, law)
 
 
 def spread_weights(
