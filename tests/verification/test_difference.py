@@ -134,6 +134,14 @@ def test_few_units_beyond_a_quantile_are_warned_of():
     assert len(found.warnings) == 1 and says(found.warnings, "difference.few", units=128, beyond=10)
 
 
+def test_shares_of_units_are_no_worst_case_and_say_so():
+    warned = fit(population="none").ask(ta.Difference(zones={"housing": 20.0}, units=2048)).teller.warnings
+    assert any("do not show that" in own for own in warned)
+    assert not any(
+        "do not show that" in own for own in fit().ask(ta.Difference(zones={"housing": 20.0})).teller.warnings
+    )
+
+
 def test_a_process_prices_the_zone_that_it_holds():
     costs = {"housing": [("turned", 1.0, 0.02, 0.01, 0.1), ("ground", 3.0, 0.02, 0.002, 0.02)]}
     study = fit(costs=costs)

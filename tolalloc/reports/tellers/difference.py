@@ -7,6 +7,7 @@ from typing import Any
 
 from tolalloc.allocation.difference import DifferenceResult
 from tolalloc.allocation.space.design_space import outside_range
+from tolalloc.allocation.space.requirement import WorstCase
 from tolalloc.capability.indices import Interval
 from tolalloc.drawings.sources import Source, by_row, zone_in, zone_unit
 from tolalloc.reading.units import COST_UNITS, unit_of
@@ -83,6 +84,8 @@ class DifferenceTeller(Teller[DifferenceResult]):
         found = [sentence for own in self.result.after if (sentence := outside_range(own))]
         if any(units * min(share, 1 - share) < _BEYOND for _, share in self.result.limited):
             found.append(_say("few", units=units, beyond=_BEYOND))
+        if any(isinstance(own.guarantee, WorstCase) for own in self.result.requirements):
+            found.append(_say("worst_case", units=units))
         if lost := self.result.unanswered:
             found.append(_say("unanswered", lost=lost, solutions=2 * units))
         return tuple(found)
