@@ -167,16 +167,6 @@ def test_columns_of_the_model_stand_in_the_nomenclature(rv20e):
         assert f"`{generic}`" in page, generic
 
 
-@pytest.mark.slow
-def test_equations_name_functions_that_exist():
-    page = (ROOT / "docs" / "theory.md").read_text(encoding="utf-8")
-    code = "\n".join(path.read_text(encoding="utf-8") for path in FILES)
-    for name in re.findall(r"`(?:tolalloc\.)?(?:\w+\.)+(\w+)`", page):
-        assert re.search(rf"(def|class) {name}\b|{name} =|/{name}\.py|^{name}$", code, re.MULTILINE) or any(
-            path.stem == name for path in FILES
-        ), name
-
-
 def test_top_level_holds_only_what_it_should():
     tracked = subprocess.run(["git", "ls-tree", "--name-only", "HEAD"], cwd=ROOT, capture_output=True, text=True)
     if tracked.returncode:

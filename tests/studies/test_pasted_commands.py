@@ -41,7 +41,6 @@ def lines_of(text: str) -> list[list[str]]:
 
 
 LINES = {page: lines for page in PAGES if (lines := shown(page))}
-SAID = {page: re.findall(r"`tolalloc ([a-z]+ [^`]*)`", (ROOT / page).read_text(encoding="utf-8")) for page in PAGES}
 
 
 def folder(place: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -108,15 +107,6 @@ def test_every_line_of_a_new_folder_s_own_page_is_taken_as_it_stands(tmp_path, m
     }
     for words in lines:
         read(words, set(), mine)
-
-
-@pytest.mark.parametrize("page", [page for page in PAGES if SAID[page]])
-def test_every_command_in_a_sentence_has_the_options_that_it_names(page):
-    for said in SAID[page]:
-        name = said.split()[0]
-        if name in COMMANDS:
-            options = {option for own in COMMANDS[name].params for option in (*own.opts, *own.secondary_opts)}
-            assert {word.partition("=")[0] for word in re.findall(r"--[\w-]+", said)} <= options | {"--help"}, said
 
 
 def test_a_line_that_could_not_be_pasted_is_noticed(tmp_path, monkeypatch):
