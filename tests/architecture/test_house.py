@@ -183,6 +183,13 @@ def test_the_version_stands_in_changes_and_citation_too():
     assert f"{date.fromisoformat(cited['date-released']):%-d %B %Y}" == first[1]
 
 
+def test_a_version_has_at_most_25_rows_in_the_changelog():
+    _, *versions = (ROOT / "docs" / "changelog.md").read_text(encoding="utf-8").split("\n## ")
+    for version in versions:
+        rows, heads = re.findall(r"^\| ", version, re.M), re.findall(r"^\|---", version, re.M)
+        assert len(rows) - len(heads) <= 25, version.partition("\n")[0]
+
+
 def test_answers_to_the_review_of_the_repository_stand_on_the_page():
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     page = (ROOT / "docs" / "CONTRIBUTING.md").read_text(encoding="utf-8")
