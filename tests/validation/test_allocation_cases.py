@@ -10,6 +10,7 @@ from scipy.optimize import minimize
 
 from studies.published import allocation_cases as published
 from studies.published.stacks import root_sum_square
+from tests.printed_tables import printed, row
 from tests.validation_manual import shown
 from tolalloc.allocation.cost.process_costs import priced
 from tolalloc.allocation.search.process_choice import allocate, second_best
@@ -125,6 +126,17 @@ def test_the_published_points_of_the_clutch_break_its_requirement(loss, over):
     assert (cost < best.bound) == (loss == "20")
     assert cost - best.cost == pytest.approx(own["gap_total"], abs=1e-7)
     assert problem.cost(point, processes) + best.prices[0] * problem.violation(point, np.empty(0))[0] > best.cost
+
+
+def test_the_page_prints_the_optima_of_the_clutch():
+    head = "| quality loss | published cost | least cost here | root sum square of the published point, allowed 0.035 |"
+    rows = []
+    for loss in ("0", "20"):
+        own, problem = published.CASES["clutch_choi2000"]["results"][loss], published.clutch(float(loss))
+        load = float(problem.stacks[0].load(np.array(own["published_t"]), np.empty(0)))
+        stated = own["published_point_evaluated"]["total"]
+        rows.append(row(loss, f"{stated:.6f}", f"{solved(problem).cost:.6f}", f"{load:.7f}"))
+    assert printed("validation/tolerance-problems.md", head) == rows
 
 
 def test_the_other_size_of_the_cage_has_the_optimum_of_the_file():

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.optimize import root
 
 from tests.builders import drawn_units
+from tests.printed_tables import DOCS, SUMMARY, number, printed, row
 from tests.verification.test_ring import on
 from tolalloc.drawings.drawing import load_drawing
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, DEGREE
@@ -40,7 +40,9 @@ MEASURED = {
 """Torque [N·m] → order of the output turn → amplitude [arcsec] and phase of a·sin + b·cos [deg], forward, 100 rpm."""
 OUTPUT_SPEED = 100.0 / 81.0  # [1/min]
 ANGLES = 2 * np.pi * np.arange(16 * 39) / (16 * 39)
-PAGE = Path(__file__).parents[2] / "docs" / "validation" / "bench-ratio-81.md"
+PAGE = "validation/bench-ratio-81.md"
+GAPS = "| torque [N·m] | measured [′] | calculated, rigid ring [′] | calculated, ring that gives [′] |"
+ORDERS = "| order | torque [N·m] | measured | calculated | difference of the amplitudes |"
 ACROSS = 10.0  # Tilt stiffness across over that along, which the two orders do not tell [-]
 
 
@@ -126,8 +128,12 @@ def peak_to_peak(torque: float, *, on_ring: bool) -> float:
     return float(np.median(model.at_torque(-torque).extremes(units, -torque).peak_to_peak)) / ARCSECOND
 
 
-def told(value: complex) -> str:
-    return f"{abs(value):.1f}″ ∠ {np.angle(value) / DEGREE:.0f}°"
+def page() -> str:
+    return (DOCS / PAGE).read_text(encoding="utf-8")
+
+
+def wave(value: complex) -> str:
+    return f"{abs(value):.1f}″ ∠ {number(np.angle(value) / DEGREE, '.0f')}°"
 
 
 def order_rows() -> list[str]:
@@ -135,27 +141,33 @@ def order_rows() -> list[str]:
     for order in (39, 78):
         for torque, own in MEASURED.items():
             measured, found = phasor(*own[order]), predicted(order, torque)
-            off = f"{100 * (abs(found) / abs(measured) - 1):+.0f} %".replace("-", "−")
-            cells = (str(order), f"{torque:,.0f}", told(measured), told(found), off)
-            rows.append(f"| {' | '.join(cells).replace('-', '−')} |")
+            off = number(100 * (abs(found) / abs(measured) - 1), "+.0f")
+            rows.append(row(str(order), f"{torque:,.0f}", wave(measured), wave(found), f"{off} %"))
     return rows
 
 
 def gap_rows() -> list[str]:
     return [
-        f"| {torque:,.0f} | {own:.2f} | {gap(torque, on_ring=False):.2f} | {gap(torque, on_ring=True):.2f} |"
+        row(f"{torque:,.0f}", f"{own:.2f}", f"{gap(torque, on_ring=False):.2f}", f"{gap(torque, on_ring=True):.2f}")
         for torque, own in GAP.items()
     ]
 
 
-@pytest.mark.parametrize("row", [0, 1, 2, 3, 4, 5, 6, 7])
-def test_the_page_prints_the_orders(row):
-    assert order_rows()[row] in PAGE.read_text(encoding="utf-8"), order_rows()[row]
+def test_the_page_prints_the_orders():
+    assert printed(PAGE, ORDERS) == order_rows()
 
 
-@pytest.mark.parametrize("row", range(len(GAP)))
-def test_the_page_prints_the_gaps(row):
-    assert gap_rows()[row] in PAGE.read_text(encoding="utf-8"), gap_rows()[row]
+@pytest.mark.parametrize("order", [39, 78])
+def test_the_summary_prints_the_orders_that_are_predicted(order):
+    loads = (400.0, 1000.0)
+    amplitudes = ([MEASURED[torque][order][0] for torque in loads], [abs(predicted(order, own)) for own in loads])
+    cells = " | ".join(", ".join(f"{own:.1f}" for own in both) + "″" for both in amplitudes)
+    assert f"| order {order} at 400 and 1,000 N·m | {cells} |" in (DOCS / SUMMARY).read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("where", [PAGE, SUMMARY])
+def test_both_pages_print_the_gaps(where):
+    assert printed(where, GAPS) == gap_rows()
 
 
 @pytest.mark.parametrize(("order", "torque"), [(39, 400.0), (39, 1000.0), (78, 400.0), (78, 1000.0)])
@@ -189,7 +201,7 @@ def test_orders_meet_the_resonance_where_they_lead():
     inertia = RIGIDITY / ARCMINUTE / (2 * np.pi * 55.0) ** 2
     assert inertia == pytest.approx(13.1, abs=0.05)
     found = replace(resonance_of(preset(), -1800.0, 13.1), ratio=81.0)
-    shown = PAGE.read_text(encoding="utf-8")
+    shown = page()
     assert f"{found.frequency:.1f} Hz" in shown
     speeds = [found.input_speed(order) for order in (240, 162, 156)]
     assert "{:,.0f}, {:,.0f} and {:,.0f} rpm".format(*speeds) in shown, speeds
@@ -201,11 +213,11 @@ def test_rigidity():
     loop = hysteresis_loop(model, exact_unit(model), TURN_ANGLES)
     found = float(loop.torsional_stiffness[0]) * ARCMINUTE
     assert found == pytest.approx(RIGIDITY, rel=0.15)
-    assert f"{found:.0f} N·m/arcmin" in PAGE.read_text(encoding="utf-8"), found
+    assert f"{found:.0f} N·m/arcmin" in page(), found
 
 
 def test_the_peak_to_peak_of_random_units_rises_with_the_ring_and_falls_without():
-    shown = PAGE.read_text(encoding="utf-8")
+    shown = page()
     for on_ring, rises in ((False, False), (True, True)):
         none, rated = (peak_to_peak(torque, on_ring=on_ring) for torque in (1.0, 1800.0))
         assert (rated > none) is rises

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tests.builders import numbers_of, order_spectrum, says
+from tests.printed_tables import SUMMARY, number, printed, row
 from tests.studies.command import answer_of, refused, tolalloc
 from tests.validation_manual import shown
 from tolalloc.exceptions import InputError
@@ -24,6 +25,7 @@ from tolalloc.reducers.unit_file import load_unit
 from tolalloc.reports.portraits.reducer import FACTOR, against_catalogue, twist_table
 
 SIZES = ("rv20e", "rv40e", "rv80e", "rv110e", "rv160e")
+RIGIDITIES = "| size | calculated [N·m/arcmin] | catalogue [N·m/arcmin] | difference | lost motion [arcmin] |"
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -36,6 +38,19 @@ def test_the_rigidity_is_the_catalogues_within_a_fifth(size):
     sentence, warnings = against_catalogue(reducer, loop)
     assert f"{reducer.catalogue.torsional_rigidity * ARCMINUTE:.3g} (" in sentence
     assert not warnings
+
+
+@pytest.mark.parametrize("page", ["validation/catalogues.md", SUMMARY])
+def test_both_pages_print_the_rigidities(page):
+    rows = []
+    for size in SIZES:
+        reducer = load_reducer(size)
+        loop = exact_loop(reducer)
+        found, stated = loop.torsional_stiffness[0] * ARCMINUTE, reducer.catalogue.torsional_rigidity * ARCMINUTE
+        off = f"{number(100 * (found / stated - 1), '+.0f')} %"
+        name, lost = f"RV-{size[2:].upper()}", f"{loop.lost_motion[0] / ARCMINUTE:.2f}"
+        rows.append(row(name, f"{found:.1f}", f"{stated:.0f}", off, lost))
+    assert printed(page, RIGIDITIES) == rows
 
 
 def test_one_rule_gives_the_dimensions_of_all_sizes():

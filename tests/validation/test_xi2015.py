@@ -15,6 +15,7 @@ import pytest
 from scipy.optimize import brentq
 
 from tests.builders import reducer_file
+from tests.printed_tables import printed, row
 from tests.validation_manual import shown
 from tolalloc.exceptions import InputError
 from tolalloc.reading.units import DEGREE, MICROMETRE, MILLIMETRE
@@ -125,6 +126,10 @@ def test_sixteen_pins_in_two_phases_of_three_and_seventeen_else(rv40e):
     assert (count == 17).mean() == pytest.approx(share, abs=1.01 / phases)
 
 
+STEEL = (
+    "| face width [mm] | method | deflection, independent [µm] | here [µm] | largest force, independent [N] | here [N] "
+    "| pins in contact |"
+)
 BY_WIDTH = [
     (10, 3.683, (10.07, 99.17), 10, 1049, 3.255, 9, 1100),
     (12, 3.237, (10.84, 94.96), 9, 1094, 2.882, 9, 1144),
@@ -147,6 +152,21 @@ def test_steel_line_contact_alone(rv40e, width, linear, zone, linear_teeth, line
     assert by_pin.pins_in_contact[0, 0] == teeth
     assert by_pin.force.max() == pytest.approx(force, rel=0.01)
     assert 4.5 < DEFLECTION / by_li.deflection[0] < 7
+
+
+def test_the_page_prints_both_methods_over_the_face_width(rv40e):
+    rows = []
+    for width, *stated in BY_WIDTH:
+        own = disc(rv40e.with_face_width(width * MILLIMETRE))
+        for name, method, depth, force in (
+            ("linear", pressed_linear, stated[0], stated[3]),
+            ("law at every pin", pressed, stated[4], stated[6]),
+        ):
+            found = method(own, PIN_0)
+            depths, forces = (depth, found.deflection[0] / MICROMETRE), (force, found.force.max())
+            pins = int(found.pins_in_contact[0, 0])
+            rows.append(row(str(width), name, *map("{:.3f}".format, depths), *map("{:,.0f}".format, forces), str(pins)))
+    assert printed("validation/xi2015.md", STEEL) == rows
 
 
 def test_largest_pressure_is_not_under_the_largest_force(rv40e):

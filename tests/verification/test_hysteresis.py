@@ -10,6 +10,7 @@ import pytest
 
 import tolalloc as ta
 from tests.builders import prepared, reducer_file, seeded_units, unit_with
+from tests.printed_tables import printed, row
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import ARCMINUTE
 from tolalloc.reducers.equivalent.friction import (
@@ -210,6 +211,22 @@ def test_the_efficiency_at_rated_torque_is_that_of_rv_reducers(size):
     assert loop.falling[0, 0] == pytest.approx(loop.rising[0, 0], abs=1e-15)
     # Inside the backlash nothing holds the carrier but friction, so it stays where the torque has left it.
     assert loop.hysteresis_loss[0] >= loop.plain.backlash[0]
+
+
+def test_the_page_prints_what_friction_takes():
+    head = (
+        "| size | efficiency at rated torque [%] | torque without load: contacts, seals, grease [N·m] "
+        "| lost motion with friction [′] | hysteresis loss [′] |"
+    )
+    rows = []
+    for size in ("20", "40", "80", "110", "160"):
+        reducer = load_reducer(f"rv{size}e")
+        loop, idle = friction_loop(*ground(reducer), TURN_ANGLES), IdleTorque.of(reducer)
+        torques = (loop.no_load.friction_torque[0], idle.seals, idle.grease)
+        widths = (f"{own[0] / ARCMINUTE:.3f}" for own in (loop.lost_motion, loop.hysteresis_loss))
+        efficiency = f"{100 * loop.rated.efficiency[0]:.1f}"
+        rows.append(row(f"RV-{size}E", efficiency, ", ".join(f"{own:.2f}" for own in torques), *widths))
+    assert printed("validation/catalogues.md", head) == rows
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ import pytest
 
 import tolalloc as ta
 from tests.builders import says
+from tests.printed_tables import printed, row
 from tolalloc.exceptions import InputError, SolveError
 from tolalloc.reducers.equivalent.perfect import perfect_reducer
 from tolalloc.reducers.load_case import LoadCase, load_cycle
@@ -76,6 +77,23 @@ def test_all_bearings_together_live_less_than_the_weakest(reducer):
     assert found.life < min(own.life for own in found.bearings)
     four, two, one = (own.count * own.life ** (-9 / 8) for own in found.bearings)
     assert found.life == pytest.approx((four + two + one) ** (-8 / 9))
+
+
+def test_the_page_prints_the_lives_of_the_presets():
+    head = (
+        "| size | crank–disc, crank–carrier bearing, each [h] | all bearings together [h] | peak pressure [MPa] "
+        "| lost power [W] | discs above the ring [K] |"
+    )
+    rows = []
+    for size in ("20", "40", "80", "110", "160"):
+        own = load_reducer(f"rv{size}e")
+        found = duty_of(own, [LoadCase("rated", torque=-own.load.rated_torque, speed=15.0)])
+        life = {bearing.kind: f"{bearing.life:,.0f}" for bearing in found.bearings}
+        cranks = f"{life['crank_disc_bearing']}, {life['crank_carrier_bearing']}"
+        load, heat = found.loads[0], f"{found.temperatures[-1]:.2f}"
+        together, pressure = f"{found.life:,.0f}", f"{load.pressure:,.0f}"
+        rows.append(row(f"RV-{size}E", cranks, together, pressure, f"{found.mean_loss:.1f}", heat))
+    assert printed("validation/catalogues.md", head) == rows
 
 
 def test_mean_torque_and_speed_are_the_makers(reducer):
