@@ -429,6 +429,13 @@ FEATURES = {
 }
 
 
+def test_heads_of_which_the_fewer_are_known_are_listed_instead_of_a_title_above_them(tmp_path):
+    rows = ("Tolerances of the RV-40X,,,,,", "Part,Characteristic,Unit,Upper dev.,Nominal,Tightest,Gauge")
+    (tmp_path / "zones.csv").write_text("\n".join([*rows, "pin,diameter,mm,0.01,6,0.002,CMM", ""]), encoding="utf-8")
+    with pytest.raises(InputError, match=r"no row has a head 'id'; row 2 has 'Part'.*\"Upper dev.\" = \"plus\""):
+        ta.drawing(tmp_path / "zones.csv")
+
+
 @pytest.mark.parametrize("heads", FEATURES, ids=["German", "French", "Chinese", "English"])
 @pytest.mark.parametrize("is_workbook", [False, True], ids=["CSV", "XLSX"])
 def test_heads_that_nobody_mapped_are_listed_and_what_is_said_of_them_can_be_pasted(heads, is_workbook, tmp_path):

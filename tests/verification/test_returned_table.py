@@ -209,6 +209,13 @@ def test_fit_that_one_cell_cannot_say_otherwise_is_refused_and_stays_where_nothi
         drawing.errors.file.written(drawing.sources, drawn, tmp_path / "out")
 
 
+def test_fit_beside_an_empty_lower_deviation_becomes_both_deviations(tmp_path):
+    text = "id;nominal;plus;minus;unit;min;max;cost\nh;6;h5;;µm;1;9;10\n"
+    written, drawn = returned(tmp_path, text, h=3e-6)
+    assert "h;6;-1;-4;µm" in written.read_text(encoding="utf-8-sig")
+    assert [own.zone for own in load_drawing(written).sources] == pytest.approx([own.zone for own in drawn])
+
+
 def test_cells_of_a_workbook_in_per_cent_and_empty_ones_take_what_is_meant(tmp_path):
     book = Workbook()
     sheet = book.active

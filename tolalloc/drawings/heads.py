@@ -12,8 +12,6 @@ from pathlib import Path
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading.units import is_unit, usual_signs
 
-_SOME = 3
-"""Names of columns in a row from which on it is one of heads, whichever are missing [-]."""
 MOST_TITLES = 200
 """Rows among which the heads of a table are looked for [-]."""
 
@@ -78,7 +76,7 @@ class Heads:
         seen = [cell for cell in (rows[at] if rows else ()) if cell]
         # Of a table that has most of its heads it is said which one is missing.
         has_all = any(self.named(cells).issuperset(self.needed) for cells in first)
-        if seen and len(self.named(seen) & {*self.known}) < _SOME and not has_all:
+        if seen and 2 * len(self.named(seen) & {*self.known}) <= len(seen) and not has_all:
             raise InputError(
                 f"{path}: no row has a head {' and '.join(map(repr, self.needed))}; row {at + 1} has "
                 f"{', '.join(map(repr, seen))}. Say what these are, each with a name of a column or left out, in "

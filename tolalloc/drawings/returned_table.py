@@ -127,13 +127,15 @@ def _changed(texts: Mapping[str, str], before: Source, drawn: Source) -> Iterato
         assert isinstance(plus, int | float)
         assert isinstance(minus, int | float)
         old = texts.get("plus", "")
-        if abs(plus + minus) > 1e-9 * abs(plus):
+        if abs(plus + minus) <= 1e-9 * abs(plus):
+            number = _NUMBER.search(old) if "±" in old else None
+            values = {name: value for name, value in values.items() if name not in ("plus", "minus")}
+            yield "plus", f"{old[: number.start()]}{plus:.7g}" if number else f"± {plus:.7g}"
+        elif "minus" in texts:  # an empty cell beside a fit
+            values |= {"plus": plus, "minus": minus}
+        else:
             both = f"{plus:+.7g}/{minus:+.7g}"
             raise InputError.at(f"returned table ({before.own_id or before.name})", "plus", both, "± one number alone")
-        number = _NUMBER.search(old) if "±" in old else None
-        values.pop("minus", None)
-        yield "plus", f"{old[: number.start()]}{plus:.7g}" if number else f"± {plus:.7g}"
-        values.pop("plus", None)
     for name, value in values.items():
         if name in texts and value is not None:
             yield name, value if isinstance(value, str) else f"{value:.7g}"
