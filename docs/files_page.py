@@ -28,7 +28,7 @@ HEAD = """# Files
 The TOML files that you write, field by field. A name ends in its unit; springs without one are in N/m.
 What is not listed is refused by name, and the
 nearest field is offered. `tolalloc schema KIND` prints the same for an editor, which then offers the fields. Tables of
-tolerances are explained in [the first study](../first-study.md).
+tolerances have [columns](columns.md) instead.
 
 Where a field may be a number or a table, either may stand; a table is explained below under its own heading.
 """
@@ -55,7 +55,7 @@ def _inner(found: dict[str, Any]) -> Iterator[tuple[str, str]]:
 def _table(own: dict[str, Any]) -> str:
     needed = own.get("required", [])
     rows = [
-        f"| `{name}` | {_kind(field)} | {_allowed(field)} | {'' if name in needed else _default(field)} |"
+        f"| `{name}` | {_kind(field)} | {allowed(field)} | {'' if name in needed else _default(field)} |"
         for name, field in own["properties"].items()
     ]
     return "\n".join(["| field | kind | allowed | unless given |", "|---|---|---|---|", *rows, ""])
@@ -77,16 +77,16 @@ def _kind(field: dict[str, Any]) -> str:
     return words.get(field.get("type", ""), "text")
 
 
-def _allowed(field: dict[str, Any]) -> str:
+def allowed(field: dict[str, Any]) -> str:
     """Return which values are allowed, in words."""
     if several := field.get("anyOf") or field.get("oneOf") or field.get("allOf"):
-        return " or ".join(dict.fromkeys(filter(None, map(_allowed, several))))
+        return " or ".join(dict.fromkeys(filter(None, map(allowed, several))))
     if "enum" in field:
         return ", ".join(f"`{value}`" for value in field["enum"])
     if "const" in field:
         return f"`{field['const']}`"
     if field.get("type") == "array" and isinstance(field.get("items"), dict):
-        return _allowed(field["items"])
+        return allowed(field["items"])
     low, above = field.get("minimum"), field.get("exclusiveMinimum")
     high, below = field.get("maximum"), field.get("exclusiveMaximum")
     ends = [f"{low:g} or more" if low is not None else "", f"above {above:g}" if above is not None else ""]

@@ -21,7 +21,7 @@ DOCS = ROOT / "docs"
 TUTORIALS = sorted((DOCS / "tutorials").glob("plot_*.py"))
 GALLERY = sorted((DOCS / "gallery").glob("plot_*.py"))
 GUIDES = sorted(page for page in (DOCS / "how-to").glob("*.md") if page.name != "index.md")
-SUBJECTS = ("first_drawing", "own_reducer", "own_table", "own_function", "a_bad_unit", "many_studies")
+SUBJECTS = ("first_study", "own_table", "own_function", "a_bad_unit", "own_reducer", "many_studies")
 """What the six tutorials are about."""
 
 
@@ -74,6 +74,17 @@ def test_numbers_of_the_equations_are_whole_and_each_is_given_once():
     numbers = [int(number) for number in re.findall(r"\\tag\{(\d+)\}", theory())]
     gone = {46}  # with the measure that it was of; a number is not given again
     assert sorted(numbers) == sorted({*range(1, 110)} - gone)
+
+
+def test_the_front_pages_are_as_short_as_they_promise_and_count_what_there_is():
+    index = (DOCS / "index.md").read_text(encoding="utf-8")
+    equations = theory().count("\\tag{")
+    assert f"{equations} equations" in index
+    assert f"{len(GALLERY)} pictures" in index
+    for page, most in {"README.md": 400, "docs/first-study.md": 1200}.items():
+        assert len((ROOT / page).read_text(encoding="utf-8").split()) <= most, page
+    for path in TUTORIALS:
+        assert len(path.read_text(encoding="utf-8").split()) <= 1000, path.name
 
 
 def test_equations_that_the_code_names_are_on_the_page():

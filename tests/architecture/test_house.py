@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from tolalloc.drawings.fields import COLUMNS, HEADERS, ToleranceRow
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.wings.bench.ask.identify import NAMES
 from tolalloc.wings.bench.parameters import SYMBOLS
@@ -195,12 +194,3 @@ def test_answers_to_the_review_of_the_repository_stand_on_the_page():
     page = (ROOT / "docs" / "CONTRIBUTING.md").read_text(encoding="utf-8")
     stated = dict(re.findall(r"^\| ([A-Z]+\d+) \| .+? \| (.+) \|$", page, re.M))
     assert stated == settings["tool"]["repo-review"]["ignore"]
-
-
-def test_the_page_for_a_first_study_explains_every_column_as_the_list_of_fields_does():
-    rows = [line.strip() for line in (ROOT / "docs" / "first-study.md").read_text(encoding="utf-8").splitlines()]
-    for name, column in COLUMNS.items():
-        needed = "yes" if ToleranceRow.model_fields[name].is_required() else ""
-        assert f"| {HEADERS[name]} | {needed} | {column.meaning} |" in rows
-    start = rows.index("| column | needed | meaning |")
-    assert rows.index("", start) - start == 2 + len(COLUMNS)

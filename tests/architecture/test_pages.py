@@ -15,13 +15,14 @@ import pytest
 import tolalloc as ta
 from tolalloc import exceptions
 from tolalloc.cli.start import KINDS, schema
+from tolalloc.drawings.fields import COLUMNS, HEADERS, ToleranceRow
 from tolalloc.study.prepared import Prepared
 
 ROOT = Path(__file__).parents[2]
 RUN = ("docs/own-model.md", "docs/extending.md")
 ASKS = ("many-studies", "notebook", "two-limits")
 LIKE_THE_NOTEBOOK = (  # the six lines that `tests/studies/test_notebook.py` runs, and studies that are made like it
-    *("README.md", "docs/first-study.md"),
+    *("README.md", "docs/reference/study.md"),
     *(f"docs/how-to/{name}.md" for name in ASKS),
 )
 PAGES = (*RUN, *LIKE_THE_NOTEBOOK)
@@ -110,6 +111,17 @@ def test_the_page_of_files_says_every_field_of_every_kind(monkeypatch):
                 assert f"| `{field}` |" in page
     assert "| `crank_count` | whole number | 2 to 6 |  |" in page
     assert "| `contact_angle_deg` | number | 0 or more, below 90 | `0.0` |" in page
+
+
+def test_the_page_of_columns_explains_each_as_the_list_of_fields_does(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    rows = importlib.import_module("columns_page").page().splitlines()
+    for name, column in COLUMNS.items():
+        needed = "yes" if ToleranceRow.model_fields[name].is_required() else ""
+        assert any(row.startswith(f"| {HEADERS[name]} | {needed} |") and f"| {column.meaning} |" in row for row in rows)
+    start = rows.index("| column | needed | allowed | meaning |")
+    assert len(rows) - start == 2 + len(COLUMNS)
+    assert "| Cp [-] |  | 0.1 to 10 | capability; 1 unless given |" in rows
 
 
 def test_the_page_of_public_names_lists_every_error():

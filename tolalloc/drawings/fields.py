@@ -65,7 +65,7 @@ Cell = str | int | float | MeasuredParts | None
 class TableColumn:
     """What a tolerance table knows of a field beside its type, its limits and its default."""
 
-    # What stands there, as ``docs/first-study.md`` explains it, and what the header says behind the name
+    # What stands there, as the page of columns explains it, and what the header says behind the name
     meaning: str
     unit: str = ""
     # Field of the source that is this cell, as the column is called unless given; none where `write` alone is
