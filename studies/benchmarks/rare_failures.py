@@ -1,6 +1,6 @@
 """Rare failures with exact answers: how often the estimate without a caution is off, and how often there is a caution.
 
-Each case of `tests/rare_cases.py` is asked with full effort and many seeds, from 16,384 random units on:
+Each case of `tests/reliability.py` is asked with full effort and many seeds, from 16,384 random units on:
 
     python studies/benchmarks/rare_failures.py [--seeds 100] [--case WORD] [--json]
 

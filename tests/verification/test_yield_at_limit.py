@@ -1,4 +1,4 @@
-"""Rare failures by methods that fail differently, on cases with exact answers (`tests.rare_cases`)."""
+"""Rare failures by methods that fail differently, on cases with exact answers (`tests.reliability`)."""
 
 from __future__ import annotations
 
