@@ -32,6 +32,7 @@ from tolalloc.models.function_model import from_fmu as from_fmu
 from tolalloc.models.function_model import model as model
 from tolalloc.models.model import Evaluation as Evaluation
 from tolalloc.models.model import Model as Model
+from tolalloc.models.model import installed_model as installed_model
 from tolalloc.models.settings import Setting as Setting
 from tolalloc.reducers import BACKLASH as BACKLASH
 from tolalloc.reducers import DISC_TEMPERATURE as DISC_TEMPERATURE

@@ -7,6 +7,7 @@ import json
 import tomllib
 
 import pytest
+import typer
 from typer.main import get_command
 
 from tests.studies.command import refused, tolalloc
@@ -135,16 +136,21 @@ def test_inner_tables_that_are_read_one_by_one_are_in_the_schema_too(tmp_path):
         load_plan(path)
 
 
+def help_of(command: str, at: int) -> str:
+    """Return what the help of a command says of an argument or option."""
+    found = get_command(app).commands[command]
+    return found.get_params(typer.Context(found))[at].help
+
+
 def test_kinds_are_those_of_the_help_and_another_is_refused():
-    said = get_command(app).commands["schema"].params[0].help
-    assert said == f"Kind of TOML file: {', '.join([*KINDS][:-1])} or {[*KINDS][-1]}."
+    assert help_of("schema", 0) == f"Kind of TOML file: {', '.join(KINDS)}."
     refused(tolalloc("schema", "bnch"), "bnch", "bench")
 
 
 def test_families_and_their_presets_are_those_of_the_help():
-    family, like = (own.help for own in get_command(app).commands["new"].params[1:3])
+    family, like = help_of("new", 1), help_of("new", 2)
     presets = {own.new.schema.replace("reducer", "rv"): ", ".join(own.new.presets) for own in FAMILIES.values()}
-    assert family == f"Family of reducers: {', '.join([*presets][:-1])} or {[*presets][-1]}; that of the preset."
+    assert family == f"Family of reducers: {', '.join(presets)}; that of the preset."
     first, *others = presets.items()
     named = [first[1], *(f"{word}: {own}" for word, own in others)]
     assert like == f"Preset that it is like: {'; '.join(named)}."

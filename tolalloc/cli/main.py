@@ -14,7 +14,7 @@ import typer
 
 from tolalloc.cli.console import answers_alone, note
 from tolalloc.cli.doctor import doctor
-from tolalloc.cli.new import new, schema
+from tolalloc.cli.new import Listing, new, schema
 from tolalloc.cli.open import open_page
 from tolalloc.cli.options import SayingNumbers, inquiry_command, saying_options
 from tolalloc.cli.run import allocate, rank, run
@@ -61,7 +61,7 @@ _FIRST_DAY = "1980-01-01"
 
 EXAMPLES = {command.__name__.removesuffix("_page"): example for command, example in _COMMANDS.items()}
 for (word, example), command in zip(EXAMPLES.items(), _COMMANDS, strict=True):
-    app.command(word, epilog=f"Example: `{example}`")(saying_options(command, word))
+    app.command(word, epilog=f"Example: `{example}`", cls=Listing)(saying_options(command, word))
 
 
 def main() -> None:

@@ -3,26 +3,60 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from tolalloc.cli.console import note, print_json, say
 from tolalloc.exceptions import InputError
 
 
+class Listing(TyperCommand):
+    """A command whose help lists what is known, of other packages too, which is loaded for that help alone."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Return arguments and options."""
+        found: list[Any] = super().get_params(ctx)
+        for own in found:
+            for mark, listed in _LISTS.items():
+                if own.help and mark in own.help:
+                    own.help = own.help.replace(mark, listed())
+        return found
+
+
+def _families() -> str:
+    from tolalloc.reducers.families.known import FAMILIES
+
+    return ", ".join(own.word for own in FAMILIES.values())
+
+
+def _presets() -> str:
+    from tolalloc.reducers.families.known import FAMILIES
+
+    first, *others = FAMILIES.values()
+    named = (f"{own.word}: {', '.join(own.new.presets)}" for own in others)
+    return "; ".join([", ".join(first.new.presets), *named])
+
+
+def _kinds() -> str:
+    from tolalloc.cli.start import KINDS
+
+    return ", ".join(KINDS)
+
+
+_LISTS: dict[str, Callable[[], str]] = {"FAMILIES": _families, "PRESETS": _presets, "KINDS": _kinds}
+"""What stands in a help for a list → the list."""
+
+
 def new(
     name: Annotated[Path | None, typer.Argument(help="The new folder, whose name becomes that of the study.")] = None,
-    family: Annotated[
-        str, typer.Option(help="Family of reducers: rv, rv-centre-gear or single-stage; that of the preset.")
-    ] = "",
+    family: Annotated[str, typer.Option(help="Family of reducers: FAMILIES; that of the preset.")] = "",
     like: Annotated[
         str,
-        typer.Option(
-            help="Preset that it is like: rv20e, rv40e, rv80e, rv110e, rv160e; rv-centre-gear: rv27c; "
-            "single-stage: cd29."
-        ),
+        typer.Option(help="Preset that it is like: PRESETS."),
     ] = "",
     cranks: Annotated[int | None, typer.Option(help="Cranks, 2 to 4; those of the preset unless given.")] = None,
     discs: Annotated[int | None, typer.Option(help="Discs, 1 to 3; those of the preset unless given.")] = None,
@@ -60,9 +94,7 @@ def new(
 def schema(
     kind: Annotated[
         str,
-        typer.Argument(
-            help="Kind of TOML file: reducer, rv-centre-gear, single-stage, unit, stiffness, bench or chain."
-        ),
+        typer.Argument(help="Kind of TOML file: KINDS."),
     ],
 ) -> None:
     """Print the JSON schema of a kind of TOML file: its fields, their units and ranges."""

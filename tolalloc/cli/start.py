@@ -23,6 +23,7 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_rows, table_text
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.reading.files import shipped_files
 from tolalloc.reading.units import ARCSECOND, COST_UNITS, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.model import EquivalentModel
@@ -30,7 +31,7 @@ from tolalloc.reducers.equivalent.sources import ErrorSource
 from tolalloc.reducers.families.family import NewRows
 from tolalloc.reducers.families.known import FAMILIES, SOURCES, family_of
 from tolalloc.reducers.reducer.design import Modification, Reducer
-from tolalloc.reducers.reducer.files import IdentifiedStiffnessRecord, load_reducer
+from tolalloc.reducers.reducer.files import PRESETS, IdentifiedStiffnessRecord, load_reducer
 from tolalloc.reducers.unit_file import UnitRecord
 from tolalloc.study.sample import NewReducer, Sample
 from tolalloc.wings import wings
@@ -47,7 +48,6 @@ KINDS: dict[str, Callable[[], type[BaseModel]]] = {
     **{kind: record for wing in wings() for kind, record in wing.schemas.items()},
 }
 """Kind of TOML file → the record that reads it."""
-_FOLDER = Path(__file__).parents[1] / "reducers" / "reducer" / "presets"
 _NUMBERED = re.compile(r"(disc|crank|bore|journal|planet|mesh)\d+")
 _CHOICES = {
     "feature": [str(feature.value) for feature in Feature],
@@ -175,7 +175,7 @@ class Likeness:
 
     def text(self, name: str) -> str:
         """Return the reducer file; new counts and the modification of the drawing are marked as assumptions."""
-        text = (_FOLDER / f"{self.preset}.reducer.toml").read_text(encoding="utf-8")
+        text = shipped_files(PRESETS, ".reducer.toml")[self.preset].read_text(encoding="utf-8")
         text = re.sub(r'^name = ".*"$', f'name = "{name}"', text, count=1, flags=re.MULTILINE)
         text, changed = self._with_modification(text), []
         for field, count in (("crank_count", self.cranks), ("disc_count", self.discs)):
@@ -206,7 +206,7 @@ class Likeness:
 
 def preset_of(family: str, like: str) -> str:
     """Return the preset of a new reducer: the one that is named, or the first of the family."""
-    names = {name.lower().replace(" ", "-"): own.new.presets for name, own in FAMILIES.items()}
+    names = {own.word: own.new.presets for own in FAMILIES.values()}
     if family and family not in names:
         raise UnknownNameError.among("new reducer", "family", family, names)
     if family and like and like not in names[family]:

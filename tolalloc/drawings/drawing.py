@@ -40,7 +40,7 @@ from tolalloc.drawings.tolerance_table import (
 )
 from tolalloc.exceptions import InputError
 from tolalloc.reading.file_content import is_file, other_encoding
-from tolalloc.reading.files import found_from_here, write_new
+from tolalloc.reading.files import found_from_here, shipped_or_path, write_new
 from tolalloc.reading.named_fields import is_number
 from tolalloc.reading.units import COST_UNITS, MICROMETRE, currency_in
 
@@ -329,7 +329,7 @@ def load_drawing(
         costs=_placed(costs if isinstance(costs, Mapping) else beside(folder, costs)),
         notes=(*notes, *doubts(sources, path.name)),
         currency=currency,
-        settings=stated_settings(path if path.suffix else DATA / f"{path.name}.tolerances.csv"),
+        settings=stated_settings(shipped_or_path(beside(folder, table), DATA, ".tolerances.csv", "tolerance table")),
         population=population,
         gauge_ratio=gauge_ratio,
     )

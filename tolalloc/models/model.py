@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float, UInt8
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.identity import identity
 from tolalloc.models.settings import DrawnAmounts, Setting
+from tolalloc.reading.plugins import plugins
 from tolalloc.running.chunks import Mapper
 
 if TYPE_CHECKING:
@@ -353,6 +354,20 @@ class DifferencedResponse:
 def is_fast(model: Model) -> bool:
     """Return whether a million units take seconds, as of a function that takes whole arrays."""
     return model.stated_rate >= ARRAY_RATE
+
+
+def installed_model(name: str) -> ModelSource:
+    """Return a model that another installed package brings, by its name.
+
+    Raises
+    ------
+    UnknownNameError
+        No package brings a model of that name.
+    """
+    known = plugins("models", (), ("bound", "name"))
+    UnknownNameError.require("ta.installed_model", "model", name, known)
+    found: ModelSource = known[name]
+    return found
 
 
 @runtime_checkable

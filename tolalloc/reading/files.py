@@ -19,6 +19,7 @@ import pydantic
 
 from tolalloc.exceptions import Faults, InputError, TolallocError, UnknownNameError, quoted
 from tolalloc.reading.file_content import is_file, read_text
+from tolalloc.reading.plugins import plugins, say_left_out
 
 Model = TypeVar("Model", bound=pydantic.BaseModel)
 
@@ -188,6 +189,16 @@ def _records(hint: Any) -> list[Any]:
     return [hint] if _fields(hint) else [own for part in get_args(hint) for own in _records(part)]
 
 
+def shipped_files(folder: Path, suffix: str) -> dict[str, Path]:
+    """Return the files of a kind by name: the shipped ones of a folder, then those that other packages bring."""
+    found = {file.name.removesuffix(suffix): file for file in folder.glob(f"*{suffix}")}
+    for module in plugins("files", (), ("__file__",)).values():
+        for file in sorted(Path(module.__file__).parent.glob(f"*{suffix}")):
+            if found.setdefault(file.name.removesuffix(suffix), file) != file:
+                say_left_out(str(file), "a file of that name is known already")
+    return found
+
+
 def shipped_or_path(name: str | Path, folder: Path, suffix: str, what: str) -> Path:
     """Return the file for a shipped name, or the user's own path.
 
@@ -198,7 +209,7 @@ def shipped_or_path(name: str | Path, folder: Path, suffix: str, what: str) -> P
     """
     if not isinstance(name, str | Path):
         raise InputError.at(f"{what} file", "name", name, "a shipped name or a path")
-    shipped = {file.name.removesuffix(suffix): file for file in folder.glob(f"*{suffix}")}
+    shipped = shipped_files(folder, suffix)
     if str(name) in shipped:
         return shipped[str(name)]
     path = found_from_here(name)

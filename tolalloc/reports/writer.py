@@ -20,6 +20,7 @@ from jinja2 import Environment, PackageLoader
 from markupsafe import Markup, escape
 
 from tolalloc.reading.files import no_formula
+from tolalloc.reading.plugins import plugin_versions
 from tolalloc.reading.units import in_cost_units, unit_of
 from tolalloc.reports.document import Document, Section
 from tolalloc.reports.excel import ANSWER, CONTENTS, write_sheets
@@ -139,7 +140,7 @@ def inline_png(figure: Figure | HeatMap) -> str:
 def versions() -> dict[str, str]:
     """Return the versions of everything that computes."""
     own = {"tolalloc": version("tolalloc"), "python": platform.python_version()}
-    return own | {name: version(name) for name in _LIBRARIES}
+    return own | {name: version(name) for name in _LIBRARIES} | plugin_versions()
 
 
 def write_document(document: Document, folder: Path) -> None:

@@ -115,9 +115,10 @@ class Inquiry(NamedFields, ABC, Generic[Prepared]):
         if getattr(self, "reducer", DEFAULT_REDUCER) is not None:
             return self
         if any(written) or any(getattr(self, name) for name in self.written):
+            from tolalloc.reading.files import shipped_files
             from tolalloc.reducers.reducer.files import PRESETS
 
-            presets = ", ".join(sorted(file.name.split(".")[0] for file in PRESETS.glob("*.reducer.toml")))
+            presets = ", ".join(sorted(shipped_files(PRESETS, ".reducer.toml")))
             raise InputError(
                 f"{argument} is missing: where a file is written the reducer must be named; allowed is a preset "
                 f"({presets}) or a TOML file."

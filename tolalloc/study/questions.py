@@ -12,6 +12,7 @@ from tolalloc.allocation.cost.unit_price import QualityLoss, UnitPrice
 from tolalloc.drawings.seeds import SeedTree
 from tolalloc.exceptions import UnknownNameError
 from tolalloc.reading.named_fields import NamedFields, Rule, a, flag, is_number, mapped, or_none, whole
+from tolalloc.reading.plugins import plugins
 from tolalloc.reports.header import Header
 from tolalloc.sensitivity.effort import BY_DIMENSION, BY_SOURCE
 from tolalloc.study.answer import Answer
@@ -223,7 +224,8 @@ def _answer(kind: str, header: Header, record: RunRecord, result: Result) -> Ans
 
 def questions_of(kinds: tuple[str, ...], asked: Sequence[Question], place: str) -> tuple[Question, ...]:
     """Return the questions of a study that are meant by their kinds; one that it does not ask has its defaults."""
-    known: dict[str, Any] = {"ranking": Ranking, "allocation": Allocation}
+    known: dict[str, Any] = {own.kind: own for own in (Ranking, Allocation)}
+    known |= plugins("questions", (*known, Difference.kind, Calculation.kind), ("kind", "answer", "__call__"), "kind")
     own = {question.kind: question for question in asked}
     for kind in kinds:
         if kind not in known and kind not in own:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from tolalloc.reading.plugins import plugins
+
 if TYPE_CHECKING:
     from tolalloc.study.inquiry import Inquiry
     from tolalloc.study.wing import Wing
@@ -17,7 +19,8 @@ def wings() -> tuple[Wing, ...]:
     from tolalloc.wings.bench.wing import BENCH
     from tolalloc.wings.motion.wing import MOTION
 
-    return BENCH, ASSEMBLY, MOTION
+    brought = plugins("wings", ("bench", "assembly", "motion"), ("questions", "samples", "schemas"))
+    return BENCH, ASSEMBLY, MOTION, *brought.values()
 
 
 @cache

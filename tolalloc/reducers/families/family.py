@@ -77,6 +77,11 @@ class ReducerFamily:
     # Gears before the sun in the picture: part → what it turns by, and where its first tooth starts [rad]
     turning: Callable[[Reducer], Mapping[str, tuple[Callable[[Positions], AtAngles], float]]] = lambda _: {}
 
+    @property
+    def word(self) -> str:
+        """Its name as a command takes it."""
+        return self.name.lower().replace(" ", "-")
+
     @cached_property
     def sources(self) -> ErrorSources:
         """All kinds of sources: of the interfaces, then of pins and teeth."""

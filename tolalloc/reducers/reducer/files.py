@@ -16,7 +16,7 @@ from tolalloc.exceptions import InputError
 from tolalloc.reading.file_content import read_text
 from tolalloc.reading.files import Record, as_toml, read_toml, shipped_or_path, validated, write_new
 from tolalloc.reading.units import MICROMETRE, MICRORADIAN
-from tolalloc.reducers.families.records import RECORDS
+from tolalloc.reducers.families.records import SHIPPED, records
 from tolalloc.reducers.reducer.design import Modification, Reducer
 from tolalloc.reducers.reducer.form import PartForm, load_designed
 from tolalloc.reducers.reducer.housing import GIVES, RING
@@ -56,7 +56,7 @@ class IdentifiedStiffnessRecord(Record):
 IDENTIFIABLE = tuple(
     name
     for name in dict.fromkeys(
-        (*(name for own in RECORDS for name in own.stiffness_fields()), *(RING + own for own in GIVES))
+        (*(name for own in SHIPPED for name in own.stiffness_fields()), *(RING + own for own in GIVES))
     )
     if name in Stiffness.__dataclass_fields__ and name != "pin_contact_law"
 )
@@ -84,7 +84,7 @@ def load_reducer(name: str | Path) -> Reducer:
 
 def _record_of(content: Mapping[str, Any]) -> type[AnyReducerRecord]:
     """Return what a file must hold: that of the last family whose table is in it, of an RV reducer if there is none."""
-    return next((own for own in reversed(RECORDS) if own.table in content), ReducerRecord)
+    return next((own for own in reversed(records()) if own.table in content), ReducerRecord)
 
 
 def write_modified(name: str | Path, modification: Modification, path: Path) -> None:

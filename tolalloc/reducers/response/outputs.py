@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from tolalloc.models.model import Evaluation, Response, Samples
+from tolalloc.reading.plugins import plugins
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, MEGAPASCAL, MICROMETRE, MILLIMETRE
 from tolalloc.reducers import (
     BACKLASH,
@@ -126,13 +127,15 @@ def requirements_of(reducer: Reducer) -> tuple[Reading, ...]:
         "largest line load, rated torque [N/mm]",
         "peak pressure, rated torque [MPa]",
     )
-    return (
+    shipped = (
         _PEAK_TO_PEAK,
         _LOOP,
         Reading(outputs=under_load, read=_load),
         Reading(outputs=(PRELOAD, FRICTION_TORQUE), read=_preload),
         Reading(outputs=(RADIAL_CLEARANCE,), read=_radial_clearance),
     )
+    names = (*WITH_FRICTION, *(name for own in shipped for name in own.outputs))
+    return (*shipped, *plugins("outputs", names, ("outputs", "read"), "outputs").values())
 
 
 def limited_outputs(reducer: Reducer) -> tuple[str, ...]:

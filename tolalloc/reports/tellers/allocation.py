@@ -11,6 +11,7 @@ from typing import Any
 import pandas as pd
 
 from tolalloc.allocation.result import AllocationResult
+from tolalloc.reading.plugins import left_out_if_broken, plugins
 from tolalloc.reading.units import unit_of
 from tolalloc.reports.columns import plain
 from tolalloc.reports.document import Section
@@ -301,6 +302,9 @@ class AllocationTeller(Teller[AllocationResult]):
     def add_files(self, folder: Path) -> None:
         """Write the drawing as files that are read back, go on calculating, and enter a drawing program."""
         write_drawing(self.result, self.header, folder)
+        for name, export in plugins("exports", (), ("__call__",)).items():
+            with left_out_if_broken(f"export {name!r} of {export.__module__}"):
+                export(self.result, self.header, folder)
 
 
 TELLER = AllocationTeller
