@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import re
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,34 +21,21 @@ class Listing(TyperCommand):
         """Return arguments and options."""
         found: list[Any] = super().get_params(ctx)
         for own in found:
-            for mark, listed in _LISTS.items():
-                if own.help and mark in own.help:
-                    own.help = own.help.replace(mark, listed())
+            if own.help and (marked := _LIST.search(own.help)):
+                own.help = own.help.replace(marked[0], _lists()[marked[0]])
         return found
 
 
-def _families() -> str:
-    from tolalloc.reducers.families.known import FAMILIES
-
-    return ", ".join(own.word for own in FAMILIES.values())
+_LIST = re.compile("FAMILIES|PRESETS|KINDS")  # What stands in a help for a list
 
 
-def _presets() -> str:
-    from tolalloc.reducers.families.known import FAMILIES
-
-    first, *others = FAMILIES.values()
-    named = (f"{own.word}: {', '.join(own.new.presets)}" for own in others)
-    return "; ".join([", ".join(first.new.presets), *named])
-
-
-def _kinds() -> str:
+def _lists() -> dict[str, str]:
     from tolalloc.cli.start import KINDS
+    from tolalloc.reducers.families.known import FAMILIES
 
-    return ", ".join(KINDS)
-
-
-_LISTS: dict[str, Callable[[], str]] = {"FAMILIES": _families, "PRESETS": _presets, "KINDS": _kinds}
-"""What stands in a help for a list → the list."""
+    words, presets = zip(*((own.word, ", ".join(own.new.presets)) for own in FAMILIES.values()), strict=True)
+    others = map(": ".join, zip(words[1:], presets[1:], strict=True))
+    return {"FAMILIES": ", ".join(words), "PRESETS": "; ".join([presets[0], *others]), "KINDS": ", ".join(KINDS)}
 
 
 def new(

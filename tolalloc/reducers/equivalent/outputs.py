@@ -277,8 +277,10 @@ def radial_clearance(model: EquivalentModel, errors: Errors) -> Float[np.ndarray
 
     Of errors without waves: −Δr_p + Δr_rp − d_k + r_k (own derivation) [m].
     """
-    discs = _standing_out(model, errors)
-    return np.asarray(-np.max([own.pin.max(axis=1) + own.tooth.max(axis=1) for own in discs], axis=0))
+    # One sample alone would be summed in another order than several.
+    discs = _standing_out(model, np.resize(errors, (max(len(errors), 2), errors.shape[1])))
+    found = -np.max([own.pin.max(axis=1) + own.tooth.max(axis=1) for own in discs], axis=0)
+    return np.asarray(found[: len(errors)])
 
 
 def radial_clearance_derivatives(model: EquivalentModel, errors: Errors) -> Errors:

@@ -10,8 +10,7 @@ from tolalloc.reducers.families.single_stage.design import SingleStageRecord
 from tolalloc.reducers.reducer.records import AnyReducerRecord, ReducerRecord
 
 SHIPPED: tuple[type[AnyReducerRecord], ...] = (ReducerRecord, CentreGearRecord, SingleStageRecord)
-FAMILY = ("name", "record", "interfaces", "new")
-"""Attributes by which a family is known."""
+FAMILY = ("name", "record", "interfaces", "new")  # Attributes by which a family is known
 
 
 @cache
