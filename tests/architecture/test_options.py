@@ -14,6 +14,7 @@ MEANT = {
         "Run folder, new or empty; the next one of runs/NAME, runs/NAME-2, … unless given.",
         "Write a report into this folder, new or empty.",
         "Folder of all run folders; finished ones in it are not run again.",
+        "Folder to write, new or empty.",
     },
     "--seed": {"Seed of every random number, instead of the study's.", "Seed of every random number."},
     "--torque": {

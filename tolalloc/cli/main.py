@@ -18,7 +18,7 @@ from tolalloc.cli.new import Listing, new, schema
 from tolalloc.cli.open import open_page
 from tolalloc.cli.options import SayingNumbers, inquiry_command, saying_options
 from tolalloc.cli.run import allocate, rank, run
-from tolalloc.cli.studies import check, series, whatif
+from tolalloc.cli.studies import check, export_problem, series, whatif
 from tolalloc.exceptions import InputError, StoppedError, TolallocError, in_short
 from tolalloc.wings import all_inquiries
 
@@ -49,6 +49,7 @@ _COMMANDS: dict[Callable[..., None], str] = {
     rank: "tolalloc rank mine/study.py --quick --pdf",
     allocate: "tolalloc allocate mine/study.py --grades --limit 50",
     whatif: "tolalloc whatif mine/study.py pin.diameter=3 'disc*.pitch=10'",
+    export_problem: "tolalloc export-problem mine/study.py --out mine/problem",
     series: "tolalloc series mine/*.py --quick",
     **{inquiry_command(own): own.example for own in all_inquiries()},
     schema: "tolalloc schema reducer",
@@ -59,7 +60,7 @@ _COMMANDS: dict[Callable[..., None], str] = {
 _FIRST_DAY = "1980-01-01"
 """First day that a file inside a workbook, a ZIP archive, can state."""
 
-EXAMPLES = {command.__name__.removesuffix("_page"): example for command, example in _COMMANDS.items()}
+EXAMPLES = {command.__name__.removesuffix("_page").replace("_", "-"): example for command, example in _COMMANDS.items()}
 for (word, example), command in zip(EXAMPLES.items(), _COMMANDS, strict=True):
     app.command(word, epilog=f"Example: `{example}`", cls=Listing)(saying_options(command, word))
 

@@ -1,4 +1,4 @@
-"""The commands that are also functions of ``ta``: ``check``, ``whatif``, ``series``."""
+"""The commands that are also functions of ``ta``, ``check``, ``whatif``, ``series``; and ``export-problem``."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from tolalloc.cli.console import (
 )
 from tolalloc.cli.run import Fresh, Quick, Scheduler, Script, solvers
 from tolalloc.exceptions import InputError, StoppedError
+from tolalloc.reading.named_fields import whole
 from tolalloc.study.script import load_script, load_study
 
 if TYPE_CHECKING:
@@ -75,6 +76,22 @@ def whatif(
     tell(
         answer, as_json, (answer.to_frame("changes"), "What changes"), (answer.to_frame("changed zones"), "Which zones")
     )
+
+
+def export_problem(
+    script: Script,
+    out: Annotated[Path, typer.Option(help="Folder to write, new or empty.")],
+    rows: Annotated[int, typer.Option(help="Random units in points.csv, and of the yield.")] = 2000,
+) -> None:
+    """Write a study as files for another tolerance program: tables, sampled points or formula, expected answers."""
+    from tolalloc.study.exported_problem import export_problem as exported
+
+    whole("a whole number from 10 to 1,000,000", 10, 10**6).check("tolalloc export-problem", "--rows", rows)
+    study = load_study(script)
+    announce_kernel(study.model)
+    with shown_progress() as progress:
+        said = exported(study, out, rows, progress)
+    say(f"{out}: {said} Begin with README.md.")
 
 
 def series(

@@ -187,7 +187,7 @@ def _member(
     *earlier, own = numbered(folder / study.name)
     try:
         with in_force():
-            current = () if fresh else (found for last in reversed(earlier) if (found := _finished(study, last)))
+            current = () if fresh else (found for last in reversed(earlier) if (found := finished_run(study, last)))
             finished = next(iter(current), None)
             if finished is None:
                 if earlier and not fresh and (unknown := Prepared(study=study).unknown):
@@ -199,7 +199,7 @@ def _member(
         return Member(name=study.name, folder=own, fault=str(error))
 
 
-def _finished(study: Study, folder: Path) -> FinishedRun | None:
+def finished_run(study: Study, folder: Path) -> FinishedRun | None:
     """Return what the folder says if it answers just this study at this effort."""
     with suppress(InputError):
         found = read_run(folder)
