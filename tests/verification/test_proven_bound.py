@@ -340,4 +340,5 @@ def test_the_report_says_what_no_drawing_costs_less_than(boxes, key):
         "allowed": str(found.allowed[0]),
     }
     assert found.says_more == (key == "proven")
-    assert says(answer.sentences, f"allocation.{key}", **own, **(more if found.says_more else {}))
+    first_page = answer.sentences[:5]
+    assert says(first_page, f"allocation.{key}", **own, **(more if found.says_more else {}))

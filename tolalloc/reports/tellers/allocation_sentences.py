@@ -346,10 +346,10 @@ def _compared(result: AllocationResult) -> str:
 
 
 def _certificate(result: AllocationResult) -> tuple[str, ...]:
-    """Return how far from optimal the answer can be."""
+    """Return how far from optimal the answer can be: first what was proven, if that was asked for."""
     if result.met and result.bound is None:
-        return (_say("no_bound"), *_proven(result))
-    return (*_free(result), *_proven(result), *_graded(result))
+        return (*_proven(result), _say("no_bound"))
+    return (*_proven(result), *_free(result), *_graded(result))
 
 
 def _proven(result: AllocationResult) -> tuple[str, ...]:
