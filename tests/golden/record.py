@@ -23,14 +23,14 @@ from pathlib import Path
 
 import pandas as pd
 
-from tests.golden.cases import LONGER, SMALL, Case, shipped
+from tests.golden.cases import LONGER, SMALL, UNRECORDED, Case, shipped
 from tests.studies.command import ROOT, tolalloc
 from tolalloc.running.compiled import processor
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
 Look = Callable[[subprocess.CompletedProcess[str], Path], None]
 FOLDER = Path(__file__).parent
-STUDIES = sorted(path.stem for path in (ROOT / "studies").glob("*.py"))
+STUDIES = sorted({path.stem for path in (ROOT / "studies").glob("*.py")} - {*UNRECORDED})
 CASES = {case.name: case for case in (*SMALL, *LONGER, *map(shipped, STUDIES))}
 _UNSTEADY = (
     (r"\d+(\.\d+)? s(?= here| to |,|$|\.)", "# s"),
