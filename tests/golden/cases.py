@@ -293,6 +293,7 @@ UNRECORDED = (
     "rv20e_duty",
     "rv20e_load_cases",
     "rv20e_lot",
+    "rv20e_processes",
     "rv20e_wear",
     "rv27c_ranking",
     "shimmed_bearing",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 from collections.abc import Callable
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import pandas as pd
@@ -16,6 +17,7 @@ from tests.golden.record import recorded
 from tests.studies.command import ROOT, process, refused
 from tests.studies.paper import can_print, lost
 from tests.studies.test_golden import require_golden
+from tolalloc.drawings.table_file import DATA
 from tolalloc.reports import pdf
 
 STUDIES = sorted((ROOT / "studies").glob("*.py"))
@@ -72,6 +74,17 @@ def _rv20e_lot(_: subprocess.CompletedProcess[str], folder: Path) -> None:
     assert max(shifts, key=shifts.__getitem__) == "pin.diameter"
 
 
+def _rv20e_processes(_: subprocess.CompletedProcess[str], folder: Path) -> None:
+    """No zone is smaller than its step makes, and the pins take the further one."""
+    drawn = ta.drawing(folder / "allocation.csv").sources
+    assert {own.process for own in drawn if own.name == "pin.diameter"} == {"ground and lapped"}
+    held = pd.read_csv(DATA / "rv20e_drawing.process_costs.csv", comment="#")
+    for own in drawn:
+        mine = held[held["sources"].map(lambda pattern, name=own.name: fnmatchcase(name, pattern))]
+        (least,) = mine[mine["process"] == own.process]["min [µm]"]
+        assert own.zone >= least * 1e-6 * (1 - 1e-9)
+
+
 FINDS = {
     "bores_lower_bound": "No drawing with free zones cheaper than",
     "cd29_ranking": "1. shaft assembly takes part in",
@@ -88,6 +101,7 @@ SAYS: dict[str, Callable[[subprocess.CompletedProcess[str], Path], None]] = {
     "xi2015_contact": _xi2015_contact,
     "gap_inspection": _gap_inspection,
     "rv20e_lot": _rv20e_lot,
+    "rv20e_processes": _rv20e_processes,
 }
 """What the answer of a study says, where that is more than a complete report."""
 

@@ -328,12 +328,15 @@ def solver_noise(solution: Solution) -> float:
     return max(solution.gap, _ROUNDING) * solution.cost
 
 
-def limit_step(side: OneSidedConstraint) -> float:
-    """Return a small change of a limit to tell its price by: a power of ten, a tenth of the limit at most.
+def limit_step(side: OneSidedConstraint, limits: Limits) -> float:
+    """Return a small change of a limit to tell its price by: a power of ten, at most a tenth of what the limits leave.
 
-    10^⌊log₁₀(|limit|/10)⌋, of what outputs are compared by where the limit is 0 (own derivation) [unit of the output].
+    10^⌊log₁₀(size/10)⌋ with the distance of two limits or the size of one, of what outputs are compared by where that
+    is 0 (own derivation) [unit of the output].
     """
     size = abs(side.limit) or side.scale
+    if limits.lower is not None and limits.upper is not None:
+        size = limits.upper - limits.lower
     return float(10.0 ** np.floor(np.log10(size / 10) + _OF_A_LOGARITHM)) if size > 0 else 1.0
 
 
@@ -341,12 +344,12 @@ _OF_A_LOGARITHM = 1e-9
 """What rounding may take of a logarithm [-]."""
 
 
-def limit_price(side: OneSidedConstraint, price: float) -> tuple[float, str]:
+def limit_price(side: OneSidedConstraint, limits: Limits, price: float) -> tuple[float, str]:
     """Return the price of a small change of a limit [cost units], and that change with its unit.
 
     λ·step (own derivation), as every shadow price for small changes.
     """
-    step, unit = limit_step(side), unit_of(side.stack.name)
+    step, unit = limit_step(side, limits), unit_of(side.stack.name)
     return price * step, unit if step == 1 else f"{step:g} {unit}".removesuffix(" -")
 
 

@@ -428,8 +428,9 @@ def _prices(result: AllocationResult, cost_unit: str) -> Iterator[str]:
     """Yield what the limits that the drawing touches cost, to first order."""
     for check, side in result.chosen.limited_sides if result.free.chosen.met else ():
         if price := result.price_of(check, side):
-            cost, _ = limit_price(side, price)
-            told = check.requirement.told(side.limit), f"{limit_step(side):g}"
+            limits = check.requirement.limits
+            cost, _ = limit_price(side, limits, price)
+            told = check.requirement.told(side.limit), f"{limit_step(side, limits):g}"
             limit, step = (with_unit(own, side.stack.name) for own in told)
             gaps = {"output": quantity(side.stack.name), "limit": limit, "step": step}
             yield _say("price", price=cost, cost_unit=cost_unit, **gaps)

@@ -37,7 +37,7 @@ def requirements_table(result: AllocationResult) -> Table[_Limited]:
     """Return every limited side with what each design was shown to keep, and what the limit costs."""
 
     def price(row: _Limited) -> tuple[float, str]:
-        return limit_price(row[1], result.price_of(row[2], row[1]))
+        return limit_price(row[1], row[2].requirement.limits, result.price_of(row[2], row[1]))
 
     def kept(label: str, design: VerifiedDesign) -> Column[_Limited]:
         header = f"kept: {label} [{unit}]"
