@@ -90,7 +90,7 @@ class UnknownNameError(TolallocError):
     def among(cls, place: Path | str, what: str, name: str, known: Iterable[str]) -> UnknownNameError:
         """Name the unknown, the kind of thing it should be, and the nearest known names."""
         names, name = sorted(known), in_short(name)
-        return cls(f"{place}: {what} {name!r} is not known; {_what_is_known(name, names)}.")
+        return cls(f"{place}: unknown {what} {name!r}; {_what_is_known(name, names)}.")
 
     @classmethod
     def require(cls, place: Path | str, what: str, name: str, known: Collection[str]) -> None:

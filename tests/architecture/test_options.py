@@ -13,7 +13,7 @@ MEANT = {
     "--out": {
         "Run folder, new or empty; the next one of runs/NAME, runs/NAME-2, … unless given.",
         "Write a report into this folder, new or empty.",
-        "Folder of all run folders; finished ones in it are not run again.",
+        "Folder for all run folders; finished runs in it are not repeated.",
         "Folder to write, new or empty.",
     },
     "--seed": {"Seed of every random number, instead of the study's.", "Seed of every random number."},
@@ -22,9 +22,9 @@ MEANT = {
         "Torque on the carrier [N·m], negative where it resists the rotation; minus the rated one unless given.",
     },
     "--write": {
-        "Reducer file to write, new: the reducer with these amounts.",
-        "Tolerance table to write, new: Cp and shift of the lot.",
-        "Stiffness file to write, new, for --stiffness elsewhere.",
+        "New reducer file to write, with these amounts.",
+        "New tolerance table to write, with Cp and shift of the lot.",
+        "New stiffness file to write, for --stiffness elsewhere.",
     },
 }
 """Option → what its helps say, where they differ in what holds unless given or in what is written."""

@@ -100,8 +100,8 @@ def test_a_centre_gear_is_mounted_as_one_part_with_the_sun():
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (("--family", "rv-centre-gear", "--like", "rv20e"), "preset of the family rv-centre-gear 'rv20e' is not known"),
-        (("--family", "rv", "--like", "rv27c"), "preset of the family rv 'rv27c' is not known"),
+        (("--family", "rv-centre-gear", "--like", "rv20e"), "unknown preset of the family rv-centre-gear 'rv20e'"),
+        (("--family", "rv", "--like", "rv27c"), "unknown preset of the family rv 'rv27c'"),
     ],
 )
 def test_what_no_folder_can_be_made_of_is_refused_in_one_sentence(tmp_path, arguments, says):

@@ -295,7 +295,10 @@ def test_a_run_folder_with_something_in_it_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (set_cell(3, "id", "disc2.bore9.position"), ["disc2.bore9.position.x", "not known", "disc2.bore2.position"]),
+        (
+            set_cell(3, "id", "disc2.bore9.position"),
+            ["unknown source 'disc2.bore9", "disc2.bore2.position"],
+        ),
         (set_cell(0, "plus [unit]", "-4"), ["row 2", "disc1.bore1.position", "-4", "must be 0 to 1000000 µm"]),
         (set_cell(4, "plus [unit]", "900000"), ["row 6", "zone 900000, max"]),
         (set_cell(1, "max [unit]", "300"), ["disc1.bore2.position", "up to 200 µm", "zone 3.8, max 300 µm"]),
@@ -442,7 +445,10 @@ def test_a_folder_that_cannot_be_made_is_refused_before_the_work(tmp_path):
         ({"limits": "{ta.PEAK_TO_PEAK: ta.Limit(lower=60.0, upper=50.0)}"}, ["limit: upper is 50", "above the lower"]),
         ({"limits": "{ta.PEAK_TO_PEAK: ta.Limit(upper=60.0, show=ta.AtYield(target=99.73))}"}, ["99.73", "0.5"]),
         ({"limits": "{ta.PEAK_TO_PEAK: 60.0}"}, [f"limits['{PEAK}']", "60.0", "ta.Limit"]),
-        ({"limits": "{'peak-to-peak [arcsec]': ta.Limit(upper=60.0)}"}, ["peak-to-peak [arcsec]", "not known", PEAK]),
+        (
+            {"limits": "{'peak-to-peak [arcsec]': ta.Limit(upper=60.0)}"},
+            ["unknown output", "peak-to-peak [arcsec]", PEAK],
+        ),
         ({"limits": "{}"}, ["limits is empty"]),
         ({"seed": -1}, ["seed", "-1"]),
         ({"name": "../elsewhere"}, ["name", "../elsewhere", "letters"]),

@@ -19,4 +19,4 @@ def test_the_doctor_tells_what_it_runs_on_and_solves_a_published_unit():
 
 def test_wrong_numbers_are_noticed(monkeypatch):
     monkeypatch.setattr(doctor, "_KNOWN", 96.7)
-    refused(tolalloc("doctor"), "trust no answer of this installation")
+    refused(tolalloc("doctor"), "do not trust this installation")

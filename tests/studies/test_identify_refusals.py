@@ -56,7 +56,7 @@ CASES = (
     asked(
         "unknown parameter",
         "crank_bearing",
-        "Error: tolalloc identify: parameter 'crank_bearing' is not known; the nearest known are crank_disc_bearing, "
+        "Error: tolalloc identify: unknown parameter 'crank_bearing'; the nearest known are crank_disc_bearing, "
         "crank_carrier_bearing, carrier_bearing.",
     ),
     asked("empty parameter", "=", "parameter", "=", "NAME=LOW:HIGH"),

@@ -131,7 +131,7 @@ def test_other_units_separators_and_columns(folder):
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
-        ("name =", "title =", "measurement.toml: field 'title' is not known; known are"),
+        ("name =", "title =", "measurement.toml: unknown field 'title'; known are"),
         ('name = "three units"\n', "", "measurement.toml: name is missing."),
         ('units = "units.csv"', "units = []", "measurement.toml: units is []; "),
         ('units = "units.csv"', "units = 5", "measurement.toml: units is 5; "),
@@ -142,15 +142,15 @@ def test_other_units_separators_and_columns(folder):
             'units = ["units.csv", "units.csv"]',
             "the name of a unit is '1'; allowed is each name",
         ),
-        ("torque_nm = -1", "torque = -1", "measurement.toml, peak_to_peak: field 'torque' is not known; the nearest"),
+        ("torque_nm = -1", "torque = -1", "measurement.toml, peak_to_peak: unknown field 'torque'; the nearest"),
         (
             "torque_nm = -1",
             "torque_nm = 0",
             "measurement.toml, peak_to_peak: torque_nm is 0; a torque of 0 is not allowed, as no pin carries; below 0 "
             "it resists the rotation.",
         ),
-        ('"2"\nfile', '"4"\nfile', "measurement.toml, curve 1: unit '4' is not known; known are 1, 2, 3."),
-        ('"3"\nfile', '"33"\nfile', "measurement.toml, loop 1: unit '33' is not known; the nearest known is 3"),
+        ('"2"\nfile', '"4"\nfile', "measurement.toml, curve 1: unknown unit '4'; known are 1, 2, 3."),
+        ('"3"\nfile', '"33"\nfile', "measurement.toml, loop 1: unknown unit '33'; the nearest known is 3"),
         ("noise_arcsec = 0.5", "noise_arcsec = 0", "measurement.toml, curve 1: noise_arcsec is 0; "),
         ("noise_arcsec = 0.5", "noise_arcsec = nan", "measurement.toml, curve 1: noise_arcsec is nan; "),
         ("start_stop_deg = 0", "start_stop_deg = -5", "measurement.toml, curve 1: start_stop_deg is -5; "),
@@ -158,7 +158,7 @@ def test_other_units_separators_and_columns(folder):
         (
             "angle_offset_deg = 90",
             "angle_offset = 90",
-            "curve 1: field 'angle_offset' is not known; the nearest known is",
+            "curve 1: unknown field 'angle_offset'; the nearest known is",
         ),
         ("carrier_angle_deg = 45", "", "measurement.toml, loop 1: carrier_angle_deg is missing."),
         ("carrier_angle_deg = 45", "carrier_angle_deg = 4500", "loop 1: carrier_angle_deg is 4500; "),
@@ -224,7 +224,7 @@ def test_bad_unit_tables_are_refused(folder, old, new, sentence):
             "\n1;",
             "peak_to_peak.csv, row 3: unit is '1'; allowed is each name once, and this one stands in row 2.",
         ),
-        ("\n3;", "\n30;", "peak_to_peak.csv, row 3: unit '30' is not known; the nearest known is 3"),
+        ("\n3;", "\n30;", "peak_to_peak.csv, row 3: unknown unit '30'; the nearest known is 3"),
         ("unit;", "name;", "peak_to_peak.csv: the column 'unit' is missing"),
         (
             "61",

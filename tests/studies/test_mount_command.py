@@ -54,7 +54,7 @@ def test_two_units_share_their_parts_and_are_reported(tmp_path):
     [
         (("--starts", "0"), "--starts is 0; allowed is 1 to 64"),
         (("--torque", "0"), "torque is 0.0"),
-        (("--reducer", "rv21e"), "'rv21e' is not known"),
+        (("--reducer", "rv21e"), "unknown name 'rv21e'"),
     ],
 )
 def test_a_wrong_option_is_refused(tmp_path, options, sentence):

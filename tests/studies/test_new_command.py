@@ -121,7 +121,7 @@ def test_a_reducer_of_three_cranks_with_turned_flanks_is_asked_and_checked(tmp_p
     assert clearances["flank clearance"] == pytest.approx(3.8 + clearances["rotation clearance"], abs=0.02)
     assert clearances["radial clearance"] == pytest.approx(8.6)
     for field, value, words in (
-        ("rotation_um", 2, ("'modification.rotation_um' is not known", "rotation_urad")),
+        ("rotation_um", 2, ("unknown field 'modification.rotation_um'", "rotation_urad")),
         ("rotation_urad", 9000, ("modification.rotation_urad is 9000", "5000")),
     ):
         path.write_text(re.sub(r"^(shift_um = .*)$", rf"\1\n{field} = {value}", text, flags=re.MULTILINE), "utf-8")

@@ -176,5 +176,9 @@ def test_bad_fields_are_refused_in_one_sentence(tmp_path, drawing, words):
 
 def test_a_limit_on_an_unknown_output_names_the_known_ones(tmp_path):
     script = script_with(tmp_path, limits="{'lost motoin [arcmin]': ta.Limit(upper=1.0)}")
-    refused(tolalloc("rank", script, "--out", tmp_path / "report"), "limit of 'lost motoin", "lost motion [arcmin]")
+    refused(
+        tolalloc("rank", script, "--out", tmp_path / "report"),
+        "unknown output in limits 'lost motoin",
+        "lost motion [arcmin]",
+    )
     assert not (tmp_path / "report").exists()

@@ -191,7 +191,7 @@ def test_a_value_without_its_name_or_of_no_field_is_refused():
         ta.te("rv20e")
     with pytest.raises(InputError, match=r"tolalloc diagnose: curve is missing"):
         ta.diagnose()
-    with pytest.raises(TolallocError, match="field 'reductor' is not known; the nearest known is reducer"):
+    with pytest.raises(TolallocError, match="unknown field 'reductor'; the nearest known is reducer"):
         ta.te(reductor="rv20e")
 
 

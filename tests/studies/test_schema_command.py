@@ -150,7 +150,7 @@ def test_kinds_are_those_of_the_help_and_another_is_refused():
 def test_families_and_their_presets_are_those_of_the_help():
     family, like = help_of("new", 1), help_of("new", 2)
     presets = {own.new.schema.replace("reducer", "rv"): ", ".join(own.new.presets) for own in FAMILIES.values()}
-    assert family == f"Family of reducers: {', '.join(presets)}; that of the preset."
+    assert family == f"Family of reducers: {', '.join(presets)}; as the preset unless given."
     first, *others = presets.items()
     named = [first[1], *(f"{word}: {own}" for word, own in others)]
-    assert like == f"Preset that it is like: {'; '.join(named)}."
+    assert like == f"Preset to start from: {'; '.join(named)}."

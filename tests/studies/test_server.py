@@ -579,7 +579,7 @@ def test_ctrl_c_ends_the_command_with_a_sentence(script):
         finally:
             process.kill()
     assert process.returncode == 0
-    assert said.strip().endswith("The page is closed. What you saved stands beside the study.")
+    assert said.strip().endswith("The page is closed. What you saved is in the folder of the study.")
     assert "Traceback" not in said
 
 

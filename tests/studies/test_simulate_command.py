@@ -102,7 +102,7 @@ def test_the_prototype_takes_a_units_errors_and_modification(tmp_path):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--engine", "newmrk"), ("engine 'newmrk' is not known", "newmark")),
+        (("--engine", "newmrk"), ("unknown engine 'newmrk'", "newmark")),
         (("--duration", "1.6"), ("duration is 1.6; allowed is 1.737 s or more",)),
         (("--torque", "0"), ("--torque is 0.0; allowed is -5720 N·m to below 0",)),
         (("--torque", "572"), ("--torque is 572.0", "a load that drives it is not simulated")),
@@ -125,8 +125,8 @@ def test_a_wrong_option_is_refused(options, words):
         ({"torque_nm": -6000.0}, "torque_nm is -6000.0"),
         ({"damping": -1.0}, "damping is -1.0; allowed is 0 or a positive number"),
         ({"pin_stiffness": float("nan")}, "pin_stiffness is nan"),
-        ({"reducer": "rv41e"}, "'rv41e' is not known"),
-        ({"unit": "tabel4"}, "'tabel4' is not known; the nearest known is table4"),
+        ({"reducer": "rv41e"}, "unknown name 'rv41e'"),
+        ({"unit": "tabel4"}, "unknown name 'tabel4'; the nearest known is table4"),
     ],
 )
 def test_a_number_or_name_out_of_range_is_refused(option, words):

@@ -79,10 +79,10 @@ def test_a_picture_shows_holes_and_output_pins():
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (("--family", "single-stage", "--like", "rv20e"), "preset of the family single-stage 'rv20e' is not known"),
-        (("--family", "harmonic"), "family 'harmonic' is not known; known are rv, rv-centre-gear, single-stage"),
+        (("--family", "single-stage", "--like", "rv20e"), "unknown preset of the family single-stage 'rv20e'"),
+        (("--family", "harmonic"), "unknown family 'harmonic'; known are rv, rv-centre-gear, single-stage"),
         (("--like", "cd29", "--cranks", "2"), "cranks is 2; allowed is nothing: a single stage has none"),
-        (("--like", "cd29", "--with", "assembly"), "sample 'assembly' is not known"),
+        (("--like", "cd29", "--with", "assembly"), "unknown sample 'assembly'"),
     ],
 )
 def test_what_no_folder_can_be_made_of_is_refused_in_one_sentence(tmp_path, arguments, says):

@@ -44,7 +44,7 @@ def stopped_after(monkeypatch, units: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("worth", "words"), [(0.0, "the same command goes on from there."), (np.inf, "Nothing was kept.")]
+    ("worth", "words"), [(0.0, "the same command continues from there."), (np.inf, "Nothing was kept.")]
 )
 def test_ctrl_c_is_a_sentence_that_says_what_is_kept(tmp_path, monkeypatch, worth, words):
     script, runs = script_with(tmp_path, asked="fixed_first=False, front=False, what_if=False"), tmp_path / "runs"

@@ -112,7 +112,7 @@ def test_samples_without_an_answer_are_counted(study):
 
 def test_a_source_that_is_no_input_is_refused(study):
     model = ta.model(lambda hub: hub, inputs=("hub",), outputs=("y [mm]",))
-    with pytest.raises(ta.UnknownNameError, match="source 'roller' is not known; known is hub"):
+    with pytest.raises(ta.UnknownNameError, match="unknown source 'roller'; known is hub"):
         model.bound(study.drawing.errors, "study x")
 
 

@@ -154,7 +154,7 @@ def test_a_shaft_too_short_to_bend_is_refused(tmp_path):
         load_reducer(path)
     path = altered(tmp_path, "sun_support = 1e8 ", "sun_support = { diameter = 20, length_mm = 15 } ")
     with pytest.raises(
-        UnknownNameError, match=r"stiffness\.sun_support\.diameter' .* stiffness\.sun_support\.diameter_mm"
+        UnknownNameError, match=r"stiffness\.sun_support\.diameter'; .* stiffness\.sun_support\.diameter_mm"
     ):
         load_reducer(path)
 

@@ -540,7 +540,7 @@ SHOP = [
     (ta.Sorting("shaft", "hole", width=2.0, classes=3), "3 classes that end at −1.00/1.00 µm from nominal", "to [µm]"),
     (
         ta.Indexing("other", positions=6, against={"one": -1.0}),
-        "mount other at the one of 6 positions 60° apart",
+        "mount other at whichever of 6 positions 60° apart",
         "turned",
     ),
     (

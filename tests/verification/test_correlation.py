@@ -125,7 +125,7 @@ def test_a_list_of_groups_correlates_every_pair_of_a_group(tmp_path, suffix):
     assert errors.correlation.mappings(errors.sources) == (
         "disc1.bore1, disc1.bore2, disc1.bore3: correlation 0.6 of each with each",
     )
-    with pytest.raises(UnknownNameError, match=r"row 3: source 'disc2.bore\[!0-9\]x' is not known"):
+    with pytest.raises(UnknownNameError, match=r"row 3: unknown source 'disc2.bore\[!0-9\]x'"):
         load_correlations(write(tmp_path, rows, suffix), SIZES + BORES)
 
 
@@ -157,7 +157,7 @@ def test_sources_with_unlike_columns_are_refused(other, columns):
 
 LIST = ["sources", "correlation"]
 BAD = [
-    ([LIST, ["a b", 0.5], ["a aa", 0.1]], r"row 3: source 'aa' is not known"),
+    ([LIST, ["a b", 0.5], ["a aa", 0.1]], r"row 3: unknown source 'aa'"),
     ([LIST, ["a b", 1.5]], r"row 2, a with b: correlation is 1\.5; allowed is -1 to 1"),
     ([LIST, ["a b", "nan"]], r"row 2, a with b: correlation is nan"),
     ([LIST, ["a b", "0,5"]], r"row 2 \(a b\): correlation is '0,5'"),
@@ -168,9 +168,9 @@ BAD = [
     ([LIST, ["a disc1.bore1", 0.5]], r"row 2, a with disc1\.bore1: columns is 'a with disc1\.bore1\.x'"),
     ([LIST, ["a b c", -0.9]], r"least eigenvalue of the correlation matrix is -0\.8; .* -0\.9 of [abc] with [abc]"),
     ([LIST], r"no rows below its header"),
-    ([["sources", "corelation"], ["a b", 0.5]], r"row 1: column 'corelation' is not known; .* correlation"),
-    ([["sources", "correlation", "notes"], ["a b", 0.5, ""]], r"row 1: column 'notes' is not known"),
-    ([["source", "correlation"], ["a b", 0.5]], r"row 1: column 'source' is not known"),
+    ([["sources", "corelation"], ["a b", 0.5]], r"row 1: unknown column 'corelation'; .* correlation"),
+    ([["sources", "correlation", "notes"], ["a b", 0.5, ""]], r"row 1: unknown column 'notes'"),
+    ([["source", "correlation"], ["a b", 0.5]], r"row 1: unknown column 'source'"),
     ([["note", "correlation"], ["a b", 0.5]], r"row 1: number of columns 'sources' is 0; allowed is 1"),
     ([["", "a", "b"], ["a", 1, 0.5], ["b", 0.4, 1]], r"row 3, b with a: correlation is 0\.4; .*row 2 says 0\.5"),
     ([["", "a", "b"], ["a", 1, 0.5], ["b", 0.5, 0.9]], r"row 3 \(b\): value on the diagonal is 0\.9; allowed is 1"),

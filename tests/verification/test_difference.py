@@ -100,7 +100,7 @@ def test_a_neglected_source_is_refused_as_such():
     )
     with pytest.raises(InputError, match=sentence):
         neglected.ask(ta.Difference(zones={"shaft": 5.0}))
-    with pytest.raises(UnknownNameError, match="source 'shafts' is not known; known is housing"):
+    with pytest.raises(UnknownNameError, match="unknown source 'shafts'; known is housing"):
         neglected.ask(ta.Difference(zones={"shafts": 5.0}))
 
 
@@ -157,7 +157,7 @@ def test_a_process_prices_the_zone_that_it_holds():
         (3, "zones is 3; allowed is source names with their zones"),
         ({1: 2.0}, "allowed is source names with their zones"),
         ({}, "no zone is given"),
-        ({"bolt": 3.0}, "source 'bolt' is not known"),
+        ({"bolt": 3.0}, "unknown source 'bolt'"),
         ({"shaft": -1.0}, "shaft is -1.0; allowed is a zone above 0"),
         ({"shaft": float("nan")}, "shaft is nan; allowed is a zone above 0"),
     ],

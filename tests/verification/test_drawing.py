@@ -190,7 +190,7 @@ def test_a_notebook_shows_the_table():
 @pytest.mark.parametrize(
     ("changes", "error", "sentence"),
     [
-        ({"zone": 0.2}, UnknownNameError, r"drawing, row 1 \(hub\): column 'zone' is not known"),
+        ({"zone": 0.2}, UnknownNameError, r"drawing, row 1 \(hub\): unknown column 'zone'"),
         ({"unit": None}, InputError, r"drawing, row 1 \(hub\): unit is missing"),
         ({"plus": "wide"}, InputError, r"row 1 \(hub\): plus is 'wide'; allowed is a number"),
         ({"plus": 3000.0}, InputError, "the zone plus − minus is 3000100 µm and must be 0 to 1000000 µm"),
@@ -201,7 +201,7 @@ def test_a_notebook_shows_the_table():
             "neglects the source, or a zone above 0 up to 1000000 µm\\.$",
         ),
         ({"feature": "weight"}, InputError, "feature is 'weight'; allowed is one of size"),
-        ({"process": "grond"}, UnknownNameError, "process for feature size 'grond' is not known"),
+        ({"process": "grond"}, UnknownNameError, "unknown process .with an empty Cp. for feature size 'grond'"),
         ({"id": "cage"}, InputError, r"row 2 \(cage\): id is 'cage' for the second time"),
         ({"id": ""}, InputError, r"row 1 \(no id\): id is missing"),
     ],

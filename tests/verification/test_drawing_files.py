@@ -201,7 +201,7 @@ def test_setting_and_sum_stand_in_workbook_and_frames(answer, folder):
     assert rows[0] == ("what", "value [unit]", "before [unit]", "unit", "tolerance ± [µm]")
     assert rows[1] == ("spring", pytest.approx(value), pytest.approx(0.1), "mm", None)
     printed = [str(row[0].value) for row in load_workbook(folder / "drawing.xlsx")["drawing"].iter_rows()]
-    said = f"The drawing holds with these settings only: spring {value:.2f} mm".replace("-", "−")
+    said = f"The drawing is valid only with these settings: spring {value:.2f} mm".replace("-", "−")
     assert any(text.startswith(said) for text in printed)
     assert any(text.startswith(said) for text in paragraphs(folder / "frames.dxf"))
     assert ["", "spring", f"{value:.2f}".replace("-", "−"), "", "mm", ""] in cells(folder / "frames.dxf", "TABLE")

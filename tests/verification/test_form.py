@@ -351,8 +351,8 @@ def test_a_unit_file_names_profiles_and_roundness(reducer, tmp_path):
 @pytest.mark.parametrize(
     ("text", "heads", "said"),
     [
-        (UNIT.replace("disc2]", "disc3]"), None, "disc with a profile 'disc3' is not known"),
-        (UNIT.replace("roundness.7", "roundness.41"), None, "roundness of a pin 'each_pin.roundness.41' is not known"),
+        (UNIT.replace("disc2]", "disc3]"), None, "unknown disc with a profile 'disc3'"),
+        (UNIT.replace("roundness.7", "roundness.41"), None, "unknown roundness of a pin 'each_pin.roundness.41'"),
         (UNIT + "spans = 400\n", None, "spans is 400; allowed is 0, or 1 to 1"),
         (UNIT.replace("true", '"yes"'), None, "aligned"),
         (UNIT + "datum = 3\n", None, "datum"),

@@ -275,7 +275,7 @@ def test_all_faults_of_other_files_are_said(tmp_path):
     toml = written(tmp_path / "u.unit.toml", 'name = 1\nsorce = "s"\n[lengths]\na = 1e9\nb = "x"\n')
     said = faults(load_unit, toml)
     assert len(said) == 4
-    assert "field 'sorce' is not known; the nearest known is source" in said[0]
+    assert "unknown field 'sorce'; the nearest known is source" in said[0]
     assert not any("source is missing" in sentence for sentence in said)
     readings = written(tmp_path / "r.csv", "angle [deg],transmission error [arcsec]\nx,1\n2,2\ny,4\n")
     assert len(faults(lambda path: load_readings(path, "angle", "transmission error"), readings)) == 2

@@ -105,7 +105,7 @@ def test_every_balloon_of_the_sheet_is_a_line_of_the_plan(folder):
     texts = [own.dxf.text for own in sheet.query("TEXT")]
     assert "Cp ≥ 1.33, centred" in texts
     notes = " ".join(own.text for own in sheet.query("MTEXT"))
-    assert "Population (as ISO 18391 means it)" in notes
+    assert "Population (in the sense of ISO 18391)" in notes
     assert "spread evenly" in notes
 
 
@@ -129,7 +129,7 @@ def test_lot_reads_the_values_that_a_measuring_room_puts_behind_the_description(
     assert run.exit_code == 0, run.output
     said = " ".join(run.output.split())
     assert "Moved: the mean of ring" in said
-    assert "The other 2 columns are what the drawing's processes make." in said
+    assert "The other 2 columns agree with the drawing's processes." in said
 
 
 def test_lot_refuses_a_unit_that_it_does_not_know_and_a_characteristic_of_no_source(folder, tmp_path):
@@ -201,7 +201,7 @@ def said_of(statuses, **changed):
 
 def test_study_of_assumed_numbers_alone_says_so_first():
     answer, paragraphs = said_of(["assumed"] * 3)
-    assert answer.teller.sentences[0].startswith("Every zone, range and cost of this table is assumed")
+    assert answer.teller.sentences[0].startswith("Every zone, range and cost in this table is assumed")
     assert answer.teller.before == answer.teller.sentences[:1]
     assert not any(text.startswith("Assumed, not measured") for text in paragraphs)
 
@@ -213,7 +213,7 @@ def test_assumed_prices_are_counted_with_what_they_make_of_the_change_of_cost():
     moved = [abs(own.cost - 10.0) for own in drawn]
     share = (moved[0] + moved[2]) / sum(moved)
     assert "1 of 3 zones, 1 of 3 ranges and 2 of 3 costs" in said
-    assert f"costs make {100 * share:.0f}" in said
+    assert f"costs account for {100 * share:.0f}" in said
 
 
 def test_table_that_says_nothing_of_its_numbers_gets_no_count(told):
@@ -237,7 +237,7 @@ def test_line_of_several_sizes_or_gauges_is_parted_in_the_plan_and_a_gauge_too_c
     answer.teller.add_files(tmp_path)
     plan = plan_of(tmp_path)
     assert [own["nominal [mm]"] for own in plan] == [42, 6, 3]
-    assert plan[2]["accept to [mm]"] == "no reading can show it"
+    assert plan[2]["accept to [mm]"] == "no gauge reading can show it"
     assert [own.fields["K2101"] for own in read_description(tmp_path / "inspection.dfd").values()] == [
         "42.000000",
         "6.000000",

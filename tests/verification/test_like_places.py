@@ -59,7 +59,7 @@ def test_a_place_with_a_row_of_its_own_keeps_it():
     ("rows", "words"),
     [
         ([{"id": "4x crank*.journal*.eccentricity"}], "places is 4; allowed is 6, as many as crank.*crank3.journal2"),
-        ([{"id": "disk*.bore*.position"}], r"source 'disk\*.bore\*.position' is not known; the nearest known"),
+        ([{"id": "disk*.bore*.position"}], r"unknown source 'disk\*.bore\*.position'; the nearest known"),
         ([{"id": "disc1.pitch", "places": 2}], "places is 2; allowed is 1, as many as disc1.pitch"),
         (
             [{"id": "disc*.bore1.position"}, {"id": "disc*.bore*.position"}, {"id": "6x disc.bore.position"}],
@@ -195,4 +195,4 @@ def test_a_lot_reads_a_row_by_its_id(tmp_path):
     path = written(tmp_path / "lot.csv", READINGS.replace("pin1 [µm];pin3", "Bolzen [µm];key"))
     assert [own.source.name for own in load_lot(path, drawing.sources)] == ["pin*", "key"]
     unknown = written(tmp_path / "other.csv", READINGS.replace("pin1", "bolt1").replace("pin3", "key"))
-    assert "'bolt1' is not known" in refusal(lambda path: load_lot(path, drawing.sources), unknown)
+    assert "unknown source of column 'bolt1'" in refusal(lambda path: load_lot(path, drawing.sources), unknown)

@@ -207,7 +207,7 @@ def stack(a: float) -> float:
 
 def reached(sentences: tuple[str, ...]) -> list[float]:
     """Return what parts in the middle of their zones reach of every limit that they miss."""
-    return [float(re.search(r"best of them is (\S+)", own)[1]) for own in sentences]
+    return [float(re.search(r"best value is (\S+)", own)[1]) for own in sentences]
 
 
 def study_of_one(

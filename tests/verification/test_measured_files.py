@@ -144,7 +144,7 @@ def test_bad_names_of_aqdef_characteristics_and_files_are_refused(tmp_path):
     assert "2 characteristics are called 'Bolzen Ø'" in refusal(
         load_tolerance_table, table(tmp_path, "parts.dfq:Bolzen Ø")
     )
-    with pytest.raises(UnknownNameError, match="characteristic '19' is not known; the nearest known"):
+    with pytest.raises(UnknownNameError, match="unknown characteristic '19'; the nearest known"):
         load_tolerance_table(table(tmp_path, "parts.dfq:19"))
     assert "allowed is parts.dfd, which describes" in refusal(load_tolerance_table, table(tmp_path, "parts.dfx"))
     aqdef(tmp_path, head(), name="parts.dfd")

@@ -29,7 +29,9 @@ def model() -> ReducerModel:
 
 
 def lost_motion(sentences: tuple[str, ...]) -> float:
-    (found,) = (re.search(r"lost motion (\S+)′ where it allows", own) for own in sentences if "lost motion" in own)
+    (found,) = (
+        re.search(r"lost motion is (\S+)′, the catalogue allows", own) for own in sentences if "lost motion" in own
+    )
     assert found is not None
     return float(found[1])
 

@@ -166,7 +166,7 @@ def test_drawing_for_parts_anywhere_in_their_zones_demands_the_zones_alone(tmp_p
     answer = study(population=ANYWHERE).allocate(effort="quick")
     answer.teller.add_files(tmp_path)
     described = (tmp_path / "inspection.dfd").read_text(encoding="utf-8")
-    assert described.count("K2900") == described.count("the zone alone") == 3
+    assert described.count("K2900") == described.count("no demand beyond the zone") == 3
     assert not any("This holds for parts" in own for own in answer.teller.sentences)
 
 

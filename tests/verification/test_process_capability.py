@@ -46,7 +46,7 @@ def test_the_shipped_library_is_marked_as_assumed():
 
 def test_an_unknown_process_is_refused_with_the_nearest_ones(tmp_path):
     with pytest.raises(
-        UnknownNameError, match=r"row 2 \(a\): Cp is empty, and process for feature size 'owm' is .* own"
+        UnknownNameError, match=r"row 2 \(a\): unknown process .with an empty Cp. for feature size 'owm'; .* own"
     ):
         loaded(tmp_path, "owm")
     with pytest.raises(UnknownNameError, match="shipped process capability library"):
@@ -56,7 +56,7 @@ def test_an_unknown_process_is_refused_with_the_nearest_ones(tmp_path):
 def test_a_process_of_which_only_the_price_is_known_needs_its_own_cp(tmp_path):
     row = loaded(tmp_path, "turned hard", "Cp", "1.1")
     assert (row.process, row.cp, row.distribution, row.sorted) == ("turned hard", 1.1, Distribution.NORMAL, False)
-    with pytest.raises(UnknownNameError, match="Cp is empty"):
+    with pytest.raises(UnknownNameError, match="with an empty Cp"):
         loaded(tmp_path, "turned hard", "shift", "0.1")
 
 
@@ -68,7 +68,7 @@ BAD = [
     ("weibull,2.0", "mixture,", "mixture belongs to single sources"),
     ("own,position,1.5,", "own,position,1.5,0.2", "shift must be 0 for feature position: 0.2"),
     ("own,position", "own,size", r"row 3 \(own\): process is 'own' for feature size for the second time"),
-    ("note\n", "source\n", "column 'source' is not known; the nearest known"),
+    ("note\n", "source\n", "unknown column 'source'; the nearest known"),
     ("Cp [-]", "shift [-]", "the column 'shift' is there twice"),
     (",measured in the shop\nown,pos", ",\nown,pos", "note is missing"),
 ]

@@ -152,7 +152,7 @@ def test_inspection_is_part_of_what_shop_points_cost(name, tmp_path):
 def test_the_cost_of_the_tolerance_table_is_that_of_its_process_alone(tmp_path):
     rows = ["disc1.pitch,hobbed,reciprocal,,20,,,,,,,,shop", "disc1.pitch,ground,reciprocal,,,,,,,,,,shop"]
     sentence = (
-        r"row 3 \(disc1.pitch\): factor is missing: the tolerance table's cost of disc1.pitch is that of 'hobbed'\."
+        r"row 3 \(disc1.pitch\): factor is missing: the tolerance table's cost of disc1.pitch belongs to 'hobbed'\."
     )
     with pytest.raises(InputError, match=sentence):
         loaded(tmp_path, *rows)
@@ -180,7 +180,7 @@ def test_points_of_the_kind_of_callout_come_first(tmp_path):
 
 GOOD = "disc1.pitch,own,reciprocal,0,20,,,,,,,,shop"
 BAD = [
-    (("disc3.pitch,own,reciprocal,0,20,,,,,,,,s",), r"row 2 \(disc3.pitch\): source 'disc3.pitch' is not known"),
+    (("disc3.pitch,own,reciprocal,0,20,,,,,,,,s",), r"row 2 \(disc3.pitch\): unknown source 'disc3.pitch'"),
     ((GOOD, GOOD), r"row 3 \(disc1.pitch\): process is 'own' for disc1.pitch for the second time"),
     ((GOOD, GOOD.replace("disc1", "disc*")), "row 3 .* for the second time"),
     (("disc1.pitch,own,reciprocal,0,20,,,,,2,,,s",), "no process can hold a zone of 3.5 to 46.6 µm for disc1.pitch"),
@@ -197,8 +197,8 @@ BAD = [
     (("disc1.pitch,own,reciprocal,0,20,,,,9,8,,,s",), "min must not be above max: 9, 8 µm"),
     (("disc1.pitch,own,reciprocal,0,20,,,,,,,,",), "note is missing"),
     (("disc1.pitch,own,reciprocal,2.9,,,,,,,,0.2,s",), "fixed and inspection without a factor is 3.1; .* less than 3,"),
-    (("disc1.pitch,own,tabulated,,,,,shop.csv,,,,,s",), "process for feature pitch 'own' is not known; .* hobbed"),
-    (("disc1.pitch,ground,spline,,,,,shop.csv,,,,,s",), "process for feature pitch 'ground' is not known"),
+    (("disc1.pitch,own,tabulated,,,,,shop.csv,,,,,s",), "unknown process for feature pitch 'own'; .* hobbed"),
+    (("disc1.pitch,ground,spline,,,,,shop.csv,,,,,s",), "unknown process for feature pitch 'ground'"),
     (("disc1.pitch,milled,spline,,,,,shop.csv,,,,,s",), "a zone of 5 costs 2 and a zone of 20 costs 3; allowed"),
     (("disc1.pitch,hobbed,fitted,,,,,none.csv,,,,,s",), "none.csv: no such file"),
 ]
@@ -212,12 +212,12 @@ def test_bad_process_cost_tables_are_refused_in_one_sentence(rows, sentence, tmp
 
 
 def test_a_process_of_the_tolerance_table_needs_its_row(tmp_path):
-    with pytest.raises(TolallocError, match=r"process of disc1.pitch in the tolerance table, 'groud' is not known"):
+    with pytest.raises(TolallocError, match=r"unknown process of disc1.pitch in the tolerance table, 'groud'"):
         loaded(tmp_path, GOOD.replace("own", "ground"), sources=(replace(PITCH, process="groud"),))
 
 
 def test_unknown_and_missing_columns_are_refused(tmp_path):
-    with pytest.raises(TolallocError, match="column 'fix' is not known; the nearest known is fixed"):
+    with pytest.raises(TolallocError, match="unknown column 'fix'; the nearest known is fixed"):
         loaded(tmp_path, GOOD, header=HEADER.replace("fixed [", "fix ["))
     with pytest.raises(InputError, match="the column 'note' is missing; needed are sources, process, model, note"):
         loaded(tmp_path, "disc1.pitch,own,reciprocal", header="sources,process,model\n")
@@ -231,7 +231,7 @@ def test_unknown_and_missing_columns_are_refused(tmp_path):
         ("30,µm", "-30,µm", "tolerance is -30.0; input should be greater than or equal to 0.000001"),
         ("hobbed,,30", ",,30", r"row 2 \(no process\): process is missing"),
         ("µm,1.2", "µm,cheap", "cost is 'cheap'; allowed is a number"),
-        ("tolerance [unit]", "zone [µm]", "column 'zone' is not known"),
+        ("tolerance [unit]", "zone [µm]", "unknown column 'zone'"),
         ("ground,runout,20,µm,1\n", "", r"shop.csv \(ground, zones in µm\): zones and costs is .* two zones or more"),
     ],
 )
@@ -270,7 +270,7 @@ def test_of_costs_from_python_those_stay_whose_zones_the_source_may_have():
 @pytest.mark.parametrize(
     ("rows", "sentence"),
     [
-        ({"disc3.pitch": []}, "process costs: source whose zone may change, 'disc3.pitch' is not known"),
+        ({"disc3.pitch": []}, "process costs: unknown source with a free zone 'disc3.pitch'"),
         ({"disc1.pitch": [("own", 1, 1, 0.01, 0.02)] * 2}, "processes is .* allowed is each name once"),
         ({"disc1.pitch": [("own", 1, 1, 1, 2)]}, "no process can hold a zone of 3.5 to 46.6 µm for disc1.pitch"),
         ({"disc1.pitch": [("own", 1, -1, 0.01, 0.02)]}, "factor is -0.001; allowed is a finite number above 0"),

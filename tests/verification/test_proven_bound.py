@@ -280,14 +280,14 @@ def test_a_condition_of_several_limits_counts_units_that_fail_any():
     ("slopes", "says"),
     [
         ({}, "no bound can be proven, as model chain states no slopes of gap [mm]; take 0"),
-        ({"gap": {}}, "output 'gap' is not known"),
+        ({"gap": {}}, "unknown output 'gap'"),
         ({GAP: {"a": (0, 1)}}, "slopes of gap [mm]: b is None; allowed is two finite numbers"),
         (3, "model chain: slopes is 3; allowed is output → input → two numbers"),
         ({GAP: [1, 2]}, "slopes: gap [mm] is [1, 2]; allowed is input → its least and its largest derivative"),
         ({GAP: {"a": ("x", 1)}}, "a is ('x', 1); allowed is two finite numbers"),
         ({GAP: {"a": 1.0}}, "a is 1.0; allowed is two finite numbers"),
         ({GAP: {"a": (1, 0), "b": (0, 1), "c": (0, 1)}}, "a is (1, 0); allowed is two finite numbers"),
-        ({GAP: {"d": (0, 1)}}, "input 'd' is not known"),
+        ({GAP: {"d": (0, 1)}}, "unknown input 'd'"),
     ],
 )
 def test_what_no_bound_can_be_proven_of_is_said_before_anything_runs(slopes, says):

@@ -215,7 +215,7 @@ def test_a_quick_run_says_of_which_sources_too_few_blocks_show_what_they_do():
     found = answer.result.sobol.of(0)
     assert says(answer.sentences, "ranking.unseen", blocks=QUICK_RANKING.sobol.start, fewest=5)
     assert answer.result.sobol.small and says(answer.sentences, "ranking.others", count=4)
-    said = [own for own in answer.sentences if "too few to say" in own]
+    said = [own for own in answer.sentences if "too few to measure" in own]
     named = [name for own in said for name in own.rpartition(": ")[2].partition(".")[0].split(", ")]
     assert {"b", "c"} <= set(named) and not {"k", "m"} & set(named)
     for low, high in (found.first_interval, found.total_interval, answer.result.sobol.overall.total_interval):
@@ -277,7 +277,7 @@ def test_a_quick_run_counts_the_units_beyond_a_limit_and_says_that_rarer_ones_ne
     study = both_limits(0.03, 0.06)
     quick = study.rank("quick")
     assert [own.method for own in quick.result.beyond.estimates] == ["Monte Carlo"]
-    assert any("rarer ones are a full run's question" in own for own in quick.sentences)
+    assert any("rarer ones need a full run" in own for own in quick.sentences)
     asked = study.rank(ta.Effort(ranking=replace(QUICK_RANKING, rare=True)))
     assert len(asked.result.beyond.estimates) > 1
     # σ is 7.5 µm: 30 µm are 4.02 σ away.

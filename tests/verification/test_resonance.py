@@ -60,9 +60,9 @@ def test_a_sentence_says_which_orders_and_where_or_that_there_is_none():
     loaded = replace(reducer, load=replace(reducer.load, inertia=10.0))
     speed = resonance_of(loaded, -167.0, 10.0).input_speed(78)
     said = resonance_sentence(loaded, -167.0, (39, 78), 1.01 * speed)
-    assert f"order 78 of the output meets it at {speed:,.0f} rpm" in said
-    assert "no order that the train makes meets it up to 10 rpm" in resonance_sentence(loaded, -167.0, (39, 78), 10.0)
-    assert "orders 78 and 39 of the output meet it at" in resonance_sentence(loaded, -167.0, (39, 78), None)
+    assert f"order 78 of the output excites it at {speed:,.0f} rpm" in said
+    assert "no order of the gear train excites it up to 10 rpm" in resonance_sentence(loaded, -167.0, (39, 78), 10.0)
+    assert "orders 78 and 39 of the output excite it at" in resonance_sentence(loaded, -167.0, (39, 78), None)
 
 
 def test_exact_parts_without_a_stiffness_are_said_and_end_no_report():
@@ -100,7 +100,7 @@ def test_a_duty_cycle_says_which_orders_meet_it_up_to_its_fastest_load_case(tmp_
     found, fastest = resonance_of(reducer, -100.0, 5.0), 20.0 * reducer.ratio
     slowest = next(iter(found.met(orders_of(reducer), fastest).values()))
     assert f"{found.frequency:.3g} Hz" in said
-    assert f"meet it at {slowest:,.0f}" in said
+    assert f"excite it at {slowest:,.0f}" in said
 
 
 @pytest.mark.parametrize("line", ["inertia_kgm2 = -1", "inertia_kgm2 = 'heavy'", "input_speed_rpm = 0"])

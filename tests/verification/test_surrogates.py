@@ -188,7 +188,7 @@ def test_the_best_of_those_that_pass_is_fitted_to_all_answers():
     assert choice.scores[choice.best].name == "best"
     assert choice.chosen is best.response
     assert best.shown[-1].shape[0] == 200
-    assert "best: Q² = 1.000 on 200 answers" in chosen_surrogate(choice)
+    assert "best: Q² = 1.000 on 200 held-out answers" in chosen_surrogate(choice)
     assert "its 99.73 % quantile is off by 0.0 %" in chosen_surrogate(choice)
 
 
@@ -197,7 +197,7 @@ def test_once_little_is_left_to_gain_no_other_candidate_is_tried():
     choice = choose(Exact(), (good, other, regression()), samples(200), SeedTree(0))
     assert [score.name for score in choice.scores] == ["good"] and choice.scores[0].q2 >= ENOUGH_Q2
     assert choice.untried == ("other", "regression") and not other.shown
-    assert chosen_surrogate(choice).endswith("Not tried, because no more can be gained: other, regression.")
+    assert chosen_surrogate(choice).endswith("Not tried, because nothing more can be gained: other, regression.")
 
 
 def test_a_candidate_that_may_not_be_used_does_not_end_the_search():

@@ -395,7 +395,7 @@ def alternating():
 @pytest.mark.parametrize("made", [counting, remembering, noisy, wearing, alternating], ids=lambda own: own.__name__)
 def test_a_function_that_answers_differently_the_second_time_is_refused(made):
     given = np.linspace(1.0, 2.0, 12)[:, np.newaxis]
-    with pytest.raises(InputError, match=r"model m: the function answers differently when it is asked the same again"):
+    with pytest.raises(InputError, match=r"model m: the function gives different results for the same arguments"):
         returned(made(), 1, given)
 
 

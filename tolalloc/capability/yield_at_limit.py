@@ -119,10 +119,10 @@ def judged(plain: RareFailure, levels: ChainedEstimate, scaled: ScaledSigmaEstim
     """
     methods = (levels,) if isinstance(scaled, SolveError) else (levels, scaled)
     if not any(item.probability for item in methods):
-        few = f"{plain.effective_samples:.0f} of them lie beyond the limit where other methods meet none"
+        few = f"{plain.effective_samples:.0f} of them lie beyond the limit, but other methods found none"
         plain = replace(plain, cautions=plain.cautions + (few,) * bool(plain.probability))
         reliance = "Do not rely on the random units" if plain.cautions else "Rely on the random units alone"
-        said = "; ".join(("neither subset simulation nor scaled-sigma sampling met a failure", *plain.cautions))
+        said = "; ".join(("neither subset simulation nor scaled-sigma sampling found a failure", *plain.cautions))
         return Agreement(estimate=plain, estimates=(plain, *methods), verdict=f"{reliance}: {said}.")
     common = _common(levels, scaled)
     doubts = common.doubts
@@ -173,12 +173,12 @@ def _common(levels: ChainedEstimate, scaled: ScaledSigmaEstimate | SolveError) -
         return _Common(
             probability=scaled.probability,
             error=scaled.standard_error,
-            found="scaled-sigma sampling alone met failures",
-            doubts=("subset simulation met none",),
+            found="only scaled-sigma sampling found failures",
+            doubts=("subset simulation found none",),
         )
     if scaled.probability < levels.probability and scaled.coefficient_of_variation > _VAGUE:
         if not any(run.levels[0].share for run in scaled.runs):
-            return alone(found="scaled-sigma sampling met no failure at any width, so no other broad region")
+            return alone(found="scaled-sigma sampling found no failure at any width, so no other broad region")
         found = f"scaled-sigma sampling can see {100 * seen:.0f} % of the failures and says nothing definite"
         return alone(found=found, doubts=("scaled-sigma sampling found too few failures to confirm it",) * (seen > 0.5))
     # What scaled-sigma sampling cannot see explains at most that it found less.
@@ -287,9 +287,7 @@ def yield_at_limit(
     if rare or plain.effective_samples >= FEWEST_BEYOND:
         found = agreement(limit_state, plain, experiment.seeds, largest_failed_share=allowed, **effort)
     else:
-        verdict = (
-            f"{within.rejected:,} of {within.units:,} random units lie there; rarer ones are a full run's question."
-        )
+        verdict = f"{within.rejected:,} of {within.units:,} random units lie there; rarer ones need a full run."
         found = Agreement(estimate=plain, estimates=(plain,), verdict=verdict)
     interval = within if found.estimate.method == _RANDOM_UNITS else log_normal_interval(found.estimate, runs)
     return YieldAtLimit(**vars(found), interval=_widened_by(interval, limit_state, sample))

@@ -16,7 +16,7 @@ _AGREES = 0.001
 
 
 def doctor(as_json: AsJson = False) -> None:
-    """Tell versions, processor, threads and what is kept, and solve a published unit whose answer is known."""
+    """Show versions, processor, threads and caches, and solve a published unit whose answer is known."""
     from tolalloc.reports.writer import versions
     from tolalloc.running.chunks import blas_libraries
     from tolalloc.running.compiled import KEPT, is_kept, processor, thread_count
@@ -48,10 +48,10 @@ def doctor(as_json: AsJson = False) -> None:
     if not abs(value - _KNOWN) <= _AGREES:
         raise SolveError(
             f"self-test: the peak-to-peak of liu2020's Table 4 unit is {value:.4f}″ here and must be {_KNOWN}″; "
-            "trust no answer of this installation."
+            "do not trust this installation."
         )
     if not as_json:
-        say("All is well: a published unit has the answer that it should have.")
+        say("All is well: a published unit gives the expected result.")
 
 
 def _peak_to_peak() -> float:

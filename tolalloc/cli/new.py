@@ -39,19 +39,19 @@ def _lists() -> dict[str, str]:
 
 
 def new(
-    name: Annotated[Path | None, typer.Argument(help="The new folder, whose name becomes that of the study.")] = None,
-    family: Annotated[str, typer.Option(help="Family of reducers: FAMILIES; that of the preset.")] = "",
+    name: Annotated[Path | None, typer.Argument(help="The new folder; its name becomes the name of the study.")] = None,
+    family: Annotated[str, typer.Option(help="Family of reducers: FAMILIES; as the preset unless given.")] = "",
     like: Annotated[
         str,
-        typer.Option(help="Preset that it is like: PRESETS."),
+        typer.Option(help="Preset to start from: PRESETS."),
     ] = "",
-    cranks: Annotated[int | None, typer.Option(help="Cranks, 2 to 4; those of the preset unless given.")] = None,
-    discs: Annotated[int | None, typer.Option(help="Discs, 1 to 3; those of the preset unless given.")] = None,
+    cranks: Annotated[int | None, typer.Option(help="Cranks, 2 to 4; as the preset unless given.")] = None,
+    discs: Annotated[int | None, typer.Option(help="Discs, 1 to 3; as the preset unless given.")] = None,
     samples: Annotated[
         str, typer.Option("--with", help="Samples for the other commands, such as costs,bench,lot, or all.")
     ] = "",
 ) -> None:
-    """Make a folder with a reducer, its tolerance table, a study and samples: the start of your own."""
+    """Make a folder with a reducer, its tolerance table, a study and samples, to start from."""
     from tolalloc.cli.start import Likeness, NewFolder, preset_of
     from tolalloc.reducers.families.known import FAMILIES
 

@@ -37,13 +37,13 @@ def open_page(
     server = _server(Desk(session=session, script=place), Address.of(place), port)
     Address(port=server.http.server_port, token=server.token).keep(place)
     typer.echo(f"Open {server.address}")
-    note("The page is for this machine alone. Ctrl-C ends it.", dim=True)
+    note("The page works on this machine only. Ctrl-C stops it.", dim=True)
     if browser:
         webbrowser.open(server.address)
     try:
         server.http.serve_forever()
     except KeyboardInterrupt:
-        note("The page is closed. What you saved stands beside the study.")
+        note("The page is closed. What you saved is in the folder of the study.")
     finally:
         server.desk.stop()
         server.http.server_close()

@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 
 Script = Annotated[Path, typer.Argument(help="Python script that defines study = Study(...).")]
 Quick = Annotated[bool, typer.Option("--quick", help="Small samples, wide intervals; every stage is real.")]
-Fresh = Annotated[bool, typer.Option("--fresh", help="Solve again what runs beside this one have solved and kept.")]
+Fresh = Annotated[bool, typer.Option("--fresh", help="Solve all units again, cached or not.")]
 Scheduler = Annotated[
     str,
     typer.Option(help="Workers that solve the units: 'local' for one per core, or the address of a Dask scheduler."),
 ]
-Verbose = Annotated[bool, typer.Option("--verbose", help="Say everything that the report says in sentences.")]
-Pdf = Annotated[bool, typer.Option("--pdf", help="Print the report as report.pdf too, by an installed browser.")]
+Verbose = Annotated[bool, typer.Option("--verbose", help="Print every sentence of the report.")]
+Pdf = Annotated[bool, typer.Option("--pdf", help="Also print the report as report.pdf, with an installed browser.")]
 
 _ROWS = 16  # of an answer's first table that are printed
 _WARNINGS = 2
@@ -43,7 +43,7 @@ class _Way:
     quick: Quick = False
     seconds: Annotated[
         float | None,
-        typer.Option(help="About how long ranking and allocation may take together, by a stated rate [s]."),
+        typer.Option(help="Approximate time for ranking and allocation together, at an assumed rate [s]."),
     ] = None
     seed: Annotated[int | None, typer.Option(help="Seed of every random number, instead of the study's.")] = None
     out: Annotated[
@@ -81,7 +81,7 @@ def _going(command: Callable[..., None]) -> Callable[..., None]:
 @_going
 def run(
     script: Script,
-    only: Annotated[str, typer.Option(help="Some of the questions, as ranking,allocation; all unless given.")] = "",
+    only: Annotated[str, typer.Option(help="Questions to answer, such as ranking,allocation; all unless given.")] = "",
     *,
     way: _Way,
 ) -> None:
@@ -91,21 +91,19 @@ def run(
 
 @_going
 def rank(script: Script, *, way: _Way) -> None:
-    """Tell which error drives which output, which order and the rejects: short for run --only ranking."""
+    """Rank the errors that drive outputs, orders and rejects: short for run --only ranking."""
     _run(way.study(script), ("ranking",), "-rank", way)
 
 
 @_going
 def allocate(
     script: Script,
-    limit: Annotated[
-        float | None, typer.Option(help="First limit of the study, in its unit, instead of its own.")
-    ] = None,
+    limit: Annotated[float | None, typer.Option(help="New first limit of the study, in its unit.")] = None,
     yield_target: Annotated[
-        float | None, typer.Option("--yield", help="Share of units that must keep the first limit, instead of its own.")
+        float | None, typer.Option("--yield", help="New share of units that must keep the first limit.")
     ] = None,
     grades: Annotated[
-        bool, typer.Option("--grades", help="Zones of ISO 286 grades and preferred numbers alone.")
+        bool, typer.Option("--grades", help="Only zones of ISO 286 grades and preferred numbers.")
     ] = False,
     *,
     way: _Way,
@@ -186,7 +184,7 @@ def _run(study: Study, kinds: tuple[str, ...], ending: str, way: _Way) -> None:
             found = run_study(study, folder, questions, progress, fresh=way.fresh, solved_by=solved_by)
     except KeyboardInterrupt:
         kept = cache_beside(folder).folder
-        what = f"Solved units are kept in {kept}; the same command goes on from there."
+        what = f"Solved units are kept in {kept}; the same command continues from there."
         raise StoppedError(
             f"Stopped: no report was written. {what if kept.is_dir() else 'Nothing was kept.'}"
         ) from None

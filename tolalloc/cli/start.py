@@ -413,7 +413,7 @@ class NewFolder:
 def new(
     folder: str | Path, *, like: str = "rv20e", cranks: int | None = None, discs: int | None = None, samples: str = ""
 ) -> Path:
-    """Make a folder with a reducer, its tolerance table, a study and samples: the start of your own.
+    """Make a folder with a reducer, its tolerance table, a study and samples, to start from.
 
     Parameters
     ----------

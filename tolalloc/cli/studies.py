@@ -29,12 +29,12 @@ if TYPE_CHECKING:
     from tolalloc.reports.finished_run import Member
 
 Timed = Annotated[
-    bool, typer.Option("--time", help="Solve a few units and say about how long each question takes here.")
+    bool, typer.Option("--time", help="Solve a few units and estimate how long each question takes here.")
 ]
 
 
 def check(script: Script, timed: Timed = False, as_json: AsJson = False) -> None:
-    """Check a study's names, units and bounds; no question is asked, but the script, a program, is run."""
+    """Check a study's names, units and bounds: the script is run, but no question is answered."""
     from tolalloc.study.commands import check as checked
 
     study = load_study(script)
@@ -58,11 +58,11 @@ def whatif(
             metavar="zone...",
         ),
     ],
-    units: Annotated[int, typer.Option(help="Random units of either drawing.")] = 1024,
+    units: Annotated[int, typer.Option(help="Random units for each drawing.")] = 1024,
     out: ReportFolder = None,
     as_json: AsJson = False,
 ) -> None:
-    """Tell what other zones do to cost, yield and quantiles: both drawings on the same random units."""
+    """Show what other zones do to cost, yield and quantiles: both drawings on the same random units."""
     from tolalloc.reports.folder import require_usable
     from tolalloc.study.commands import whatif as changed
 
@@ -95,16 +95,16 @@ def export_problem(
 
 
 def series(
-    scripts: Annotated[list[Path], typer.Argument(help="Study scripts, each with a study of its own name.")],
+    scripts: Annotated[list[Path], typer.Argument(help="Study scripts, each with a study of a different name.")],
     quick: Quick = False,
-    out: Annotated[Path, typer.Option(help="Folder of all run folders; finished ones in it are not run again.")] = Path(
+    out: Annotated[Path, typer.Option(help="Folder for all run folders; finished runs in it are not repeated.")] = Path(
         "runs"
     ),
     fresh: Fresh = False,
     scheduler: Scheduler = "",
     as_json: AsJson = False,
 ) -> None:
-    """Run many studies, a product series or a grid of limits, and tell all answers in one table."""
+    """Run many studies, a product series or a grid of limits, and show all answers in one table."""
     from tolalloc.study.commands import series as run_series
 
     done: list[Member] = []
@@ -122,7 +122,7 @@ def series(
             )
     except KeyboardInterrupt:
         raise StoppedError(
-            f"Stopped after {len(done)} of {len(scripts)} studies; the same command goes on with the others."
+            f"Stopped after {len(done)} of {len(scripts)} studies; the same command continues with the others."
         ) from None
     tell(answer, as_json, *answer.teller.terminal)
 

@@ -342,8 +342,8 @@ def _read_beside(table: Path, sheet: str, columns: Mapping[str, str]) -> tuple[t
     header, names = read_table_file(table, heads := heads_of(table, columns), sheet=sheet)[0]
     stated, units = [split_header(name) for name in names], {name: own.unit for name, own in COLUMNS.items()}
     own = own_heads(table, [name for name, _ in stated])
-    titles = f"{table.name}: the header stands in row {header}; what stands above it was left out"
-    kept = f"{table.name}: kept as they are, and written again: {', '.join(own)}"
+    titles = f"{table.name}: the header is in row {header}; the rows above it were left out"
+    kept = f"{table.name}: kept unchanged and written again: {', '.join(own)}"
     found = [titles] * (header > 1) + [kept] * bool(own)
     if is_workbook(table):
         found += hidden_cells(table, sheet)

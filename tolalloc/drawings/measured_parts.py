@@ -171,8 +171,8 @@ class MeasuredParts:
         off = abs(self.fit.mean - self.middle) if not self.are_radii else self.fit.mean
         if off > _FAR * self.zone / 2.0:
             return (
-                f"its measured parts lie {off / self.zone:,.3g} zones from the middle on average, as sizes do that are "
-                "read as deviations, or deviations that are read as sizes"
+                f"its measured parts lie {off / self.zone:,.3g} zones from the middle on average, as if sizes were "
+                "read as deviations, or deviations as sizes"
             )
         own = self.relative
         spread = float(np.subtract(*np.quantile(own, [0.75, 0.25]))) / _QUARTILES if own.size else 0.0
@@ -185,7 +185,7 @@ class MeasuredParts:
     @property
     def sentence(self) -> str:
         """What the distribution follows, and what was assumed."""
-        fit, shape = self.fit, "smoothed, since normal parts would look otherwise"
+        fit, shape = self.fit, "smoothed, because they are not normal"
         if self.is_normal:
             shape = "taken for normal on each axis" if self.are_radii else "taken for normal"
         nearest = f", nearest to {fit.best.distribution.value}" if fit.fits else ""

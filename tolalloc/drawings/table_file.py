@@ -297,9 +297,7 @@ def read_table_file(path: Path, heads: Heads = _ANY, sheet: str = "") -> tuple[N
         (number, tuple(cells[at] for at in used)) for (number, _), cells in zip(rows, full, strict=True)
     )
     if again := [number for number, cells in others if heads.known and cells == header]:
-        raise InputError(
-            f"{path}, row {again[0]}: the heads stand here again; allowed is one table with its heads once."
-        )
+        raise InputError(f"{path}, row {again[0]}: the header is repeated here; allowed is one table with one header.")
     return _with_units(path, ((first, tuple(map(heads.meant, header))), *others), heads)
 
 

@@ -167,7 +167,7 @@ def with_process(cells: Mapping[str, object], capabilities: ProcessCapabilities,
         if "Cp" in cells:
             return dict(cells)
         known = [name for name, kind in capabilities if kind == feature]
-        raise UnknownNameError.among(place, f"Cp is empty, and process for feature {feature}", str(process), known)
+        raise UnknownNameError.among(place, f"process (with an empty Cp) for feature {feature}", str(process), known)
     taken = capability.cells
     if cells.get("distribution", capability.distribution) is not capability.distribution:
         del taken["shape"]  # it belongs to the library's distribution
@@ -272,7 +272,7 @@ def heads_of(path: Path, columns: Mapping[str, str] = MappingProxyType({})) -> H
         columns, places = {**stated, **columns}, {**dict.fromkeys(stated, f"{beside}, columns"), **places}
     for head, name in columns.items():
         if name not in ToleranceRow.model_fields:
-            raise UnknownNameError.among(places[head], f"{head!r} stands for column", name, ToleranceRow.model_fields)
+            raise UnknownNameError.among(places[head], f"column for {head!r},", name, ToleranceRow.model_fields)
     return Heads(needed=("id",), known=tuple(ToleranceRow.model_fields), called=dict(columns))
 
 

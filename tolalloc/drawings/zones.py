@@ -87,9 +87,9 @@ class Characteristic:
     assumed: str  # What is taken for granted by it, in words
 
 
-TILT = Characteristic("parallelism", "a tilt is drawn as parallelism of the axis over its length")
-ROTATION = Characteristic("position", "a rotation of a pattern is drawn as the position of its features")
-PHASE = Characteristic("position", "a phase of a journal is drawn as its position about the axis")
+TILT = Characteristic("parallelism", "a tilt is toleranced as parallelism of the axis over its length")
+ROTATION = Characteristic("position", "a rotation of a pattern is toleranced as the position of its features")
+PHASE = Characteristic("position", "a phase of a journal is toleranced as its position about the axis")
 
 
 def parsed_spectrum(text: str) -> tuple[Spectrum, int]:

@@ -116,7 +116,7 @@ class UserFunction:
             if not _agree(first, second):
                 said = " and then ".join(", ".join(f"{value:.9g}" for value in own) for own in (first, second))
                 raise InputError(
-                    f"{self.place}: the function answers differently when it is asked the same again: {said} for "
+                    f"{self.place}: the function gives different results for the same arguments: {said} for "
                     f"({_listed(sample)}); allowed is a function of its arguments alone, without random numbers and "
                     "without memory of earlier calls."
                 )

@@ -91,7 +91,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         pass
     except ValueError as error:  # of tomllib, or of a whole number with more digits than Python reads
         raise InputError(f"{path}: not complete TOML; is the file truncated? ({error}).") from None
-    raise InputError(f"{path}: its tables or lists stand in each other too deeply; allowed are a few levels.")
+    raise InputError(f"{path}: its tables or lists are nested too deeply; allowed are a few levels.")
 
 
 def validated(model: type[Model], data: Mapping[str, Any], place: Path | str) -> Model:

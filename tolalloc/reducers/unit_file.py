@@ -134,7 +134,7 @@ class BuiltUnit:
             for column, value in self.deviations.items():
                 if value and teeth.match(column):
                     raise InputError(
-                        f"unit {self.name}: {column} is stated beside the profile of {disc}, which holds it; allowed "
+                        f"unit {self.name}: {column} is stated beside the profile of {disc}, which has it; allowed "
                         "is one of the two."
                     )
             held |= {column: 0.0 for column in columns if teeth.match(column)}

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Result = TypeVar("Result")
 
 _FAILED_HEADING = "A part of this report failed"
-_FAILED = "What stands behind “{last}” could not be told: {fault}. All else stands; the terminal says where it failed."
+_FAILED = "The part after “{last}” could not be written: {fault}. The rest stands; the terminal shows where it failed."
 
 
 class Teller(ABC, Generic[Result]):

@@ -137,8 +137,8 @@ def with_unit(text: str, name: str) -> str:
 GLOSSARY = {
     "capability, Cp": "Zone over six standard deviations of what the process makes; 1 leaves 0.27 % outside.",
     "Cpk": "Distance of the mean from the nearer limit over three standard deviations.",
-    "certificate": "Lower bound on the cost of drawings that keep the limits: of all drawings where every limited "
-    "value is linear in the deviations, of drawings near by otherwise; it is valid whatever the solver did.",
+    "certificate": "Lower bound on the cost of drawings that keep the limits: of all drawings if every limited "
+    "value is linear in the deviations, otherwise of nearby drawings. It is valid whatever the solver did.",
     "confidence": "Share of repeated studies in which such a statement is true.",
     "first-order index": "Share of the variance that one error makes alone (Sobol's S1).",
     "independent verification sample": "Random units that no search has used, on which the drawing is judged.",
@@ -147,13 +147,13 @@ GLOSSARY = {
     "order": "Number of waves per turn of the output.",
     "peak-to-peak": "Largest minus smallest transmission error over one turn of the output.",
     "Ppk": "Distance of the mean from the nearer limit over three standard deviations of all units.",
-    "preloaded": "Said of a reducer whose pins press harder without torque than the rated torque presses them: it "
-    "turns, but warm, worn early and without lost motion.",
+    "preloaded": "A reducer is preloaded if its pin forces without torque exceed those of the rated torque: it turns, "
+    "but runs warm, wears early and has no lost motion.",
     "quantile": "Value that a stated share of the units keeps.",
-    "kept value per zone": "Change of what is compared with the limit per micrometre of the zone.",
+    "kept value per zone": "Change of the value compared with the limit per micrometre of the zone.",
     "Sens": "Change of the output per micrometre of deviation, mean over the units of the drawing, with its sign; root "
     "mean square for a position or a wave, whose direction is random, and where signs cancel.",
-    "simulated": "Said of a unit whose errors are drawn at random from the tolerance table and solved by the model.",
+    "simulated": "A simulated unit has errors drawn at random from the tolerance table and is solved by the model.",
     "surrogate": "Fast approximation of the model, used only with its error stated.",
     "total-effect index": "Share of the variance in which an error takes part, alone or with others (Sobol's ST).",
     "transmission error": "Angle by which the output is ahead of or behind the ideal ratio.",

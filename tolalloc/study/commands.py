@@ -104,7 +104,7 @@ def whatif(
     units: int = 1024,
     progress: Progress | None = None,
 ) -> Answer[Any]:
-    """Tell what other zones do to cost, yield and quantiles: both drawings on the same random units.
+    """Show what other zones do to cost, yield and quantiles: both drawings on the same random units.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def series(
     solved_by: Mapper = map,
     told: Callable[[Member], None] | None = None,
 ) -> Answer[tuple[Member, ...]]:
-    """Run many studies, a product series or a grid of limits, and tell all answers in one table.
+    """Run many studies, a product series or a grid of limits, and show all answers in one table.
 
     Parameters
     ----------

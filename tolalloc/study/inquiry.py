@@ -32,7 +32,7 @@ class Word:
 
 ReducerName = Annotated[
     str | None,
-    Word(f"Preset name or TOML file; {DEFAULT_REDUCER} unless given, to be given where a file is written."),
+    Word(f"Preset name or TOML file; {DEFAULT_REDUCER} unless given; required where a file is written."),
 ]
 UnitName = Annotated[str, Word("Shipped unit (exact, table4 of an RV-20E) or TOML file.")]
 StiffnessName = Annotated[str, Word("Identified stiffness: shipped name or TOML file.")]
@@ -50,7 +50,7 @@ RatedTorque = Annotated[
 
 Neglected = Annotated[
     list[str] | None,
-    Word("Sources that the table may leave out, a pattern such as '*', beside those that it may anyway; repeatable."),
+    Word("Further sources that the table may omit, a pattern such as '*'; repeatable."),
 ]
 
 Seed = Annotated[int, Word("Seed of every random number."), whole("0 or a positive integer", 0)]

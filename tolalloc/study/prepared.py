@@ -126,7 +126,7 @@ class Prepared:
         if not self.study.limits:
             raise InputError(f"{self.place}: limits is empty; limit one output at least, the leading one first.")
         for name in self.study.limits:
-            UnknownNameError.require(self.place, "limit of", name, self.model.outputs)
+            UnknownNameError.require(self.place, "output in limits", name, self.model.outputs)
         asked = {name: limit for name, limit in self.study.limits.items() if limit is not None}
         for name in self.study.limits.keys() - asked.keys() - self.model.own_limits.keys():
             allowed = "ta.Limit(...): the model has no limit of its own to lift there"

@@ -190,7 +190,7 @@ def test_columns_take_tilts_and_rotations_where_they_belong():
         (
             [("A", "bed"), ("B", "a")],
             UnknownNameError,
-            "datum flow chain, part B: on 'a' is not known; known are A, B, bed.",
+            "datum flow chain, part B: unknown part under on 'a'; known are A, B, bed.",
         ),
         (
             [("B", "A"), ("A", "bed")],

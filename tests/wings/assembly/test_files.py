@@ -219,7 +219,7 @@ def test_a_reducers_file_stands_beside_the_chain_file(tmp_path):
         (
             'on = "column"',
             'on = "colunm"',
-            "FILE, datum flow chain, part head: on 'colunm' is not known; the nearest known is column.",
+            "FILE, datum flow chain, part head: unknown part under on 'colunm'; the nearest known is column.",
         ),
         (
             'name = "head"',
@@ -238,8 +238,7 @@ def test_a_reducers_file_stands_beside_the_chain_file(tmp_path):
         (
             "tolerance_arcsec = [30",
             "tolerance_deg = [30",
-            "FILE, part column: field 'tolerance_deg' is not known; the nearest known are tolerance_arcsec, "
-            "turned_deg.",
+            "FILE, part column: unknown field 'tolerance_deg'; the nearest known are tolerance_arcsec, turned_deg.",
         ),
         (
             "[30, 20, 0]",
@@ -343,7 +342,7 @@ def test_a_reducers_file_stands_beside_the_chain_file(tmp_path):
         (
             "precision = 2",
             'precision = 2\nreducer = "bx40"',
-            "shipped reducer files: name 'bx40' is not known; the nearest known is bx40e.",
+            "shipped reducer files: unknown name 'bx40'; the nearest known is bx40e.",
         ),
         (
             "precision = 2",
@@ -478,7 +477,7 @@ def test_a_truncated_chain_file_is_refused(tmp_path):
     text = (DATA / "bx40e.chain.toml").read_text(encoding="utf-8")
     with pytest.raises(InputError, match=r"not complete TOML; is the file truncated\?"):
         load(tmp_path, text=text[: len(text) // 3])
-    with pytest.raises(TolallocError, match=r"name 'bx40' is not known; the nearest known is bx40e\."):
+    with pytest.raises(TolallocError, match=r"unknown name 'bx40'; the nearest known is bx40e\."):
         load_plan("bx40")
 
 
@@ -534,7 +533,7 @@ def test_a_perfect_assembly_may_be_measured(tmp_path, bx40e):
             "FILE: the header is 'part, x [arcsec], y [arcsec], x [arcsec]'; allowed is part, x [arcsec], y [arcsec], "
             "z [arcsec].",
         ),
-        ("KC3", "KC5", "FILE, row 4: part 'KC5' is not known; the nearest known are KC4, KC3, KC2."),
+        ("KC3", "KC5", "FILE, row 4: unknown part 'KC5'; the nearest known are KC4, KC3, KC2."),
         ("KC3,0,0,0\n", "", "FILE: part KC3 is missing; allowed is one row for each of KC1, KC2, KC3, KC4."),
         (
             "KC3",

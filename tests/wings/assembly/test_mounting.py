@@ -381,7 +381,11 @@ def test_a_parts_file_is_read_in_its_units(tmp_path: Path) -> None:
     ("text", "error", "sentence"),
     [
         ("part,error\nD 1,tilt.x\n", InputError, "columns is 'part, error'"),
-        (HEADER + ONE_UNIT.replace("C 1, carrier", "C 1, carier"), UnknownNameError, "'carier' .* carrier"),
+        (
+            HEADER + ONE_UNIT.replace("C 1, carrier", "C 1, carier"),
+            UnknownNameError,
+            "kind 'carier'; .* carrier",
+        ),
         (HEADER + ONE_UNIT.replace("bore1.position.x", "bore1.positon.x"), UnknownNameError, "bore1.position.x"),
         (HEADER + ONE_UNIT.replace("5, arcsec", "5, µm"), InputError, "unit of tilt.x is 'µm'; allowed is arcsec"),
         (HEADER + ONE_UNIT.replace("3.1, µm", "3.1, mm"), InputError, "is 'mm'; allowed is µm or um"),

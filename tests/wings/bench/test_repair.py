@@ -178,7 +178,7 @@ def test_prices_of_a_file_are_those_of_the_last_pattern_that_means_a_source(tmp_
     [
         ("limit_arcsec = 45", "limit_arcsec = 0", "limit_arcsec is 0; input should be greater than 0"),
         ("scrap = 900", "scrap = -1", "scrap is -1; input should be greater than or equal to 0"),
-        ("scrap = 900", "scrp = 900", "field 'scrp' is not known; the nearest known is scrap"),
+        ("scrap = 900", "scrp = 900", "unknown field 'scrp'; the nearest known is scrap"),
         ("minute = 1.2", "", "minute is missing"),
         ("minute = 1.2", 'minute = 1\ncurrency = "Euro"', "currency is 'Euro'; allowed are three letters such as EUR"),
         ('"*" = 15\n"pin.*" = 5', "", "minutes: allowed is one source or more, each with its minutes"),
@@ -186,9 +186,9 @@ def test_prices_of_a_file_are_those_of_the_last_pattern_that_means_a_source(tmp_
         (
             '"disc1.*" = 150',
             '"disk1.*" = 150',
-            "the source of change 'disk1.*' is not known; the nearest known are disc1",
+            "unknown source of change 'disk1.*'; the nearest known are disc1",
         ),
-        ('"disc1.pitch" = 7.5', '"disc1.*" = 7.5', "the source of read 'disc1.*' is not known"),
+        ('"disc1.pitch" = 7.5', '"disc1.*" = 7.5', "unknown source of read 'disc1.*'"),
         (
             '"disc1.pitch" = 7.5',
             '"disc1.pitch" = "thick"',

@@ -173,7 +173,7 @@ def priced(
     found: dict[str, tuple[Process, ...]] = {name: (today(source),) for name, source in free.items()}
     for name, own in rows.items():
         if name not in free:
-            raise UnknownNameError.among("process costs", "source whose zone may change,", name, free)
+            raise UnknownNameError.among("process costs", "source with a free zone", name, free)
         made, source = [*own], free[name]
         if len({row[0] for row in made}) < len(made):
             raise InputError.at(f"process costs of {name}", "processes", [row[0] for row in made], "each name once")
@@ -245,7 +245,7 @@ def _processes(
     for place, row in rows:
         if not (row.factor or row.points or row.process == now):
             raise InputError(
-                f"{place}: factor is missing: the tolerance table's cost of {source.name} is that of {now!r}."
+                f"{place}: factor is missing: the tolerance table's cost of {source.name} belongs to {now!r}."
             )
     processes = [_process(source, place, row, shops, 0.0 if row.process == now else row.change) for place, row in rows]
     left = tuple(process for process in processes if process is not None)

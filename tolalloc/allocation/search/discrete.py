@@ -365,7 +365,7 @@ def _graded(grid: _Grid, chosen: VerifiedDesign, tried: tuple[VerifiedDesign, ..
     problem = grid.problem(kept_stacks(chosen, tried, margin=0.0, room=ROUNDING))
     solution = problem.solve()
     if solution is None:
-        raise SolveError(f"{chosen.name}: the choice among ladders does not find the design that it was built around.")
+        raise SolveError("The choice among grades does not reproduce the design that it starts from.")
     steps = zip(grid.options, chosen.scales, strict=True)
     return GradedAllocation(
         space=grid.space,

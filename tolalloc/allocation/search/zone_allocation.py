@@ -376,7 +376,7 @@ def _cheapest_by_models(
     """Return the cheapest design that the models of a verified one let keep the limits, as far inside as it is."""
     found = process_choice.allocate(space.problem(kept_stacks(chosen, tried, margin, ROUNDING)))
     if not isinstance(found, Solution):
-        raise SolveError(f"{chosen.name}: the convex program does not find the design that it was built around.")
+        raise SolveError("The convex program does not reproduce the design that it starts from.")
     return found
 
 

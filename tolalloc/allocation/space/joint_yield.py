@@ -77,7 +77,7 @@ class JointRequirement(Requirement):
     @property
     def sentence(self) -> str:
         """The requirement in words."""
-        return f"all limits at once, shown for {self.guarantee.words}"
+        return f"all limits at once, must hold for {self.guarantee.words}"
 
     @property
     def outputs(self) -> tuple[str, ...]:

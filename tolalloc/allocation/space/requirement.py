@@ -516,7 +516,8 @@ class Requirement:
         """The requirement in words."""
         ends = {"at least": self.limits.lower, "at most": self.limits.upper}
         said = " and ".join(f"{word} {self.told(end)}" for word, end in ends.items() if end is not None)
-        return f"{self.output}: {said}, shown for {self.guarantee.words}"
+        asked = "must hold for" if isinstance(self.guarantee, AtYield) else "judged by"
+        return f"{self.output}: {said}, {asked} {self.guarantee.words}"
 
     def told(self, limit: float) -> str:
         """Return one of its limits as it was stated [unit of the output]."""

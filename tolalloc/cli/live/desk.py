@@ -237,7 +237,7 @@ class Desk:
         table, script = (self.script.parent / f"{name}{ending}" for ending in (".tolerances.csv", ".py"))
         for path in (table, script):
             if path.exists():
-                raise InputError(f"{path.name}: is there already in the folder of the study; choose another name.")
+                raise InputError(f"{path.name}: already exists in the folder of the study; choose another name.")
         # A script imports what lies beside it first: a saved numpy.py would take the place of NumPy.
         if name in {"tolalloc", *sys.stdlib_module_names, *packages_distributions()}:
             raise InputError.at("page", "name", name, "what no installed Python module is called")

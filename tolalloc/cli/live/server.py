@@ -176,7 +176,7 @@ class _Handler(BaseHTTPRequestHandler):
         if page is None:
             self._refuse(HTTPStatus.NOT_FOUND, "There is no such page.")
         elif path == "/" and not self._knows(parse_qs(query).get("token", [""])[0]):
-            self._refuse(HTTPStatus.FORBIDDEN, "Open the address that tolalloc open printed: its token is missing.")
+            self._refuse(HTTPStatus.FORBIDDEN, "The token is missing: open the address that tolalloc open printed.")
         else:
             kind = _KINDS.get(path.rpartition(".")[2], "text/html")
             self._send(HTTPStatus.OK, page, f"{kind}; charset=utf-8")
@@ -186,7 +186,7 @@ class _Handler(BaseHTTPRequestHandler):
         if not self._is_local():
             return
         if not self._knows(self.headers.get("X-Token", "")):
-            self._refuse(HTTPStatus.FORBIDDEN, "The token is missing or wrong: open the page anew.")
+            self._refuse(HTTPStatus.FORBIDDEN, "The token is missing or wrong: open the page again.")
         elif self.free.acquire(blocking=False):
             try:
                 self._answer()

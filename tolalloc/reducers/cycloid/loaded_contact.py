@@ -451,7 +451,7 @@ class Assessment:
             f"the most loaded of {count} discs carries {self.share:.3g} of the torque ({PAIR_SHARE:g} of two)",
             f"{law} contact law; the pins rest in {supports}",
             "no errors: every pin and tooth at its place, discs turning about their centres",
-            "lever of a pin force: that of the exact tooth",
+            "lever arm of a pin force: taken from the exact tooth",
             *self.reducer.assumptions,
         )
 

@@ -42,10 +42,10 @@ class Interface:
     is_mesh: bool = False  # Whether it carries along one direction; the others carry x and y
 
 
-_STANDS_OFF = Characteristic("coaxiality", "how far an assembly stands off is drawn as coaxiality")
+_STANDS_OFF = Characteristic("coaxiality", "assembly offset is toleranced as coaxiality")
 _PIN_RADIUS = Nominal(said="its pin radius", of=lambda reducer: reducer.cycloid_stage.pin_radius)
 _PIN_DIAMETER = Nominal(said="twice its pin radius", of=lambda reducer: 2 * reducer.cycloid_stage.pin_radius)
-_ECCENTRIC = Characteristic("coaxiality", "the eccentricity of a gear is drawn as its coaxiality")
+_ECCENTRIC = Characteristic("coaxiality", "the eccentricity of a gear is toleranced as its coaxiality")
 
 
 def _fine(name: str, place: str, neglected: str, **other: Any) -> ErrorSource:

@@ -97,7 +97,7 @@ def _outlines(reducer: Reducer) -> tuple[dict[str, Any], tuple[str, ...]]:
     }
     stated = {"housing": False, "bearings of the cranks": dimensions.crank_disc_bearing is not None}
     open_names = [name for name, known in stated.items() if not known]
-    assumed = f"drawn by a rule, as the reducer file does not state them: outlines of {', '.join(open_names)}, carrier"
+    assumed = f"outlines of {', '.join(open_names)} and carrier are schematic: the reducer file gives none"
     return {name: float(length / MILLIMETRE) for name, length in lengths.items()} | counts, (assumed,)
 
 

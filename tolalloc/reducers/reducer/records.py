@@ -54,12 +54,12 @@ _SMALLEST_TWIST, _LARGEST_TWIST = 0.3, 30.0
 """Twist under rated torque that a catalogue's rigidity may mean; RV reducers have 2.9 to 4 [arcmin]."""
 Micrometres = Annotated[float, Field(ge=-200, le=200), times(MICROMETRE)]
 CROWNING = (
-    "the crowning of the teeth is felt by line load and pressure alone, by slices as stiff as the contact law at the "
+    "the crowning of the teeth affects line load and pressure alone, by slices as stiff as the contact law at the "
     "force of the pin; forces, twist and transmission error are those of the section in the middle over the whole width"
 )
 """What is assumed of crowned teeth."""
 BOLTED = (
-    "the ring gives as its bolts and the cones that they clamp let it, by a rule of thumb, alike all around; the "
+    "the ring is as compliant as its bolts and the cones that they clamp, by a rule of thumb, alike all around; the "
     "bodies behind the flange are left out"
 )
 """What is assumed of a ring whose bolts are stated."""

@@ -558,7 +558,7 @@ export class Mechanism {
     const legend = html("ul", "mechanism-legend", "", this.element);
     for (const [className, text] of [
       ["key-force", "force of a pin on the disc"], ["key-other", "the other discs, modified teeth without errors"],
-      ["key-output", "where the output stands, turned further by the magnified transmission error"], ["key-share", "share in what is asked"],
+      ["key-output", "position of the output, turned further by the magnified transmission error"], ["key-share", "share in the output asked about"],
     ]) {
       if (className === "key-other" && this.scene.outline.disc_count === 1) continue;
       const item = html("li", className, "", legend);
@@ -637,10 +637,10 @@ export class Mechanism {
   tell(pose) {
     const turn = degrees(this.carrierAngle), own = degrees(pose.state.error) * 3600;
     const seconds = (this.sense > 0 ? this.errorAt?.(turn % 360) : null) ?? own;
-    const touching = pose.contacts.map((own) => own.filter(({ force }) => force > 0).length).join(" and ");
+    const touching = pose.contacts.map((own, disc) => `${own.filter(({ force }) => force > 0).length || "none"} on disc ${disc + 1}`).join(", ");
     this.stated.textContent =
       `Errors, gaps and displacements are drawn ${short(pose.magnification)} times larger. Carrier at ${turn.toFixed(2)}°, ` +
-      `torque ${short(pose.state.torque)} N·m, transmission error ${seconds.toFixed(1).replace("-", "−")}″, ${touching} pins carry; ` +
+      `torque ${short(pose.state.torque)} N·m, transmission error ${seconds.toFixed(1).replace("-", "−")}″, pins in contact: ${touching}; ` +
       `the longest arrow of the turn is ${short(this.largest)} N. In one output turn ` +
       (this.scene.outline.output_pin_count ? "the input shaft turns " : `the sun turns ${short(Math.abs(this.scene.turns.sun))} times the same way, the cranks `) +
       `${short(Math.abs(this.scene.turns.crank))} times the other way` +

@@ -170,7 +170,7 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
             if value >= _FELT:
                 yield (
                     f"{value:.3g}″ of the peak-to-peak at {abs(torque):,.5g} N·m is elastic: exact parts have it too, "
-                    "so no tolerance takes it away."
+                    "so no tolerance can remove it."
                 )
 
     @property
@@ -187,7 +187,7 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
         """Which errors show at multiples of teeth or pins."""
         stage = self.model.reducer.cycloid_stage
         return (
-            f"Errors that stand still in the housing show at multiples of {stage.disc_teeth}, errors that turn with "
+            f"Errors that stand still in the housing appear at multiples of {stage.disc_teeth}, errors that turn with "
             f"disc or carrier at multiples of {stage.pin_count}"
         )
 
@@ -223,7 +223,7 @@ class ReducerPortrait(Portrait[ReducerModel], of=ReducerModel):
             "rotation δ·r_d [µm]": _effect(modification.rotation, "tooth narrower", "tooth wider"),
             FLANK: "target: nominal gap where cos φ = K1",
             RADIAL: "target: nominal gap at tip and root",
-            TURNED: "target: what turned flanks leave of the flank clearance",
+            TURNED: "target: flank clearance that turned flanks leave",
         }
 
     def cautions(self, values: Float[np.ndarray, " setting"]) -> tuple[str, ...]:
@@ -285,21 +285,21 @@ def against_catalogue(reducer: Reducer, loop: HysteresisLoop) -> tuple[str, tupl
         if USUAL_TWIST / FACTOR**2 <= twist <= USUAL_TWIST * FACTOR**2:
             return "", ()
         return "", (
-            f"Exact parts twist by {twist:.2g}′ under their rated torque; sizes in catalogues twist by 3 to 4′. "
-            "Do not trust what depends on the load: state bearings by their dimensions, or a [catalogue] to compare "
-            "with.",
+            f"Exact parts twist by {twist:.2g}′ under their rated torque; reducers in catalogues twist by 3 to 4′. Do "
+            "not trust results that depend on the load: state bearings by their dimensions, or a [catalogue] to "
+            "compare with.",
         )
     wanted, largest = stated.torsional_rigidity * ARCMINUTE, stated.lost_motion / ARCMINUTE
     sentence = (
-        f"With exact parts the torsional rigidity is {rigidity:.3g} N·m/arcmin where the catalogue states "
-        f"{wanted:.3g} ({number(100 * (rigidity / wanted - 1), '+.0f')} %), the lost motion {lost:.2g}′ where it "
-        f"allows {largest:.2g}′."
+        f"With exact parts the torsional rigidity is {rigidity:.3g} N·m/arcmin, the catalogue states {wanted:.3g} "
+        f"({number(100 * (rigidity / wanted - 1), '+.0f')} %); the lost motion is {lost:.2g}′, the catalogue allows "
+        f"{largest:.2g}′."
     )
     warnings = []
     if not 1 / FACTOR <= rigidity / wanted <= FACTOR:
         off = rigidity / wanted
         times = f"{off:.3g} times as stiff as" if off > 1 else f"{1 / off:.3g} times softer than"
-        warnings.append(f"The model is {times} the catalogue states: do not trust what depends on the load.")
+        warnings.append(f"The model is {times} the catalogue states: do not trust results that depend on the load.")
     if lost > largest:
         warnings.append(f"The lost motion of exact parts, {lost:.2g}′, is above the catalogue's {largest:.2g}′.")
     return sentence, tuple(warnings)
@@ -311,12 +311,12 @@ def linear_model_warnings(stage: CycloidStage, modification: Modification) -> tu
         return ()
     return (
         f"The modification is above {LARGE / MICROMETRE:g} µm, where the linear gaps of the equivalent model are no "
-        "longer good to 0.3 µm; tolalloc contact takes exact distances.",
+        "longer accurate to 0.3 µm; tolalloc contact uses exact distances.",
     )
 
 
 def twist_table(reducer: Reducer) -> pd.DataFrame:
-    """Return which part yields how much of the twist at rated torque."""
+    """Return which part makes how much of the twist at rated torque."""
     import pandas as pd
 
     rows = [
@@ -348,8 +348,8 @@ def _examination(portrait: ReducerPortrait, figures: Mapping[str, float]) -> Exa
         f"{number(radial, '.3g')} µm at tip and root; the whole reducer has "
         f"{loop.backlash[0] / ARCMINUTE:.2f}′ of backlash and {loop.lost_motion[0] / ARCMINUTE:.2f}′ of lost motion.",
         f"Of {count:,} simulated reducers {number(figures['share preloaded [-]'], '.1%')} are preloaded"
-        f"{unsolved}: without torque their pins press with more than "
-        f"the {model.rated_pin_force:,.0f} N of the rated torque; half of all press with "
+        f"{unsolved}: without torque their largest pin force is above "
+        f"the {model.rated_pin_force:,.0f} N of the rated torque. Half of all reach "
         f"{float(f'{half:.2g}'):,g} N or more.",
         _no_load(model, figures),
         f"The tightest of these reducers has {number(least, '.2g')} µm of radial clearance.",
@@ -382,14 +382,14 @@ def resonance_sentence(reducer: Reducer, torque: float, orders: Iterable[float],
     said = f"With {inertia:.4g} kg·m² at the output the first resonance is at {found.frequency:.3g} Hz"
     met = found.met(orders, inf if fastest is None else fastest)
     if not met:
-        return f"{said}; no order that the train makes meets it up to {fastest:,.5g} rpm of the input."
+        return f"{said}; no order of the gear train excites it up to {fastest:,.5g} rpm at the input."
     shown = list(met.items())[:_MET]
     which, speeds = (
         _listed(own) for own in zip(*((f"{order:.6g}", f"{speed:,.0f}") for order, speed in shown), strict=True)
     )
     if len(shown) == 1:
-        return f"{said}; order {which} of the output meets it at {speeds} rpm of the input."
-    return f"{said}; orders {which} of the output meet it at {speeds} rpm of the input."
+        return f"{said}; order {which} of the output excites it at {speeds} rpm at the input."
+    return f"{said}; orders {which} of the output excite it at {speeds} rpm at the input."
 
 
 def _listed(own: Sequence[str]) -> str:
@@ -405,10 +405,10 @@ def _no_load(model: ReducerModel, figures: Mapping[str, float]) -> str:
     assumed = "" if None not in (model.reducer.friction.seals, model.reducer.friction.grease) else " (assumed)"
     more = f"Seals, grease and preloaded rollers take {number(idle.together, '.2g')} N·m more{assumed}"
     if idle.seals is None:
-        more = "Seals and grease come on top"
+        more = "Seals and grease are not included"
     return (
-        f"Without load the friction of the pins takes {number(half, '.2g')} N·m at the output in half of them and up "
-        f"to {number(most, '.2g')} N·m in 99.73 %: {number(100 * most / rated, '.2g')} % of the rated torque, "
+        f"Without load, pin friction takes up to {number(half, '.2g')} N·m at the output in half of them and up to "
+        f"{number(most, '.2g')} N·m in 99.73 %: {number(100 * most / rated, '.2g')} % of the rated torque, "
         f"{number(most / abs(model.reducer.ratio), '.2g')} N·m at the motor. {more}{beside}."
     )
 
@@ -424,7 +424,7 @@ def _reasons(model: ReducerModel, figures: Mapping[str, float]) -> list[str]:
     if (share := figures["share preloaded [-]"]) > allowed:
         by = "" if PRELOAD in model.own_limits else ", by stiffnesses that no dimensions support"
         force = figures["pin force of the rated torque [N]"]
-        more = f"a pin presses with more than the {force:,.0f} N of rated torque{by}"
+        more = f"the largest pin force is above the {force:,.0f} N of rated torque{by}"
         found.append(f"{number(share, '.1%')} are preloaded ({more})")
     most = figures["no-load torque of the pins, 99.73 % [N·m]"] + IdleTorque.of(model.reducer).together
     stated = _catalogue_no_load(model)
@@ -448,7 +448,7 @@ def _advice(model: ReducerModel) -> str:
         else "flank_clearance=(smallest, largest) of ta.reducer(...) would let the allocation open it"
     )
     return (
-        f"a tooth modification that leaves more than the present {number(flank, '.3g')} µm on the flank frees them; "
+        f"a tooth modification with more flank clearance than the present {number(flank, '.3g')} µm frees them; "
         f"`tolalloc modify` proposes one, and {freely}"
     )
 
@@ -472,8 +472,8 @@ def _illustrated(model: ReducerModel, units: Units) -> tuple[Section, ...]:
         Section(
             heading="How exact parts carry the rated torque",
             paragraphs=(
-                "Hertzian line contact, the most loaded disc by Li Lixing's share; a modification that "
-                "interferes before any load has no numbers.",
+                "Hertzian line contact on the most loaded disc, with Li Lixing's load share; no numbers where a "
+                "modification interferes before any load.",
             ),
             tables=(("contact", _contact_table(model, units)),),
         ),
@@ -503,7 +503,7 @@ def _curve_figure(curves: Mapping[str, Equilibria], torque: float) -> Figure:
 
 def _crank_turn_figure(curves: Mapping[str, Equilibria], reducer: Reducer) -> Figure:
     """Return the same over one turn of the crankshafts: the mean of all their turns, and between which they lie."""
-    title = "The same over one turn of the crankshafts: mean of all turns, the band holds every one"
+    title = "The same over one turn of the crankshafts: mean of all turns, with a band that contains each of them"
     series = (_crank_turn(label, curve, reducer.cycloid_stage.disc_teeth) for label, curve in curves.items())
     return Figure("crank_turn", title, "crank angle [°]", _ERROR, series=tuple(series))
 
@@ -603,10 +603,10 @@ def _moving(
     elsewhere = ", ".join(name for name in named if not is_placed(name))
     scene = _scene(model, x, unit, named, per_crank_turn=_COARSE)
     said = (
-        f"The {unit} in true proportion, errors and gaps drawn larger. The stronger a place is coloured, the "
-        "more the sources that sit there drive together, over the place that drives most. Point at a place to "
+        f"The {unit} in true proportion, with errors and gaps magnified. The stronger the colour of a place, the "
+        "larger the joint share of its sources, relative to the place with the largest share. Point at a place to "
         "see its sources, and at a source in a table to see its place.",
-        *((f"The picture has no place for {elsewhere}.",) if elsewhere else ()),
+        *((f"Not shown in the picture: {elsewhere}.",) if elsewhere else ()),
     )
     record, strength = scene_record(scene, coarse=True), strongest(shares, scene.place_by_source)
     picture = MovingPicture("reducer", f"{model.name}, {unit}", record=record, shares=strength)

@@ -27,8 +27,8 @@ def units_figure(result: AllocationResult) -> Figure:
         leading,
         "share of the units [%]",
         series=(
-            Series(label="as it is", kind="histogram", x=list(before)),
-            Series(label="as drawn", kind="histogram", x=list(after)),
+            Series(label="before", kind="histogram", x=list(before)),
+            Series(label="after", kind="histogram", x=list(after)),
         ),
         vertical=tuple((limit, f"limit {with_unit(f'{limit:g}', leading)}") for limit in sides),
     )
@@ -86,7 +86,7 @@ def _trade_figure(result: AllocationResult, trade: SettingTrade, cost_unit: str)
         if known.any():
             drawn = Series.line if known.sum() > 1 else Series.points
             lines.append(drawn(", ".join(chosen) or "cheapest zones", along[known], trade.cost[at][known]))
-    marks = (result.space.settings[-1].value, "as it is"), (float(result.chosen.settings[-1]), "chosen")
+    marks = (result.space.settings[-1].value, "before"), (float(result.chosen.settings[-1]), "chosen")
     heads = _say("figure_trade"), trade.names[-1], f"cost of the cheapest zones [{cost_unit}]"
     return Figure("modification_trade", *heads, series=tuple(lines), vertical=marks)
 

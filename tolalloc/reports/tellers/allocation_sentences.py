@@ -361,7 +361,7 @@ def _proven(result: AllocationResult) -> tuple[str, ...]:
         "found": found,
         "allowed": " or ".join(dict.fromkeys(str(own) for own in found.allowed)),
         "counted": ", ".join(short(own) for own in found.counted),
-        "rests": f", as far as {found.rests_on} hold" if found.rests_on else "",
+        "rests": f", provided that {found.rests_on} hold" if found.rests_on else "",
     }
     answer = _say("answer_free" if result.graded else "answer_drawing", cost=free.cost)
     key = ("proven" if free.met else "proven_alone") if found.says_more else "proven_nothing"
@@ -455,7 +455,7 @@ def _settled(result: AllocationResult) -> Iterator[str]:
     if found is None:
         return
     same = [group for group, settled in zip(found.groups, found.same, strict=True) if settled]
-    names = f": {', '.join(same)}" if same else ""
+    names = f" ({', '.join(same)})" if same else ""
     key = "same_one" if len(same) == 1 else "same_many"
     yield _say(key, same=len(same), count=len(found.groups), most=SAME, change=COST_CHANGE, names=names)
     worst, cost = found.worst, result.free.chosen.cost
@@ -470,7 +470,7 @@ def _settled(result: AllocationResult) -> Iterator[str]:
     if found.graded:
         steady = [group for group, one in zip(found.groups, found.graded, strict=True) if one.holds_change]
         gaps = {"same": len(steady), "count": len(found.groups), "change": COST_CHANGE}
-        yield _say("graded_prices", names=f": {', '.join(steady)}" if steady else "", **gaps)
+        yield _say("graded_prices", names=f" ({', '.join(steady)})" if steady else "", **gaps)
     if found.uncertain and result.free.chosen.met:
         yield from _region(found.uncertain)
 

@@ -162,7 +162,7 @@ def tried_table(result: AllocationResult) -> Table[_Named]:
     kept = f"{short(result.leading)} kept [{unit_of(result.leading)}]"
     columns: list[Column[_Named]] = [
         Column("search", lambda row: row[0]),
-        Column("design", lambda row: row[1].name),
+        Column("design", lambda row: row[1].name.replace("by hand", "scaled")),
         Column("cost [{cost}]", lambda row: row[1].cost),
         Column(kept, lambda row: row[1].quantile_bound),
         Column("yield [%]", lambda row: row[1].achieved.estimate * 100),

@@ -17,7 +17,7 @@ from tolalloc.study.inquiry import Inquiry, Word
 
 @dataclass(frozen=True, kw_only=True)
 class Compare(Inquiry[Comparison]):
-    """Two finished studies side by side: answers, rankings, zones; the last two of the folder runs unless named."""
+    """Show two finished studies side by side: answers, rankings, zones; the last two in folder runs unless named."""
 
     word: ClassVar[str] = "compare"
     example: ClassVar[str] = "tolalloc compare runs/mine runs/other"

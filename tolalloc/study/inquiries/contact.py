@@ -27,7 +27,7 @@ MOST_PHASES = 3600
 
 @dataclass(frozen=True, kw_only=True)
 class ToothContact(Inquiry["tuple[Reducer, float]"]):
-    """Clearance, backlash, pins in contact, forces and pressure of exact parts."""
+    """Compute clearance, backlash, pins in contact, forces and pressure of exact parts."""
 
     word: ClassVar[str] = "contact"
     example: ClassVar[str] = "tolalloc contact --reducer mine/reducer.toml"
@@ -41,11 +41,11 @@ class ToothContact(Inquiry["tuple[Reducer, float]"]):
     ] = None
     support: Annotated[
         float | None,
-        Word("Distance of two supports between which the pins bend [mm]."),
+        Word("Distance between the two supports of a bending pin [mm]."),
         or_none(number("1 to 500 mm between two supports", least=1, most=500)),
     ] = None
     law: Annotated[str, Word("Contact law: logarithmic (Hertz), constant, table2.")] = "logarithmic"
-    exact: Annotated[bool, Word("Exact distances even for a small modification.", option="--exact")] = False
+    exact: Annotated[bool, Word("Use exact distances even for a small modification.", option="--exact")] = False
     phases: Annotated[
         int, Word("Phases of the crank within one pin pitch."), whole(f"1 to {MOST_PHASES}", 1, MOST_PHASES)
     ] = 72

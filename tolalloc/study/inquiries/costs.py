@@ -15,7 +15,7 @@ from tolalloc.study.inquiry import Inquiry, Word
 
 @dataclass(frozen=True, kw_only=True)
 class Costs(Inquiry[tuple[ShopFit, ...]]):
-    """Cost of a zone from shop data: every closed form with its fit error and the range where it holds."""
+    """Fit the cost of a zone to shop data: every closed form with its fit error and the range where it is valid."""
 
     word: ClassVar[str] = "costs"
     example: ClassVar[str] = "tolalloc costs mine/shop.csv"

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Modify(Inquiry["tuple[ModificationRequest, Reducer, float]"]):
-    """Choose equidistant and shift amount for wanted clearances or by a published objective; say what they deliver."""
+    """Choose equidistant and shift amount for wanted clearances or by a published objective; show what they deliver."""
 
     word: ClassVar[str] = "modify"
     example: ClassVar[str] = "tolalloc modify --flank 3.5 --radial 8 --reducer mine/reducer.toml"
@@ -36,7 +36,7 @@ class Modify(Inquiry["tuple[ModificationRequest, Reducer, float]"]):
     flank: Annotated[float | None, Word("clearances: wanted on the flank [µm]; 3.5 unless given.")] = None
     radial: Annotated[
         float | None,
-        Word("At tip and root [µm]: wanted by clearances, 8 unless given, the least of the others, 15 unless given."),
+        Word("At tip and root [µm]: for clearances wanted, 8 unless given; else the smallest, 15 unless given."),
     ] = None
     rotation: Annotated[float, Word("song2019: rotation of the profile to come close to [rad].")] = 0.005
     metric: Annotated[str, Word("song2019: same_angle, normal or nearest.")] = "same_angle"
@@ -45,9 +45,7 @@ class Modify(Inquiry["tuple[ModificationRequest, Reducer, float]"]):
     torque: RatedTorque = None
     profile: ProfileFile = None
     points: ProfilePoints = 200
-    write_to: Annotated[
-        Path | None, Word("Reducer file to write, new: the reducer with these amounts.", option="--write")
-    ] = None
+    write_to: Annotated[Path | None, Word("New reducer file to write, with these amounts.", option="--write")] = None
 
     def prepare(self) -> tuple[ModificationRequest, Reducer, float]:
         """Return what is chosen, on which design, and the torque on the carrier [N·m]."""

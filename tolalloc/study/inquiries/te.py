@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class TransmissionError(Inquiry["tuple[Reducer, BuiltUnit, float]"]):
-    """Transmission error of one built unit over one output turn."""
+    """Compute the transmission error of one built unit over one output turn."""
 
     word: ClassVar[str] = "te"
     example: ClassVar[str] = "tolalloc te --reducer rv20e --unit table4 --attribute"
@@ -28,7 +28,7 @@ class TransmissionError(Inquiry["tuple[Reducer, BuiltUnit, float]"]):
     unit: UnitName = "exact"
     torque: TestTorque = None
     stiffness: StiffnessName = ""
-    attributed: Annotated[bool, Word("Show which source makes which order.", option="--attribute")] = False
+    attributed: Annotated[bool, Word("Show which source drives which order.", option="--attribute")] = False
 
     def prepare(self) -> tuple[Reducer, BuiltUnit, float]:
         """Return the design, the unit and the torque on the carrier [N·m]."""

@@ -41,7 +41,7 @@ class DatumFlowChain:
             raise InputError.at("datum flow chain", "part", repeated[0], "a name that no other part and no datum has")
         on = {part.name: part.on for part in self.parts}
         for part in self.parts:
-            UnknownNameError.require(f"datum flow chain, part {part.name}", "on", part.on, names)
+            UnknownNameError.require(f"datum flow chain, part {part.name}", "part under on", part.on, names)
             path = [part.name]
             while path[-1] in on and path.count(path[-1]) == 1:
                 path.append(on[path[-1]])

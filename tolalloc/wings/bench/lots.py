@@ -424,7 +424,7 @@ def _meant(path: Path, header: str, sources: Sequence[Source]) -> tuple[Source, 
     if name not in known and ending and base in known and known[base].feature is Feature.POSITION:
         return known[base], *ending
     if name not in known:
-        raise UnknownNameError.among(path, "the source of a column", name, known_as(sources))
+        raise UnknownNameError.among(path, "source of column", name, known_as(sources))
     source = known[name]
     if source.feature is Feature.POSITION:
         allowed = f"{name}.radius or {name}.diameter, or both {name}.x and {name}.y"

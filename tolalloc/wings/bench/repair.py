@@ -112,7 +112,7 @@ def load_repair(path: Path, errors: ErrorModel) -> Repair:
         for name in getattr(repair, field):
             with faults.kept():
                 if not (name in known if field == "read" else meant(name, errors.active)):
-                    raise UnknownNameError.among(path, f"the source of {field}", name, known)
+                    raise UnknownNameError.among(path, f"source of {field}", name, known)
     faults.require_none()
     return repair
 

@@ -8,7 +8,7 @@ export class CostChart {
   // draw(figure) draws it; present() returns what is shown, as `figure` takes it.
   constructor(element, present, draw) {
     Object.assign(this, { present, draw });
-    this.choice = make("select", { "aria-label": "limited output of the chart of cost", onchange: () => this.update() });
+    this.choice = make("select", { "aria-label": "output of the cost chart", onchange: () => this.update() });
     element.append(this.choice);
   }
 
@@ -29,7 +29,7 @@ export class CostChart {
   figure({ output, place, own, share, name }, { judged, cost, currency, pins, scaled, found, byProcess }) {
     const value = (outputs) => outputs[output]?.quantiles[place]?.value ?? null, limit = share < 0.5 ? own.lower : own.upper, series = [];
     const line = (scaled ?? []).map((item) => [item.quantiles[output][place], item.cost]).filter(([x]) => x !== null);
-    if (line.length > 1) series.push({ label: `the drawing, all zones scaled alike${byProcess ? ", by the cheapest processes" : ""}`, kind: "line", x: line.map(([x]) => x), y: line.map(([, y]) => y), colour: "var(--faint)" });
+    if (line.length > 1) series.push({ label: `the drawing, all zones scaled by one factor${byProcess ? ", by the cheapest processes" : ""}`, kind: "line", x: line.map(([x]) => x), y: line.map(([, y]) => y), colour: "var(--faint)" });
     if (found?.front && !output) series.push({ label: "cheapest at other limits", kind: "line", ...found.front, colour: "var(--series-1)" });
     for (const pin of pins) if (value(pin.outputs) !== null) series.push({ label: pin.name, kind: "points", x: [value(pin.outputs)], y: [pin.cost], colour: pin.colour });
     const here = value(judged.outputs);

@@ -368,7 +368,7 @@ async function begin() {
   at("unit").max = study.most;
   at("unit").addEventListener("change", () => {
     const wanted = at("unit").value, good = /^\d+$/.test(wanted) && Number(wanted) <= study.most;
-    refuseUnit(good ? "" : `“${wanted}” is no unit: write a whole number up to ${number(study.most)}, 0 for exact parts.`);
+    refuseUnit(good ? "" : `“${wanted}” is not a unit: write a whole number up to ${number(study.most)}, 0 for exact parts.`);
     at("unit").value = good ? wanted : goodUnit;
     goodUnit = unit();
     if (good) look();

@@ -34,7 +34,7 @@ export class Question {
       this.tell(kind, state);
       await new Promise((done) => setTimeout(done, EVERY));
       state = await refusable(ask("state"));
-      if (state && !state.kind) state.error = "The server was started again: ask once more.";
+      if (state && !state.kind) state.error = "The server was restarted: ask again.";
     }
     if (own !== this.running) return; // a newer question took its place
     at("stop").hidden = at("asked-bar").hidden = true;
@@ -58,7 +58,7 @@ export class Question {
     at("found").replaceChildren(
       ...(zones ? [make("button", { onclick: () => this.taken = this.take(zones, settings) }, "Take this drawing")] : []),
       make("p", { class: "earlier", hidden: true }, "This is the answer for an earlier design, not for the one that is shown now."),
-      ...told, ...(rest.length ? [make("details", {}, make("summary", {}, "what else it says"), ...rest)] : []),
+      ...told, ...(rest.length ? [make("details", {}, make("summary", {}, "more of the answer"), ...rest)] : []),
       ...warnings.map((text) => make("p", { class: "warning" }, text)));
     if (figure) this.draw(figure);
   }

@@ -9,10 +9,11 @@ export const percent = (share) => `${(100 * share).toFixed(2)} %`;
 
 export function quantile(own, { share, value, interval }) {
   const limit = share < 0.5 ? own.lower : own.upper, beyond = value !== null && (share < 0.5 ? value < limit : value > limit);
-  const end = (known) => (known === null ? "more units needed" : number(Number(known.toPrecision(4))));
+  const [low, high] = interval.map((end) => (end === null ? null : number(Number(end.toPrecision(4)))));
+  const known = low !== null && high !== null ? `${low} … ${high} (95 %)` : low !== null ? `at least ${low} (95 %); an upper bound needs more units` : high !== null ? `at most ${high} (95 %); a lower bound needs more units` : "bounds need more units";
   return make("div", { class: "of-units quantile" }, make("dt", {}, `${own.name}, ${named(share)}`),
     make("dd", { class: beyond ? "bad" : "" }, `${value === null ? "–" : number(Number(value.toPrecision(4)))} ${own.unit}`),
-    make("dd", { class: "small" }, `${end(interval[0])} … ${end(interval[1])} (95 %)`));
+    make("dd", { class: "small" }, known));
 }
 
 // Whether the limits are kept, as far as the units tell, and how many units do not work at all.
@@ -20,7 +21,7 @@ export function verdict(judged) {
   const [, low, high] = judged.yield;
   const free = Object.entries(judged.broken).map(([output, share]) => {
     const units = share ? `${percent(share)} of the units are` : "No unit is";
-    return output.startsWith("largest pin force without torque") ? ` ${units} preloaded${share ? ": without torque their pins press harder than the rated torque makes them" : ""}.` : ` ${units} beyond the model's own limit of ${output}.`;
+    return output.startsWith("largest pin force without torque") ? ` ${units} preloaded${share ? ": without torque their pin forces exceed those of the rated torque" : ""}.` : ` ${units} beyond the model's own limit of ${output}.`;
   }).join("");
   if (low >= judged.target) return `The limits are kept: the yield is at least the ${percent(judged.target)} asked for.${free}`;
   if (high < judged.target) return `The limits are not kept: the yield is below the ${percent(judged.target)} asked for.${free}`;

@@ -98,7 +98,7 @@ export class Zones {
     const read = (text) => {
       const zone = typed(text);
       if (zone > 0 && Number.isFinite(zone)) return zone;
-      row.refuse(`“${text}” is no zone: write a number above 0, such as 4 or 0.004 mm.`);
+      row.refuse(`“${text}” is not a zone: write a number above 0, such as 4 or 0.004 mm.`);
       return null;
     };
     const field = make("input", { inputmode: "decimal", "aria-label": `zone of ${name} in ${MICRO}`, onchange: (e) => {
@@ -110,7 +110,7 @@ export class Zones {
       type: "range", min: 0, max: STEPS, step: 1, "aria-label": `zone of ${name}`,
       oninput: (e) => set(rounded(at(Number(e.target.value))), false), onchange: (e) => set(rounded(at(Number(e.target.value))), true),
     });
-    const lock = make("button", { title: "lock: an allocation leaves it as it is", onclick: () => this.toggle(group) });
+    const lock = make("button", { title: "lock: an allocation does not change it", onclick: () => this.toggle(group) });
     const price = make("span", { class: "price of-design", title: "cost" }), delta = make("small", { class: "delta" });
     const drawn = make("i", { class: "drawn", title: `drawing: ${number(rounded(first.zone))} ${MICRO}` });
     const share = make("div", { class: "share", hidden: true });

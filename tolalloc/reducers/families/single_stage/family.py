@@ -20,7 +20,7 @@ from tolalloc.reducers.families.family import HOUSING_PLACES, NewRows, Place, Re
 from tolalloc.reducers.families.single_stage.design import OutputPins, SingleStageRecord, SingleStageReducer
 from tolalloc.reducers.reducer.design import Reducer
 
-_STANDS_OFF = Characteristic("coaxiality", "how far the shaft stands off is drawn as coaxiality")
+_STANDS_OFF = Characteristic("coaxiality", "shaft offset is toleranced as coaxiality")
 
 
 def _pins_of(reducer: Reducer) -> OutputPins:
@@ -197,9 +197,7 @@ def _outlines(reducer: Reducer) -> tuple[dict[str, Any], tuple[str, ...]]:
         "pin_count": stage.pin_count,
         "disc_teeth": stage.disc_teeth,
     }
-    assumed = (
-        "drawn by a rule, as the reducer file does not state them: outlines of housing, carrier, shaft and its bore"
-    )
+    assumed = "outlines of housing, carrier, shaft and its bore are schematic: the reducer file gives none"
     return {name: float(length / MILLIMETRE) for name, length in lengths.items()} | counts, (assumed,)
 
 

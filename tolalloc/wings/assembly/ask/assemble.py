@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Assemble(Inquiry["AssemblyRequest"]):
-    """Turn parts while they are assembled: how far, what that leaves, and which angular tolerances are cheapest."""
+    """Plan how far parts are turned at assembly, what error remains, and which angular tolerances are cheapest."""
 
     word: ClassVar[str] = "assemble"
     example: ClassVar[str] = "tolalloc assemble mine/chain.toml --measured mine/angles.csv"

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Mount(Inquiry["MountingRequest"]):
-    """Build the units with the least peak-to-peak from measured parts: who goes where, turned how far."""
+    """Build the units with the least peak-to-peak from measured parts: which part goes where, turned how far."""
 
     word: ClassVar[str] = "mount"
     example: ClassVar[str] = "tolalloc mount mine/parts.csv --reducer mine/reducer.toml"

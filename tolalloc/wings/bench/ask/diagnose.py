@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Diagnose(Inquiry["DiagnosisRequest"]):
-    """Which part error the measured curve of a bad unit points to, and which ones it cannot tell apart."""
+    """Find which part error the measured curve of a bad unit points to, and which ones it cannot distinguish."""
 
     word: ClassVar[str] = "diagnose"
     example: ClassVar[str] = "tolalloc diagnose mine/unit7.csv --reducer mine/reducer.toml --tolerances mine/zones.csv"

@@ -32,7 +32,7 @@ NAMES = (
 
 @dataclass(frozen=True, kw_only=True)
 class Identify(Inquiry["tuple[Reducer, IdentificationRequest | None, Measurements | None]"]):
-    """Identify stiffnesses from measured units, and say what the measurements cannot tell."""
+    """Identify stiffnesses from measured units, and show what the measurements cannot determine."""
 
     word: ClassVar[str] = "identify"
     example: ClassVar[str] = "tolalloc identify mine/bench.toml --reducer mine/reducer.toml"
@@ -55,7 +55,7 @@ class Identify(Inquiry["tuple[Reducer, IdentificationRequest | None, Measurement
     ] = None
     priors: Annotated[
         list[str] | None,
-        Word("Known beforehand, as NAME=RELATIVE standard deviation (bias: arcsec).", option="--prior"),
+        Word("Prior knowledge, as NAME=RELATIVE standard deviation (bias: arcsec).", option="--prior"),
     ] = None
     catalogue: Annotated[
         bool,
@@ -63,7 +63,7 @@ class Identify(Inquiry["tuple[Reducer, IdentificationRequest | None, Measurement
     ] = False
     seed: Seed = 1
     write_to: Annotated[
-        Path | None, Word("Stiffness file to write, new, for --stiffness elsewhere.", option="--write")
+        Path | None, Word("New stiffness file to write, for --stiffness elsewhere.", option="--write")
     ] = None
 
     def apart_from(self, report: Path | None) -> None:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Lot(Inquiry["LotRequest"]):
-    """Tell from gauge readings of a lot which process moved, how the parts keep their zones, and the lot's drawing."""
+    """Find from gauge readings of a lot which process moved and how well the parts keep their zones."""
 
     word: ClassVar[str] = "lot"
     example: ClassVar[str] = "tolalloc lot mine/lot.csv mine/zones.csv"
@@ -36,16 +36,16 @@ class Lot(Inquiry["LotRequest"]):
     processes: ProcessesName = "generic"
     false_alarms: Annotated[
         float,
-        Word("Probability that any process is called moved if none is."),
+        Word("Probability of a false alarm if no process moved."),
         number("0.001 to 0.5", least=0.001, most=0.5),
     ] = 0.05
     next_parts: Annotated[
         int | None,
-        Word("Parts of the next sample, for its control limits; as many as now unless given."),
+        Word("Parts in the next sample, for its control limits; as many as now unless given."),
         or_none(whole("2 to 10000", 2, 10_000)),
     ] = None
     write_to: Annotated[
-        Path | None, Word("Tolerance table to write, new: Cp and shift of the lot.", option="--write")
+        Path | None, Word("New tolerance table to write, with Cp and shift of the lot.", option="--write")
     ] = None
     curves: Annotated[
         Path | None, Word("Folder of curves, a CSV per unit: columns 'angle [deg]', 'transmission error [arcsec]'.")

@@ -126,11 +126,11 @@ class DiagnosisTeller(Teller[DiagnosisResult]):
             return (_say("unexplained", measured=measured, chi_square=fit.chi_square, freedom=fit.freedom),)
         named = [row for row in self._sources.records() if row["named"] == "yes"]
         likely = ", ".join(_say("one_likely", source=row["source"], share=row["P(dominant) [%]"]) for row in named)
-        first = named[0]
+        first, key = named[0], "likely" if named[1:] else "certain"
         reading, low, high = alike(*(first[name] for name in _ENDS), figures=2)
         pairs = "; ".join(_say("pair", one=one, other=other) for one, other in found.twins)
         return (
-            _say("likely", measured=measured, level=self.result.request.level, likely=likely),
+            _say(key, measured=measured, level=self.result.request.level, likely=likely),
             _say("first", source=first["source"], reading=reading, low=low, high=high, zone=first["zone [µm]"]),
             *((_say("twins", pairs=pairs),) if pairs else ()),
             *(

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Duty(Inquiry["tuple[Reducer, tuple[LoadCase, ...]]"]):
-    """Lives of the bearings, loads, losses and temperature of the discs under a duty cycle, of exact parts."""
+    """Compute bearing lives, loads, losses and disc temperature of exact parts under a duty cycle."""
 
     word: ClassVar[str] = "duty"
     example: ClassVar[str] = "tolalloc duty mine/cycle.csv --reducer mine/reducer.toml"
@@ -31,7 +31,7 @@ class Duty(Inquiry["tuple[Reducer, tuple[LoadCase, ...]]"]):
     reducer: ReducerName = None
     resistance: Annotated[
         float | None,
-        Word("Temperature of the discs above the ring over the lost power [K/W]; assumed by size unless given."),
+        Word("Temperature of the discs above the ring per watt lost [K/W]; assumed from the size unless given."),
         or_none(number("0 to 10 K/W", least=0, most=10)),
     ] = None
 

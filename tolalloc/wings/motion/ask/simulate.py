@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Simulate(Inquiry["PreparedSimulation"]):
-    """Speeds, accelerations, transmission error and pins in contact over time, beside the static model."""
+    """Simulate speeds, accelerations, transmission error and pins in contact over time, beside the static model."""
 
     word: ClassVar[str] = "simulate"
     example: ClassVar[str] = "tolalloc simulate --reducer rv40e --out motion"
@@ -26,15 +26,15 @@ class Simulate(Inquiry["PreparedSimulation"]):
 
     reducer: ReducerName = None
     unit: UnitName = "exact"
-    speed: Annotated[float, Word("Input speed that is reached [rpm].")] = 525.0
+    speed: Annotated[float, Word("Final input speed [rpm].")] = 525.0
     torque: RatedTorque = None
     engine: Annotated[
         str, Word("generalised-alpha or newmark (equivalent model), exudyn (exact profile, optional extra).")
     ] = "generalised-alpha"
     duration: Annotated[float, Word("Simulated time [s].")] = 2.0
-    ramp: Annotated[float, Word("Time in which the speed rises [s]; the load rises in half of it afterwards.")] = 1.0
+    ramp: Annotated[float, Word("Time in which the speed rises [s]; then the load rises in half that time.")] = 1.0
     step: Annotated[float, Word("Time step [s].")] = 5e-5
-    output_inertia: Annotated[float, Word("Moment of inertia that the carrier turns besides its own [kg·m²].")] = 0.0
+    output_inertia: Annotated[float, Word("Moment of inertia driven by the carrier, besides its own [kg·m²].")] = 0.0
     damping: Annotated[float, Word("Damping over stiffness of meshes and bearings [s].")] = 1e-5
     mass_damping: Annotated[
         float | None,
