@@ -162,6 +162,11 @@ def test_promise_names_a_mean_off_the_middle_only_as_what_lines_demand():
     assert "Cp 1 about the middle" not in said
 
 
+def test_promise_for_evenly_spread_parts_says_so():
+    sentences = study(population=EVENLY).allocate(effort="quick").teller.sentences
+    assert any("This holds for parts that are spread evenly over their zones." in own for own in sentences)
+
+
 def test_drawing_for_parts_anywhere_in_their_zones_demands_the_zones_alone(tmp_path):
     answer = study(population=ANYWHERE).allocate(effort="quick")
     answer.teller.add_files(tmp_path)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from tolalloc.allocation.result import AllocationResult
 from tolalloc.allocation.space.requirement import WorstCase
+from tolalloc.drawings.distributions import Distribution
 from tolalloc.drawings.population import demand, demanded_capabilities
 from tolalloc.drawings.provenance import ASSUMED, CELLS
 from tolalloc.drawings.sources import Source
@@ -38,8 +39,10 @@ def _capability(result: AllocationResult) -> str:
 
 def population_sentences(result: AllocationResult) -> tuple[str, ...]:
     """Return for which parts the yield is promised, and what becomes of parts that only keep their zones."""
-    if result.evenly is None or not result.met:
+    if not result.met:
         return ()
+    if result.evenly is None:
+        return (_say("population_evenly"),) if _are_even(result.drawn_sources) else ()
     several = len(result.requirements) > 1
     return (
         _say(
@@ -50,6 +53,11 @@ def population_sentences(result: AllocationResult) -> tuple[str, ...]:
             **interval_gaps(result.evenly.joint),
         ),
     )
+
+
+def _are_even(sources: Sequence[Source]) -> bool:
+    """Return whether all lines are promised for parts that are evenly spread."""
+    return all(own.distribution is Distribution.UNIFORM for own in sources if own.zone > 0.0)
 
 
 def assumed_alone(result: AllocationResult) -> tuple[str, ...]:

@@ -40,6 +40,8 @@ _MOSTLY = 0.5
 """Share of a wave's variance from single sources above which they are named for it [-]."""
 _SURE = 0.995
 """Confidence that would be rounded to certainty [-]."""
+_TOO_CLOSE = 0.6
+"""Share of resamples below which one source is not said to rank above the next [-]."""
 _CARRIED = 0.99
 """Width of intervals over that without a control variate below which it is worth a sentence [-]."""
 _LEAST_CARRIED = 0.01
@@ -534,6 +536,8 @@ def _named_drivers(sobol: SourceIndices, output: str) -> str:
 def _before(pair: Neighbours, sources: Sequence[str]) -> str:
     """Return how sure it is that a source ranks above the next one."""
     key = "driver_surely" if pair.probability >= _SURE else "driver_before"
+    if pair.probability < _TOO_CLOSE:
+        key = "driver_close"
     return _say(key, next=sources[pair.after], probability=pair.probability)
 
 
