@@ -44,7 +44,7 @@ def read(path: Path) -> tuple[list[str], list[list[str]]]:
 def share_within(folder: Path, values: dict[str, np.ndarray]) -> float:
     """Return the share of the rows that keep all limits."""
     kept = True
-    for output, lower, upper, _ in read(folder / "limits.csv")[1]:
+    for output, lower, upper, *_ in read(folder / "limits.csv")[1]:
         kept &= (values[output] >= float(lower or -np.inf)) & (values[output] <= float(upper or np.inf))
     return float(np.mean(kept))
 
@@ -56,6 +56,20 @@ def expected(folder: Path) -> tuple[float, int]:
     estimate, low, high = yields["all limits"]
     assert low < estimate < high
     return estimate, int(said.split(" units")[0].split()[-1])
+
+
+def test_what_decides_and_stands_in_no_file_is_said(tmp_path):
+    text = LINEAR.replace('{"id": "b", **ROW}])', '{"id": "b", **ROW}], gauge_ratio=10)').replace(
+        'name="linear",', 'name="linear", compensators=[ta.Shim("a", step=2.0, sizes=(1, 3), against={"b": -1.0})],'
+    )
+    (tmp_path / "study.py").write_text(text, "utf-8")
+    made = tolalloc("export-problem", tmp_path / "study.py", "--out", tmp_path / "problem", "--rows", 200)
+    assert made.returncode == 0, made.stderr
+    page = (tmp_path / "problem" / "README.md").read_text("utf-8")
+    assert "Not in these files: parts chosen at assembly and what choosing costs." in page
+
+    assert read(tmp_path / "problem" / "nominals.csv")[1] == [["a", "10.0"], ["b", "2.0"]]
+    assert [row[-1] for row in read(tmp_path / "problem" / "limits.csv")[1]] == ["0.9973"]
 
 
 @pytest.mark.parametrize(("text", "points"), [(LINEAR, 4000), (OWN.replace("upper=0.2,", "upper=0.12,"), 3000)])
@@ -83,7 +97,8 @@ def test_the_points_give_the_expected_yield_and_the_function_gives_the_points(tm
         assert [row[0] for row in read(folder / "linear.csv")[1]] == ["gap [mm]"]  # the seat has a square
 
 
-NAMES = ("tolerances.csv", "limits.csv", "settings.csv", "points.csv", "linear.csv", "model.py", "expected.json")
+NAMES = tuple(f"{name}.csv" for name in ("tolerances", "limits", "settings", "nominals", "points", "linear"))
+NAMES += ("model.py", "expected.json")
 
 
 @pytest.mark.slow

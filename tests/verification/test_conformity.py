@@ -119,6 +119,15 @@ def test_cheapest_gauge_is_where_another_reading_costs_what_it_saves():
     assert gauges[0] != found[0].gauge != gauges[-1]
 
 
+def test_gauges_cost_the_same_in_every_unit():
+    def costs(unit):
+        gauges = [ta.Gauge(name="one", uncertainty=4.0 * unit, price=0.1)]
+        (own,) = ta.costs_of_gauges(gauges, 0.0, 6.0 * unit, lower=-12 * unit, upper=12 * unit, rejected=5, escaped=99)
+        return own.cost, own.guard / unit
+
+    assert costs(1e-6) == pytest.approx(costs(1.0), rel=1e-6)
+
+
 def test_gauges_that_cannot_be_priced_are_refused():
     with pytest.raises(InputError, match="uncertainty is -1"):
         ta.Gauge(name="caliper", uncertainty=-1.0, price=0.0)

@@ -214,7 +214,7 @@ FILES = [
     OfficeFile(
         "head again on the next page",
         text().replace("lid", ";".join(HEAD) + "\nlid"),
-        refused="row 4: the heads stand here again",
+        refused="row 4: the header is repeated here",
     ),
     OfficeFile(
         "second table below",

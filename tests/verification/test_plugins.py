@@ -52,7 +52,7 @@ def test_a_package_brings_a_model_and_stands_in_the_manifest(site):
     assert ta.installed_model("sum").outputs == ("sum [mm]",)
     assert plugin_versions() == {"acme_model": "1.2"}
     assert versions()["acme_model"] == "1.2"
-    with pytest.raises(UnknownNameError, match=r"model 'summ' is not known; the nearest known is sum"):
+    with pytest.raises(UnknownNameError, match=r"unknown model 'summ'; the nearest known is sum"):
         ta.installed_model("summ")
 
 
@@ -113,6 +113,43 @@ def test_what_cannot_be_used_is_left_out_with_one_sentence(site, caplog, code, w
     assert caplog.messages == [
         f"{package} 1.2: 'mine' of tolalloc.families is left out: {why.format(package=package)}."
     ]
+
+
+TAKES_ALL = """
+from dataclasses import replace
+from tolalloc.reducers.families.rv import RV
+Like = replace(RV, name={name!r})
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [("own", "ValueError: its record is of the family 'RV', not of 'own'")],
+)
+def test_a_family_that_would_take_the_files_of_another_is_left_out(site, caplog, name, why):
+    install(site, f"acme_{name}", TAKES_ALL.format(name=name), families=f"mine = acme_{name}:Like")
+    assert records() == SHIPPED
+    assert load_reducer("rv20e").family == "RV"
+    assert caplog.messages == [f"acme_{name} 1.2: 'mine' of tolalloc.families is left out: {why}."]
+
+
+def test_a_folder_without_a_module_brings_presets_too(site):
+    folder = install(site, "acme_folder", "", files="any = acme_folder")
+    (folder / "__init__.py").unlink()
+    (folder / "acme2.reducer.toml").write_text((PRESETS / "rv20e.reducer.toml").read_text("utf-8"), "utf-8")
+    assert load_reducer("acme2").name == "RV-20E"
+
+
+def test_a_command_that_is_known_is_no_wing_of_another_package(tmp_path):
+    code = """
+from tolalloc.study.inquiries import INQUIRIES
+from tolalloc.study.wing import Wing
+WING = Wing(questions=(INQUIRIES[0],))
+"""
+    install(tmp_path, "acme_wing", code, wings="mine = acme_wing:WING")
+    done = process("schema", "unit", PYTHONPATH=str(tmp_path))
+    assert done.returncode == 0
+    assert "is known already, give it another word" in done.stderr
 
 
 def test_of_two_packages_with_one_name_the_first_is_taken(site, caplog):

@@ -147,7 +147,7 @@ def test_hidden_rows_and_columns_are_read_and_said(sources, tmp_path):
     drawing = load_drawing(shop_sheet(tmp_path / "t.xlsx", hide))
     assert drawing.sources == sources
     titles, rows, columns = _read(drawing)
-    assert "what stands above it was left out" in titles
+    assert "the rows above it were left out" in titles
     assert rows.endswith("hidden rows of the sheet are read like the others: 6")
     assert columns.endswith("hidden columns of the sheet are read like the others: B")
     assert _read(drawing.with_table(tmp_path / "comma.csv")) == ()  # its own, not those of the table before

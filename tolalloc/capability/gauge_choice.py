@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import Annotated, ClassVar
 
 from tolalloc.capability.conformity import COVERAGE, Risks, risks
 from tolalloc.capability.indices import Limits
 from tolalloc.exceptions import InputError
-from tolalloc.reading.named_fields import NamedFields, a, number
+from tolalloc.reading.named_fields import NamedFields, a, is_number, number
 
 _FAR = 4.0
 """Standard uncertainties to either side of a limit between which the cheapest guard band is searched [-]."""
@@ -91,8 +92,10 @@ def costs_of_gauges(
     """
     if not gauges:
         raise InputError.at("gauges", "gauges", "none", "one or more")
+    if not is_number(mean) or not isfinite(mean):
+        raise InputError.at("gauges", "mean", mean, "a finite number")
     for name, value in {"deviation": deviation, "rejected": rejected, "escaped": escaped}.items():
-        if not 0.0 < value < float("inf"):
+        if not is_number(value) or not 0.0 < value < float("inf"):
             raise InputError.at("gauges", name, value, "a finite number above 0")
     limits = Limits(lower=lower, upper=upper)
     found = [_cheapest(own, mean, deviation, limits, rejected, escaped) for own in gauges]
@@ -112,5 +115,5 @@ def _cheapest(
     if gauge.uncertainty == 0.0:
         return at(0.0)
     reach = _FAR * gauge.uncertainty / COVERAGE
-    search = minimize_scalar(lambda guard: at(float(guard)).cost, bounds=(-reach, reach), method="bounded")
-    return at(float(search.x))
+    search = minimize_scalar(lambda guard: at(reach * float(guard)).cost, bounds=(-1.0, 1.0), method="bounded")
+    return at(reach * float(search.x))

@@ -23,7 +23,7 @@ from tolalloc.drawings.sources import Source
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_rows, table_text
 from tolalloc.drawings.zones import Feature
 from tolalloc.exceptions import InputError, UnknownNameError
-from tolalloc.reading.files import shipped_files
+from tolalloc.reading.files import shipped_or_path
 from tolalloc.reading.units import ARCSECOND, COST_UNITS, MICROMETRE, MILLIMETRE
 from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.model import EquivalentModel
@@ -175,7 +175,7 @@ class Likeness:
 
     def text(self, name: str) -> str:
         """Return the reducer file; new counts and the modification of the drawing are marked as assumptions."""
-        text = shipped_files(PRESETS, ".reducer.toml")[self.preset].read_text(encoding="utf-8")
+        text = shipped_or_path(self.preset, PRESETS, ".reducer.toml", "reducer").read_text(encoding="utf-8")
         text = re.sub(r'^name = ".*"$', f'name = "{name}"', text, count=1, flags=re.MULTILINE)
         text, changed = self._with_modification(text), []
         for field, count in (("crank_count", self.cranks), ("disc_count", self.discs)):

@@ -192,8 +192,8 @@ def _records(hint: Any) -> list[Any]:
 def shipped_files(folder: Path, suffix: str) -> dict[str, Path]:
     """Return the files of a kind by name: the shipped ones of a folder, then those that other packages bring."""
     found = {file.name.removesuffix(suffix): file for file in folder.glob(f"*{suffix}")}
-    for module in plugins("files", (), ("__file__",)).values():
-        for file in sorted(Path(module.__file__).parent.glob(f"*{suffix}")):
+    for module in plugins("files", (), ("__path__",)).values():
+        for file in sorted(file for place in module.__path__ for file in Path(place).glob(f"*{suffix}")):
             if found.setdefault(file.name.removesuffix(suffix), file) != file:
                 say_left_out(str(file), "a file of that name is known already")
     return found

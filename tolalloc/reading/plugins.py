@@ -6,7 +6,7 @@ Nothing is loaded before a list asks for it. What cannot be used is left out wit
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
@@ -20,7 +20,8 @@ GROUPS = ("families", "files", "outputs", "models", "questions", "exports", "win
 @cache
 def _entries(group: str) -> list[tuple[str, str, EntryPoint]]:
     """Return package, version and entry point of all that is installed of a group, in the order of their names."""
-    found = ((own.dist.name, own.dist.version, own) for own in entry_points(group=f"tolalloc.{group}") if own.dist)
+    brought = (own for own in entry_points(group=f"tolalloc.{group}") if own.dist and own.dist.name)
+    found = ((own.dist.name, own.dist.version, own) for own in brought if own.dist)
     return sorted(found, key=lambda own: (own[0], own[2].name))
 
 
@@ -44,7 +45,13 @@ def left_out_if_broken(what: str) -> Iterator[None]:
         say_left_out(what, f"{type(error).__name__}: {error}".partition("\n")[0])
 
 
-def plugins(group: str, taken: Iterable[str], needs: tuple[str, ...], named_by: str = "") -> dict[str, Any]:
+def plugins(
+    group: str,
+    taken: Iterable[str],
+    needs: tuple[str, ...],
+    named_by: str = "",
+    require: Callable[[Any], object] = lambda _: None,
+) -> dict[str, Any]:
     """Return what other packages bring of a group, by name.
 
     Parameters
@@ -57,6 +64,8 @@ def plugins(group: str, taken: Iterable[str], needs: tuple[str, ...], named_by: 
         Attributes by which such a thing is known.
     named_by
         Attribute that holds its name, or its names; that of the entry point unless given.
+    require
+        Raises what is wrong with a thing that has all these.
     """
     found, known = dict[str, Any](), {*taken}
     for package, version, entry in _entries(group):
@@ -68,6 +77,7 @@ def plugins(group: str, taken: Iterable[str], needs: tuple[str, ...], named_by: 
             names = (names,) if isinstance(names, str) else tuple(names)
             if double := known.intersection(names):
                 raise ValueError(f"{', '.join(sorted(double))} is known already, give it another name")
+            require(thing)
             known.update(names)
             found[", ".join(names)] = thing
     return found

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from tolalloc.exceptions import InputError, TolallocError
+from tolalloc.reading.plugins import plugin_versions
 from tolalloc.reports.finished_run import FinishedRun, Member, common_currency, read_run
 from tolalloc.reports.folder import numbered
 from tolalloc.reports.header import Header
@@ -205,6 +206,7 @@ def finished_run(study: Study, folder: Path) -> FinishedRun | None:
         found = read_run(folder)
         manifest, asked = found.manifest, [question.kind for question in study.questions]
         same = manifest.get("study hash") == Prepared(study=study).digest != "" and manifest.get("questions") == asked
-        if same and manifest.get("quick") == study.quick:
+        of_these = plugin_versions().items() <= manifest.get("versions", {}).items()
+        if same and of_these and manifest.get("quick") == study.quick:
             return found
     return None

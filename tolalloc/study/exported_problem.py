@@ -33,17 +33,24 @@ A tolerance problem for any program. Model: {model}.
 | `tolerances.csv` | the tolerance table: zones, their ranges and costs |
 | `limits.csv` | limits of each output, and what must be shown of it |
 | `settings.csv` | what may be chosen beside the zones, and its value in `points.csv` |
-| `points.csv` | random assemblies of today's drawing: deviations, outputs, `status` (0: there is an answer) |
+{nominals}| `points.csv` | random assemblies of today's drawing: deviations, outputs, `status` (0: there is an answer) |
 {formulas}| `expected.json` | the answers of tolalloc |
 
 1. The share of rows of `points.csv` within all limits is the yield of today's drawing; no answer counts as outside.
    {said}
 2. A program without this model fits one to the rows, or takes a formula where there is one.
-3. The cheapest drawing keeps every limit as `limits.csv` asks. `expected.json` holds its cost and yield if it is known.
+3. The cheapest drawing keeps every limit as `limits.csv` asks{joint}.
+   `expected.json` holds its cost and yield where a run of this study at its full effort stands in the folder `runs`.
+
+How to read them: `plus` and `minus` are deviations from the nominal size, `min` and `max` the smallest and largest
+whole zone. A normal size has σ = zone/(6·Cp) about the middle of its zone, of a position on each of two axes so that
+99.73 % of its parts lie inside at Cp 1. A line of zone t costs cost·zone/t.
+{missing}
 
 Row to post: program and version; yield of today's drawing; cost of the cheapest drawing; its yield; time taken.
 """
 _LINEAR = "| `linear.csv` | outputs that are linear: a constant, then the factor of each deviation |\n"
+_NOMINALS = "| `nominals.csv` | nominal size of each argument of the function, to which its deviation is added |\n"
 _SOURCE = "| `model.py` | the file of the model's function, as it stands |\n"
 _SAID = (
     "Expected is {0.estimate:.4f} ({0.low:.4f} to {0.high:.4f}, 95 % interval), of {0.units:,} other random assemblies."
@@ -62,8 +69,11 @@ def export_problem(study: Study, folder: Path, points: int, progress: Progress) 
         progress.advance(points)
         kept = KeptLimits.of(response(others), tuple(limits), limits)
         (beside / "tolerances.csv").write_text(table_text(errors.sources, None, prepared.currency), encoding="utf-8")
-        asked = ((own.output, own.limits.lower, own.limits.upper, own.guarantee.words) for own in prepared.requirements)
-        _write(beside / "limits.csv", ("output", "lower", "upper", "to be shown"), asked)
+        asked = (
+            (own.output, own.limits.lower, own.limits.upper, own.guarantee.words, getattr(own.guarantee, "target", ""))
+            for own in prepared.requirements
+        )
+        _write(beside / "limits.csv", ("output", "lower", "upper", "to be shown", "target [-]"), asked)
         chosen = ((own.name, own.value, own.lower, own.upper) for own in prepared.model.settings)
         _write(beside / "settings.csv", ("setting", "value", "lower", "upper"), chosen)
         named = zip(errors.columns, errors.source_of_column, strict=True)
@@ -87,9 +97,41 @@ def export_problem(study: Study, folder: Path, points: int, progress: Progress) 
         }
         write_json(expected, beside / "expected.json")
         said = _SAID.format(kept.joint)
-        text = _READ_ME.format(name=study.name, model=prepared.model.name, formulas=formulas, said=said)
+        joint = f", and {prepared.joint.target:.6g} of all units keep all of them at once" if prepared.joint else ""
+        text = _READ_ME.format(
+            name=study.name,
+            model=prepared.model.name,
+            nominals=_nominals(prepared, beside),
+            formulas=formulas,
+            said=said,
+            joint=joint,
+            missing=_missing(prepared),
+        )
         (beside / "README.md").write_text(text, encoding="utf-8")
     return said
+
+
+def _nominals(prepared: Prepared, folder: Path) -> str:
+    """Write the nominal sizes of a function's arguments and return their row of the page."""
+    model = prepared.model
+    if not isinstance(model, BoundFunction):
+        return ""
+    rows = zip(model.source.inputs, (model.offsets / model.lengths).tolist(), strict=True)
+    _write(folder / "nominals.csv", ("argument", "nominal, in the unit of the function"), rows)
+    return _NOMINALS
+
+
+def _missing(prepared: Prepared) -> str:
+    """Return what decides the answer and stands in none of the files."""
+    errors, drawing = prepared.errors, prepared.study.drawing
+    found = {
+        "correlations between lines": any(len(block) > 1 for block in errors.blocks),
+        "deviations of measured parts": any(own.measured for own in errors.active),
+        "parts chosen at assembly and what choosing costs": bool(prepared.study.compensators),
+        "other processes and their costs": bool(drawing and drawing.costs),
+    }
+    missing = [what for what, is_there in found.items() if is_there]
+    return f"\nNot in these files: {'; '.join(missing)}. `points.csv` follows them.\n" if missing else ""
 
 
 def _source(prepared: Prepared, folder: Path) -> str:

@@ -15,12 +15,22 @@ if TYPE_CHECKING:
 @cache
 def wings() -> tuple[Wing, ...]:
     """Return all wings, in the order in which a newcomer meets their commands."""
+    from tolalloc.study.inquiries import INQUIRIES
     from tolalloc.wings.assembly.wing import ASSEMBLY
     from tolalloc.wings.bench.wing import BENCH
     from tolalloc.wings.motion.wing import MOTION
 
-    brought = plugins("wings", ("bench", "assembly", "motion"), ("questions", "samples", "schemas"))
-    return BENCH, ASSEMBLY, MOTION, *brought.values()
+    shipped = (BENCH, ASSEMBLY, MOTION)
+    words = {own.word for own in (*INQUIRIES, *(own for wing in shipped for own in wing.questions))}
+
+    def require(wing: Wing) -> None:
+        if double := words.intersection(own.word for own in wing.questions):
+            raise ValueError(f"{', '.join(sorted(double))} is known already, give it another word")
+        words.update(own.word for own in wing.questions)
+
+    return *shipped, *plugins(
+        "wings", ("bench", "assembly", "motion"), ("questions", "samples", "schemas"), "", require
+    ).values()
 
 
 @cache

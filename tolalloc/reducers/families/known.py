@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from tolalloc.reading.plugins import plugins
 from tolalloc.reducers.equivalent.sources import ErrorSources
 from tolalloc.reducers.families.centre_gear.family import CENTRE_GEAR
 from tolalloc.reducers.families.family import ReducerFamily
-from tolalloc.reducers.families.records import FAMILY
+from tolalloc.reducers.families.records import brought
 from tolalloc.reducers.families.rv import RV
 from tolalloc.reducers.families.single_stage.family import SINGLE_STAGE
 from tolalloc.reducers.reducer.design import Reducer
 
 _SHIPPED = {own.name: own for own in (RV, CENTRE_GEAR, SINGLE_STAGE)}
-FAMILIES: dict[str, ReducerFamily] = _SHIPPED | plugins("families", _SHIPPED, FAMILY, "name")
+FAMILIES: dict[str, ReducerFamily] = _SHIPPED | brought()
 """Name → family, those that other packages bring last."""
 
 INTERFACES = tuple(dict.fromkeys(interface for own in FAMILIES.values() for interface in own.interfaces))

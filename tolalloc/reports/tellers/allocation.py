@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from shutil import copytree
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pandas as pd
@@ -303,8 +305,11 @@ class AllocationTeller(Teller[AllocationResult]):
         """Write the drawing as files that are read back, go on calculating, and enter a drawing program."""
         write_drawing(self.result, self.header, folder)
         for name, export in plugins("exports", (), ("__call__",)).items():
-            with left_out_if_broken(f"export {name!r} of {export.__module__}"):
-                export(self.result, self.header, folder)
+            with left_out_if_broken(f"export {name!r} of {export.__module__}"), TemporaryDirectory() as made:
+                export(self.result, self.header, Path(made))
+                if taken := sorted(own.name for own in Path(made).iterdir() if (folder / own.name).exists()):
+                    raise FileExistsError(f"{', '.join(taken)} is written already")
+                copytree(made, folder, dirs_exist_ok=True)
 
 
 TELLER = AllocationTeller
