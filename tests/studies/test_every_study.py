@@ -86,9 +86,9 @@ def _rv20e_processes(_: subprocess.CompletedProcess[str], folder: Path) -> None:
 
 
 FINDS = {
-    "bores_lower_bound": "No drawing with free zones cheaper than",
+    "bores_lower_bound": "No drawing with free zones that costs less than",
     "cd29_ranking": "1. shaft assembly takes part in",
-    "rv20e_duty": "of it used up by the load case start",
+    "rv20e_duty": "load case start uses up",
     "rv20e_load_cases": "Drivers of no-load friction torque, warm",
     "rv20e_wear": "Which dimension of the drawing drives the lost motion, 3000 h",
     "rv27c_ranking": "1. disc pitch takes part in",
