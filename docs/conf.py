@@ -65,7 +65,7 @@ sphinx_gallery_conf = {
 def whole(page: str) -> str:
     """Return the page of commands with the first sentence of each in its list, which typer cuts, as a link to it."""
     said = dict(re.findall(r"^## `tolalloc (\S+)`\n+(.+)", page, re.MULTILINE))
-    page = re.sub(r"^\* `(\w+)`: .*$", lambda found: _line(found, said), page, flags=re.MULTILINE)
+    page = re.sub(r"^\* `([\w-]+)`: .*$", lambda found: _line(found, said), page, flags=re.MULTILINE)
     return page.replace(", …", " and so on").replace("study = Study(...)", "`study = ta.Study(...)`")
 
 

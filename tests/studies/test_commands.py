@@ -79,7 +79,7 @@ def set_cell(row: int, column: str, value: str):
     return change
 
 
-DRAWN = {"drawing.xlsx", "frames.dxf"}
+DRAWN = {"drawing.xlsx", "frames.dxf", "inspection.dfd"}
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ from tests.builders import ZONE_OF_A_LENGTH, study_of_lengths, written
 from tolalloc.drawings.correlation import load_correlations
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_text
 from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.study.prepared import Prepared
 
 ROWS = (
     {"id": "4711-12", "source": "a", "group": "sleeves", **ZONE_OF_A_LENGTH},
@@ -29,6 +30,12 @@ def test_they_are_read_and_written_back(tmp_path):
     frame = pd.read_csv(tmp_path / "zones.csv", dtype=str, keep_default_na=False)
     assert frame["id"].tolist() == ["4711-12", "4711-13", "c"]
     assert frame["source"].tolist() == ["a", "b", ""]
+
+
+def test_a_line_of_one_source_is_called_what_the_table_calls_it(tmp_path):
+    rows = [{**ROWS[0], "group": ""}, *ROWS[1:]]
+    study = study_of_lengths(ta.Drawing.of_rows(rows))
+    assert [own.dimension for own in Prepared(study=study).errors.sources] == ["4711-12", "sleeves", "c"]
 
 
 @pytest.mark.slow

@@ -71,7 +71,7 @@ class Own(ta.Question):
 def test_a_package_brings_an_output_of_every_reducer(site):
     code = """
 from tolalloc.reducers.response.outputs import Reading
-OWN = Reading(outputs=("own [arcsec]",), read=None)
+OWN = Reading(outputs=("own [arcsec]",), read=lambda kernel, errors: None)
 """
     install(site, "acme_output", code, outputs="any = acme_output:OWN")
     assert requirements_of(load_reducer("rv20e"))[-1].outputs == ("own [arcsec]",)

@@ -153,10 +153,10 @@ class Answer(Generic[Result]):
         printer.text(str(self))
 
     def _repr_html_(self) -> str:
-        """Return what a notebook shows: the first two sentences, the first table, one figure."""
+        """Return what a notebook shows: the first three sentences, the first table, one figure."""
         from tolalloc.reports.writer import html_table, inline_png
 
-        shown = [f"<p><b>{self.title}</b></p>", *(f"<p>{sentence}</p>" for sentence in self.sentences[:2])]
+        shown = [f"<p><b>{self.title}</b></p>", *(f"<p>{sentence}</p>" for sentence in self.sentences[:3])]
         shown += [str(html_table(frame.head(12))) for frame in list(self.tables.values())[:1]]
         shown += [inline_png(figure) for figure in list(self.figures.values())[:1]]
         return "\n".join(shown)

@@ -23,6 +23,7 @@ from tolalloc.drawings.compensators import Compensator, all_choices, choice_labe
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.population import ANYWHERE, STATED, taken_as
 from tolalloc.drawings.seeds import SeedTree
+from tolalloc.drawings.sources import Source
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.identity import UnknownIdentityError
 from tolalloc.models.model import HasCopies, Model
@@ -71,12 +72,19 @@ class Prepared:
         """The sources of the drawing, each with its group.
 
         Where the table states none, it is the line of the drawing on which the source stands with its copies on
-        identical parts: those of which the table states the same zone, limits and price.
+        identical parts: those of which the table states the same zone, limits and price. A source that stands there
+        alone is called what the user's table calls it.
         """
         source, rows = self.study.model, [own for own in self._stated.sources if not own.group]
         stated = {own.name: (own.stated, repr(self._processes.get(own.name))) for own in rows}
         lines: Mapping[str, str] = source.shared_lines(stated) if isinstance(source, HasCopies) else {}
-        found = (replace(own, group=own.group or lines.get(own.name, own.name)) for own in self._stated.sources)
+        count = Counter(lines.values())
+
+        def line(own: Source) -> str:
+            named = lines.get(own.name, own.name)
+            return own.own_id if own.own_id and count[named] <= 1 else named
+
+        found = (replace(own, group=own.group or line(own)) for own in self._stated.sources)
         return replace(self._stated, sources=tuple(found), compensators=self.assemblies[0])
 
     @cached_property
