@@ -151,7 +151,7 @@ def unknown_words(text: str) -> Iterator[str]:
     known = {"--upgrade", *re.findall(r'add_argument\("(--[\w-]+)"', code)}.union(*COMMANDS.values())  # the first of uv
     for span in spans(text):
         options = {*re.findall(r"(?<![\w-])--[a-z][\w-]*", span)}
-        command = re.match(r"tolalloc ([a-z]+)\b", span)
+        command = re.match(r"tolalloc ([a-z][a-z-]*)", span)
         if command and not (command[1] in COMMANDS and options <= COMMANDS[command[1]]):
             yield span
         elif span.startswith("--"):

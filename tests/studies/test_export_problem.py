@@ -97,7 +97,7 @@ def test_the_points_give_the_expected_yield_and_the_function_gives_the_points(tm
         assert [row[0] for row in read(folder / "linear.csv")[1]] == ["gap [mm]"]  # the seat has a square
 
 
-NAMES = tuple(f"{name}.csv" for name in ("tolerances", "limits", "settings", "nominals", "points", "linear"))
+NAMES = tuple(f"{name}.csv" for name in ("tolerances", "limits", "settings", "nominals", "costs", "points", "linear"))
 NAMES += ("model.py", "expected.json")
 
 

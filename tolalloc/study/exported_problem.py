@@ -33,7 +33,7 @@ A tolerance problem for any program. Model: {model}.
 | `tolerances.csv` | the tolerance table: zones, their ranges and costs |
 | `limits.csv` | limits of each output, and what must be shown of it |
 | `settings.csv` | what may be chosen beside the zones, and its value in `points.csv` |
-{nominals}| `points.csv` | random assemblies of today's drawing: deviations, outputs, `status` (0: there is an answer) |
+{nominals}{ways}| `points.csv` | random assemblies of today's drawing: deviations, outputs, `status` (0: an answer) |
 {formulas}| `expected.json` | the answers of tolalloc |
 
 1. The share of rows of `points.csv` within all limits is the yield of today's drawing; no answer counts as outside.
@@ -44,14 +44,17 @@ A tolerance problem for any program. Model: {model}.
 
 How to read them: `plus` and `minus` are deviations from the nominal size, `min` and `max` the smallest and largest
 whole zone. A normal size has σ = zone/(6·Cp) about the middle of its zone, of a position on each of two axes so that
-99.73 % of its parts lie inside at Cp 1. A line of zone t costs cost·zone/t.
+99.73 % of its parts lie inside at Cp 1. A line of zone t costs cost·zone/t, or what its processes cost.
 {missing}
 
 Row to post: program and version; yield of today's drawing; cost of the cheapest drawing; its yield; time taken.
 """
 _LINEAR = "| `linear.csv` | outputs that are linear: a constant, then the factor of each deviation |\n"
 _NOMINALS = "| `nominals.csv` | nominal size of each argument of the function, to which its deviation is added |\n"
+_WAYS = "| `costs.csv` | what each process of a line, or of its group, costs from its smallest to its largest zone |\n"
 _SOURCE = "| `model.py` | the file of the model's function, as it stands |\n"
+_ZONES = 41
+"""Zones at which the cost of a process is written, in equal ratios [-]."""
 _SAID = (
     "Expected is {0.estimate:.4f} ({0.low:.4f} to {0.high:.4f}, 95 % interval), of {0.units:,} other random assemblies."
 )
@@ -102,6 +105,7 @@ def export_problem(study: Study, folder: Path, points: int, progress: Progress) 
             name=study.name,
             model=prepared.model.name,
             nominals=_nominals(prepared, beside),
+            ways=_ways(prepared, beside),
             formulas=formulas,
             said=said,
             joint=joint,
@@ -121,14 +125,29 @@ def _nominals(prepared: Prepared, folder: Path) -> str:
     return _NOMINALS
 
 
+def _ways(prepared: Prepared, folder: Path) -> str:
+    """Write what processes cost where a table of them is given, and return their row of the page."""
+    space, drawing = prepared.space, prepared.study.drawing
+    if not (drawing and drawing.costs):
+        return ""
+    rows = [
+        (group, own.name, first * scale / MICROMETRE, float(own.total(np.array(scale))))
+        for group, feature, first in zip(space.groups, space.features, space.first_zones.tolist(), strict=True)
+        for own in feature.processes
+        for scale in np.geomspace(own.minimum, own.maximum, _ZONES).tolist()
+    ]
+    head = ("line or group", "process", "zone [µm]", f"cost [{prepared.currency or COST_UNITS}]")
+    _write(folder / "costs.csv", head, rows)
+    return _WAYS
+
+
 def _missing(prepared: Prepared) -> str:
     """Return what decides the answer and stands in none of the files."""
-    errors, drawing = prepared.errors, prepared.study.drawing
+    errors = prepared.errors
     found = {
         "correlations between lines": any(len(block) > 1 for block in errors.blocks),
         "deviations of measured parts": any(own.measured for own in errors.active),
         "parts chosen at assembly and what choosing costs": bool(prepared.study.compensators),
-        "other processes and their costs": bool(drawing and drawing.costs),
     }
     missing = [what for what, is_there in found.items() if is_there]
     return f"\nNot in these files: {'; '.join(missing)}. `points.csv` follows them.\n" if missing else ""
