@@ -67,13 +67,23 @@ _STUDY = '''"""{name}: which error drives it, and which zones are cheapest."""
 
 import tolalloc as ta
 
+SHIPPED = ta.AtYield(target=0.9973)
+# Discs colder and warmer than the ring [K], assumed.
+COLD, WARM = ta.LoadCase("cold", disc_temperature=-2.0), ta.LoadCase("warm", disc_temperature=2.0)
+
 study = ta.Study(
-    # Smallest and largest nominal clearance [µm] that the tooth modification may leave on the flank, at tip and root.
-    ta.reducer("reducer.toml", flank_clearance=(1.0, 12.0), radial_clearance=(5.0, 30.0)),
+    ta.reducer(
+        "reducer.toml",
+        # Clearances [µm] that the tooth modification may leave on the flank, at tip and root: smallest, largest.
+        flank_clearance=(1.0, 12.0),
+        radial_clearance=(5.0, 30.0),
+        load_cases=(COLD, WARM),
+    ),
     ta.drawing("zones.xlsx"),
     limits={{
-        ta.PEAK_TO_PEAK: ta.Limit(upper={limit:g}, show=ta.AtYield(target=0.9973)),
-        ta.LOST_MOTION: ta.Limit(upper={lost_motion}),
+        ta.PEAK_TO_PEAK: ta.Limit(upper={limit:g}, show=SHIPPED),
+        ta.at(ta.LOST_MOTION, COLD): ta.Limit(upper={lost_motion}, show=SHIPPED),
+        ta.at(ta.RADIAL_CLEARANCE, WARM): ta.Limit(lower=0.0, show=SHIPPED),
     }},
     questions=[ta.Ranking(), ta.Allocation()],
     name="{name}",
