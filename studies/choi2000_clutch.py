@@ -3,7 +3,8 @@
 tolalloc run studies/choi2000_clutch.py --quick
 
 Problem and costs: Choi, Park & Salisbury 2000, J. Manuf. Sci. Eng. 122(3), with quality loss 0. A cage of 101.6 mm
-(4 in) gives the published optimum, one of 101.69 mm, as some papers print it, does not.
+(4 in) gives the published optimum, one of 101.69 mm, as some papers print it, does not. Steps of 1 pm leave its zones
+as they are found; without them the drawing has three figures and costs 0.08 % more.
 """
 
 import numpy as np
@@ -24,7 +25,7 @@ ways = {  # process, A and B of the cost A + B/t, smallest and largest t [mm] of
     "other roller": [("lap", 2.5, 0.3, 0.04, 0.2), ("grind", 5, 0.045, 0.12, 0.25)],
     "cage": [("grind", 4, 0.56, 0.08, 0.12), ("turn", 6, 0.16, 0.15, 0.25), ("press", 0.5, 0.88, 0.2, 0.4)],
 }
-as_today = {"plus": 0.15, "minus": -0.15, "unit": "mm", "min": 0.03, "max": 0.8, "cost": 10}
+as_today = {"plus": 0.15, "minus": -0.15, "unit": "mm", "min": 0.03, "max": 0.8, "cost": 10, "step": 1e-9}
 angle = contact_angle(*nominal.values())
 study = ta.Study(
     ta.model(contact_angle, inputs=nominal, outputs=("contact angle [rad]",)),

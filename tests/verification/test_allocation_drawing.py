@@ -31,6 +31,7 @@ from tolalloc.allocation.space.design_space import DesignSpace
 from tolalloc.allocation.space.effort import QUICK_ALLOCATION
 from tolalloc.cli.main import app
 from tolalloc.drawings.error_model import ErrorModel
+from tolalloc.drawings.sources import FIGURES, rounded_down
 from tolalloc.drawings.table_file import stated_settings
 from tolalloc.drawings.tolerance_table import load_tolerance_table, table_frame
 from tolalloc.drawings.zones import Feature
@@ -323,6 +324,35 @@ def test_members_with_their_own_zones_are_rounded_each_on_its_own():
     assert design.tolist() == pytest.approx([1.0, 0.7])
     _, least = space.rounded_down(np.array([1.0, space.lower[1]]))
     assert least[1] == space.lower[1]
+
+
+@pytest.mark.parametrize(("zone", "stated"), [(106.86, 106.5), (199.99, 199.5), (2.009, 2.0), (0.004278, 0.00427)])
+def test_a_number_of_any_other_assembly_has_three_figures(zone, stated):
+    assert rounded_down(zone * UM, usual=FIGURES) == pytest.approx(stated * UM, rel=1e-12)
+
+
+def test_three_figures_take_less_than_half_a_per_cent_of_a_zone():
+    zones = np.geomspace(1e-9, 1e9, 5_000) * UM
+    taken = np.array([1 - rounded_down(zone, usual=FIGURES) / zone for zone in zones.tolist()])
+    assert (taken > -1e-12).all()
+    assert (taken < 0.005).all()
+
+
+def test_the_drawing_of_an_own_model_has_three_figures_where_its_table_states_no_steps():
+    rows = [
+        {"id": own, "plus": 7, "minus": -7, "unit": "µm", "nominal": 5, "cost": 1, "min": 1, "max": 60} for own in "ab"
+    ]
+    rows[1]["step"] = 2.0
+    gap = ta.model(lambda a, b: 1000 * (a - b), inputs={"a": 5.0, "b": 5.0}, outputs=("gap [µm]",))
+    limits = {"gap [µm]": ta.Limit(lower=-12.3, upper=12.3)}
+    asked = ta.Study(
+        gap, ta.Drawing.of_rows(rows), limits=limits, questions=[ta.Allocation(front=False, what_if=False)]
+    )
+    result = asked.allocate(effort="quick").result
+    free, stepped = (own.zone / UM / 2 for own in result.drawn_sources)
+    assert free == pytest.approx(rounded_down(free * UM, usual=FIGURES) / UM, rel=1e-9)
+    assert stepped / 2.0 == pytest.approx(round(stepped / 2.0), rel=1e-9)
+    assert result.chosen.unrounded_cost < result.chosen.cost
 
 
 @pytest.mark.slow

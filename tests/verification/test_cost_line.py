@@ -98,7 +98,7 @@ def test_where_the_units_show_nothing_of_a_line_its_safe_end_is_what_missed():
     test = acceptance_test_of(model, 3)
     shown = beyond.cheapest_shown(test, FIRST)
     assert shown is not None
-    assert shown.design.tolist() == line.cheap.tolist()
+    assert shown.design == pytest.approx(line.cheap, rel=0.005)  # as its drawing states it
     assert not test.run(shown, FIRST).accepted
 
 

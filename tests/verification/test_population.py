@@ -16,7 +16,7 @@ from tolalloc.exceptions import InputError
 from tolalloc.study.prepared import Prepared
 
 NAMES = ("a", "b", "c")
-ROW = {"unit": "µm", "plus": 10, "minus": -10, "min": 2, "max": 60, "cost": 10.0}
+ROW = {"unit": "µm", "plus": 10, "minus": -10, "min": 2, "max": 60, "cost": 10.0, "step": 1e-6}
 GAP = "gap [µm]"
 
 

@@ -267,8 +267,8 @@ class ToleranceRow(Record):
         Field(ge=0, le=LARGEST_ZONE),
         TableColumn(
             "step of the numbers that the drawing states, to which an allocated zone is rounded down: the zone, or for "
-            "a size its deviations; 0.01 µm below 1 µm, 0.1 below 10, 0.5 below 100, then 1 unless given, for a "
-            "reducer; an own model's zones stay as found",
+            "a size its deviations; unless given, for a reducer 0.01 µm below 1 µm, 0.1 below 10, 0.5 below 100, "
+            "then 1, and for an own model three figures",
             "unit",
             write=lambda source: _written(source, source.step) or None,
         ),

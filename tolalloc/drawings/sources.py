@@ -32,6 +32,11 @@ STEPS = ((1.0, 0.01), (10.0, 0.1), (100.0, 0.5), (np.inf, 1.0))
 """Step of a number on a reducer's drawing up to a size, where its table states none: two or three figures [µm]. An
 assumption: a tenth of a micrometre is what a measuring room tells apart on parts of a reducer; finer numbers need finer
 steps."""
+FIGURES = tuple(
+    (end * 10.0**power, step * 10.0**power) for power in range(-9, 10) for end, step in ((2, 0.005), (10, 0.01))
+)
+"""Step of a number on the drawing of anything else up to a size, whatever its unit: three figures, a half of the last
+one up to 200, so that rounding takes less than 0.5 % of a zone [µm]. An assumption: a table states its own steps."""
 RESOLVED = 10.0
 """Zone over the uncertainty of its gauge from which on the gauge is said to resolve it, the rule of many shops [-]."""
 _WHOLE = 1e-6
@@ -57,10 +62,13 @@ def rounded_down(number: float, step: float = 0.0, usual: Sequence[tuple[float, 
 
     Examples
     --------
-    Of 4.75 µm the drawing states 4.7 µm, of 23.3 µm 23 µm, and 4.5 µm in steps of half a micrometre:
+    Of 4.75 µm the drawing states 4.7 µm, of 23.3 µm 23 µm, and 4.5 µm in steps of half a micrometre; of 106.86 µm
+    that of no reducer 106.5 µm:
 
     >>> [round(rounded_down(*own) * 1e6, 6) for own in ((4.75e-6,), (23.3e-6,), (4.75e-6, 0.5e-6))]
     [4.7, 23.0, 4.5]
+    >>> round(rounded_down(106.86e-6, usual=FIGURES) * 1e6, 6)
+    106.5
     """
     size = number / MICROMETRE
     own = step / MICROMETRE or next((own for end, own in usual if size < end * (1 - _ROUNDING)), 0.0)

@@ -15,7 +15,7 @@ from tolalloc.allocation.cost.process_costs import today
 from tolalloc.allocation.space.problem import AllocationProblem, PricedFeature, Shared, Stack
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import STEPS, Source, known_as, meant
+from tolalloc.drawings.sources import FIGURES, STEPS, Source, known_as, meant
 from tolalloc.drawings.tolerance_table import with_zones
 from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.settings import DrawnAmounts, Setting
@@ -186,11 +186,11 @@ class DesignSpace:
         Notes
         -----
         A zone that is the one of the tolerance table stays as its table states it. Rows without a step have the usual
-        ones where the model's drawings round (`DrawnAmounts.finest`), or else stay as they were found.
+        ones of a reducer, or else three figures.
         Members of a group that have one zone keep one; others are rounded one by one, in a space whose table has them
         at the rounded ratio. So the design costs what its rounded zones cost, and units of it lie in them.
         """
-        usual = STEPS if drawn is not None and drawn.finest else ()
+        usual = () if drawn is None else STEPS if drawn.finest else FIGURES
         found, zones = design.copy(), {own.name: own.zone for own in self.errors.sources}
         for at, group in enumerate(self.groups):
             members, scale = self.members(group), float(design[at])

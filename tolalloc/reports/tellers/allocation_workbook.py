@@ -178,6 +178,9 @@ def _written(result: AllocationResult, source: Source, row: int, zone: float, sh
         step = number(STEPS[-1][1])
         for end, own in reversed(STEPS[:-1]):
             step = f"IF({size}<{number(end)},{number(own)},{step})"
+    if not source.step and not result.model.drawn_amounts.finest:  # three figures, as `FIGURES` has them
+        decade = f"10^INT(LOG10(MAX({size},1E-9)))"
+        step = f"({decade}*IF({size}<2*{decade},0.005,0.01))"
     half = zone / 2 if halved else zone
     # What was verified is stated as it is, a grade or a smallest zone too.
     value, near = rounded_down(half * shown, finest) / length, _AS_VERIFIED * MICROMETRE / shown
