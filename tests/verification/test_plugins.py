@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import tolalloc as ta
 from tests.studies.command import process
-from tolalloc.exceptions import UnknownNameError
+from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.reading import plugins as module
 from tolalloc.reading.files import shipped_files
 from tolalloc.reading.plugins import plugin_versions, plugins
@@ -17,6 +18,7 @@ from tolalloc.reducers.reducer.files import PRESETS, load_reducer
 from tolalloc.reducers.response.outputs import requirements_of
 from tolalloc.reports.writer import versions
 from tolalloc.study.questions import questions_of
+from tolalloc.wings import wings
 
 
 def install(folder: Path, package: str, code: str, **entries: str) -> Path:
@@ -75,6 +77,52 @@ OWN = Reading(outputs=("own [arcsec]",), read=lambda kernel, errors: None)
 """
     install(site, "acme_output", code, outputs="any = acme_output:OWN")
     assert requirements_of(load_reducer("rv20e"))[-1].outputs == ("own [arcsec]",)
+
+
+@pytest.mark.parametrize(
+    ("read", "why"),
+    [
+        (
+            "1 / 0",
+            r"output own \[arcsec\] of another package: its code fails \(ZeroDivisionError: division by zero\)\.",
+        ),
+        ("None", r"its code fails \(TypeError: 'NoneType' object is not iterable\)\."),
+        ("(errors[:, :2], errors[:, 0])", r"shape of values and status is .*; allowed is \(\(3, 1\), \(3,\)\)\."),
+    ],
+)
+def test_an_output_of_a_package_that_fails_is_one_sentence(site, read, why):
+    package = f"acme_{site.name}"
+    code = f"""
+from tolalloc.reducers.response.outputs import Reading
+OWN = Reading(outputs=("own [arcsec]",), read=lambda kernel, errors: {read})
+"""
+    install(site, package, code, outputs=f"any = {package}:OWN")
+    found = requirements_of(load_reducer("rv20e"))[-1]
+    with pytest.raises(InputError, match=why):
+        found.read(None, np.zeros((3, 4)))
+
+
+@pytest.mark.parametrize(
+    ("group", "code", "why"),
+    [
+        ("outputs", "outputs, read = ('a',), None", "{package}:Like is no Reading"),
+        ("questions", "kind, answer = 'own', None", "{package}:Like is no Question"),
+        ("wings", "questions, samples, schemas = (), {}, {}", "{package}:Like is no Wing"),
+    ],
+)
+def test_what_is_of_another_kind_is_left_out(site, caplog, group, code, why):
+    package = f"acme_{site.name}"
+    install(site, package, f"class Like: {code}", **{group: f"mine = {package}:Like"})
+    wings.cache_clear()
+    asked = {
+        "outputs": lambda: requirements_of(load_reducer("rv20e")),
+        "questions": lambda: questions_of(("ranking",), (), "here"),
+        "wings": wings,
+    }
+    assert all(getattr(own, "__module__", "") != package for own in asked[group]())
+    wings.cache_clear()
+    said = why.format(package=package)
+    assert caplog.messages == [f"{package} 1.2: 'mine' of tolalloc.{group} is left out: TypeError: {said}."]
 
 
 def test_a_package_brings_presets_and_none_of_a_shipped_name(site, caplog):

@@ -51,6 +51,7 @@ def plugins(
     needs: tuple[str, ...],
     named_by: str = "",
     require: Callable[[Any], object] = lambda _: None,
+    kind: type = object,
 ) -> dict[str, Any]:
     """Return what other packages bring of a group, by name.
 
@@ -66,6 +67,8 @@ def plugins(
         Attribute that holds its name, or its names; that of the entry point unless given.
     require
         Raises what is wrong with a thing that has all these.
+    kind
+        What it is an instance of, or a subclass where it is a class itself.
     """
     found, known = dict[str, Any](), {*taken}
     for package, version, entry in _entries(group):
@@ -73,6 +76,8 @@ def plugins(
             thing = entry.load()
             if wanting := [name for name in needs if not hasattr(thing, name)]:
                 raise TypeError(f"{entry.value} has no {', '.join(wanting)}")
+            if not (issubclass(thing, kind) if isinstance(thing, type) else isinstance(thing, kind)):
+                raise TypeError(f"{entry.value} is no {kind.__name__}")
             names = getattr(thing, named_by) if named_by else entry.name
             names = (names,) if isinstance(names, str) else tuple(names)
             if double := known.intersection(names):

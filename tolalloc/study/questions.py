@@ -225,7 +225,7 @@ def _answer(kind: str, header: Header, record: RunRecord, result: Result) -> Ans
 def questions_of(kinds: tuple[str, ...], asked: Sequence[Question], place: str) -> tuple[Question, ...]:
     """Return the questions of a study that are meant by their kinds; one that it does not ask has its defaults."""
     known: dict[str, Any] = {own.kind: own for own in (Ranking, Allocation)}
-    known |= plugins("questions", (*known, Difference.kind, Calculation.kind), ("kind", "answer", "__call__"), "kind")
+    known |= plugins("questions", (*known, Difference.kind, Calculation.kind), ("kind",), "kind", kind=Question)
     own = {question.kind: question for question in asked}
     for kind in kinds:
         if kind not in known and kind not in own:

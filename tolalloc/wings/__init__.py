@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 def wings() -> tuple[Wing, ...]:
     """Return all wings, in the order in which a newcomer meets their commands."""
     from tolalloc.study.inquiries import INQUIRIES
+    from tolalloc.study.wing import Wing
     from tolalloc.wings.assembly.wing import ASSEMBLY
     from tolalloc.wings.bench.wing import BENCH
     from tolalloc.wings.motion.wing import MOTION
@@ -28,9 +29,7 @@ def wings() -> tuple[Wing, ...]:
             raise ValueError(f"{', '.join(sorted(double))} is known already, give it another word")
         words.update(own.word for own in wing.questions)
 
-    return *shipped, *plugins(
-        "wings", ("bench", "assembly", "motion"), ("questions", "samples", "schemas"), "", require
-    ).values()
+    return *shipped, *plugins("wings", ("bench", "assembly", "motion"), (), "", require, Wing).values()
 
 
 @cache

@@ -12,6 +12,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from tolalloc.exceptions import InputError
 from tolalloc.models.model import Evaluation, Response, Samples
 from tolalloc.reading.plugins import plugins
 from tolalloc.reading.units import ARCMINUTE, ARCSECOND, MEGAPASCAL, MICROMETRE, MILLIMETRE
@@ -60,6 +61,25 @@ class Reading:
     outputs: tuple[str, ...]  # Names of the outputs with their units
     # From the kernel and errors in the order of its model's columns, the outputs and the status of every sample
     read: Callable[[KernelResponse, Float[np.ndarray, "chunk all_columns"]], Answer]
+
+
+@dataclass(frozen=True)
+class _Brought:
+    """The reading of another package: what its code does wrong is one sentence."""
+
+    own: Reading
+
+    def __call__(self, kernel: KernelResponse, errors: Errors) -> Answer:
+        place, units = f"output {self.own.outputs[0]} of another package", len(errors)
+        try:
+            values, status = map(np.asarray, self.own.read(kernel, errors))
+        except Exception as error:
+            why = f"{type(error).__name__}: {error}".partition("\n")[0]
+            raise InputError(f"{place}: its code fails ({why}).") from error
+        shapes = (units, len(self.own.outputs)), (units,)
+        if (values.shape, status.shape) != shapes:
+            raise InputError.at(place, "shape of values and status", (values.shape, status.shape), f"{shapes}")
+        return values, status
 
 
 def _loop(kernel: KernelResponse, errors: Errors) -> Answer:
@@ -135,7 +155,8 @@ def requirements_of(reducer: Reducer) -> tuple[Reading, ...]:
         Reading(outputs=(RADIAL_CLEARANCE,), read=_radial_clearance),
     )
     names = (*WITH_FRICTION, *(name for own in shipped for name in own.outputs))
-    return (*shipped, *plugins("outputs", names, ("outputs", "read"), "outputs").values())
+    brought = plugins("outputs", names, (), "outputs", kind=Reading).values()
+    return (*shipped, *(Reading(outputs=tuple(own.outputs), read=_Brought(own)) for own in brought))
 
 
 def limited_outputs(reducer: Reducer) -> tuple[str, ...]:
