@@ -85,7 +85,7 @@ def test_a_zone_is_written_in_hundredths_of_a_micrometre_and_never_wider(zone, t
         ({"name": "housing.pitch", "feature": Feature.PITCH, "spectrum": ((1, 1.0),)}, "Fp 0.006"),
         ({"name": "pin.diameter"}, "±0.003"),
         ({"name": "pin.diameter", "middle": -2.26 * UM}, "+0.00074 / −0.00526"),
-        ({"name": "carrier.tilt", "feature": Feature.POSITION, "over": 0.05}, "∥ ⌀0.006/50 A"),
+        ({"name": "carrier.tilt", "feature": Feature.POSITION, "over": 0.05}, "∥ ⌀0.003/50 A"),
         ({"name": "crank1.journal1.phase", "over": 0.0009}, "⌖ 0.006 A at R 0.9"),
         ({"name": "sun.eccentricity", "feature": Feature.POSITION}, "◎ ⌀0.006 A"),
     ],

@@ -304,8 +304,8 @@ class ToleranceRow(Record):
         float | None,
         Field(ge=0.001, le=1000),
         TableColumn(
-            "for tilt, phase and rotation: the length over which the zone limits the deviation; in inches where the "
-            "unit is in",
+            "for tilt, phase and rotation: the length over which the zone limits the deviation, in inches where the "
+            "unit is in; a tilt leans by half the zone to either side, which is what a parallelism states",
             "mm",
             write=lambda source: _length_written(source, source.over) or None,
         ),
@@ -536,7 +536,8 @@ class ToleranceRow(Record):
             return None
         zone = (self.measured_zone or self.zone) * (self.micrometres * MICROMETRE)
         nominal = self.nominal * LENGTHS[self.length_unit]
-        made_to = MadeTo(feature=self.feature, zone=zone, middle=middle, nominal=nominal)
+        is_tilt = self.name.endswith(".tilt")
+        made_to = MadeTo(feature=self.feature, zone=zone, middle=middle, nominal=nominal, is_tilt=is_tilt)
         file, characteristic = named_file(self.measured)
         return load_measured_parts((folder / file).resolve(), made_to, characteristic)
 

@@ -275,6 +275,7 @@ class MadeTo:
     zone: float
     middle: float
     nominal: float = 0.0
+    is_tilt: bool = False  # Whether half the zone is stated and measured, by which an axis leans in any direction
 
 
 def named_file(text: str) -> tuple[str, str]:
@@ -390,7 +391,7 @@ def _of_characteristic(path: Path, name: str, made_to: MadeTo) -> MeasuredParts:
     if made_to.feature is Feature.POSITION:
         if found.size and found.min() < 0.0:
             raise InputError.at(where, "a position (K0001)", f"{found.min():g} µm", "a diameter, 0 or more")
-        found = found / 2.0
+        found = found if made_to.is_tilt else found / 2.0
     return _measured(path, found, made_to, characteristic=name, left_out=len(own.values) - len(valid))
 
 
@@ -444,7 +445,10 @@ def _require_limits(where: str, own: Characteristic, factor: float, nominal: flo
     half = made_to.zone / 2.0
     ends = {
         "lower": (("K2112", "K2110"), (made_to.middle - half) / MICROMETRE if is_size else None),
-        "upper": (("K2113", "K2111"), (made_to.middle + half if is_size else made_to.zone) / MICROMETRE),
+        "upper": (
+            ("K2113", "K2111"),
+            (made_to.middle + half if is_size or made_to.is_tilt else made_to.zone) / MICROMETRE,
+        ),
     }
     for side, ((allowance, limit), expected) in ends.items():
         written = next((key for key in (allowance, limit) if own.fields.get(key)), "")

@@ -87,7 +87,10 @@ class Characteristic:
     assumed: str  # What is taken for granted by it, in words
 
 
-TILT = Characteristic("parallelism", "a tilt is toleranced as parallelism of the axis over its length")
+TILT = Characteristic(
+    "parallelism",
+    "a tilt is toleranced as parallelism over its length, with half of the zone, by which it leans to either side",
+)
 ROTATION = Characteristic("position", "a rotation of a pattern is toleranced as the position of its features")
 PHASE = Characteristic("position", "a phase of a journal is toleranced as its position about the axis")
 

@@ -28,6 +28,9 @@ INSPECTED = ("cumulative pitch", "tooth run-out", "single tooth")
 """Characteristics that are inspection data of a gear part, which stand in a table and in no frame."""
 _DEVIATIONS = ("size", "single tooth")
 """Characteristics of which limit deviations are written."""
+_HALVED = (*_DEVIATIONS, TILT.name)
+"""Characteristics of which half the zone is written, to either side; a parallelism of t over L lets an axis lean by
+t/L in any direction, so it is half the width or diameter of what the axis may do (ISO 1101)."""
 
 HEIGHT, _LETTER = 20.0, 9.0
 """Height of a frame and width of a letter in it [px]."""
@@ -94,6 +97,11 @@ class FeatureFrame:
         """Whether limit deviations are written."""
         return self.characteristic in _DEVIATIONS
 
+    @property
+    def share(self) -> float:
+        """What is written over the zone [-]."""
+        return _share(self.characteristic)
+
     def __str__(self) -> str:
         return " ".join(filter(None, (*self.cells, self.place)))
 
@@ -112,6 +120,10 @@ class Frames(tuple[FeatureFrame, ...]):
 
     def _repr_html_(self) -> str:
         return " ".join(frame._repr_html_() for frame in self)
+
+
+def _share(characteristic: str) -> float:
+    return 0.5 if characteristic in _HALVED else 1.0
 
 
 def _found(source: Source, kind: ErrorSource | None) -> tuple[str, str]:
@@ -164,7 +176,7 @@ def callout(source: Source, kind: ErrorSource | None = None) -> FeatureFrame:
     elif source.over:
         over = f"/{source.over / LENGTHS[unit]:g}"
     datums = () if characteristic in INSPECTED else ("A",)
-    zone = f"{'⌀' if round_zone else ''}{written(source.zone, unit)}{over}{stated}"
+    zone = f"{'⌀' if round_zone else ''}{written(_share(characteristic) * source.zone, unit)}{over}{stated}"
     return FeatureFrame(characteristic, zone, datums, exact, place)
 
 
@@ -190,13 +202,13 @@ def _steps(source: Source) -> tuple[int, int]:
 
 
 def stated_limits(source: Source, frame: FeatureFrame) -> tuple[float | None, float]:
-    """Return the limits that a drawing states of a source: both deviations, or none and the zone [m].
+    """Return the limits that a drawing states of a source: both deviations, or none and what its frame says [m].
 
     As they are written, so no wider than the zone that was verified.
     """
     step, _ = FINEST[source.length_name]
     if not frame.is_deviation:
-        return None, floor(source.zone / step + _ROUNDING) * step
+        return None, floor(frame.share * source.zone / step + _ROUNDING) * step
     lower, upper = _steps(source)
     return lower * step, upper * step
 

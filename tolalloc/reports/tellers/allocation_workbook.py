@@ -142,8 +142,10 @@ def _drawing(result: AllocationResult, lines: Sequence[_Line], cost_unit: str) -
             shown[f"zone to change [{unit}]"] = Formula(f"=B{_FIRST + at}*{ratio}", zone)
             rows.append({**shown, **stated(line, _written(result, own, row, zone, length))})
         else:
-            half = own.zone / 2 if _frame(result, own).is_deviation else own.zone
-            written = rounded_down(half, FINEST[own.length_name][0]) / LENGTHS[own.length_name]
+            written = (
+                rounded_down(_frame(result, own).share * own.zone, FINEST[own.length_name][0])
+                / LENGTHS[own.length_name]
+            )
             rows.append({**shown, "inside": _say("workbook_locked"), **stated(line, written)})
     return pd.DataFrame(rows)
 
@@ -166,12 +168,12 @@ def _characteristic(result: AllocationResult, source: Source) -> str:
 
 
 def _written(result: AllocationResult, source: Source, row: int, zone: float, shown: float) -> Formula:
-    """Return what the drawing states of a zone in a row: rounded down to its step, half of it for a size.
+    """Return what the drawing states of a zone in a row: rounded down to its step, half of it for a size or a tilt.
 
     The zone is in the unit of the sheet, of that length [m]; what is stated in that of the drawing, mm or in.
     """
-    halved = _frame(result, source).is_deviation
-    size = f"B{row}/2" if halved else f"B{row}"
+    share = _frame(result, source).share
+    size = f"B{row}/2" if share < 1 else f"B{row}"
     length, (finest, _) = LENGTHS[source.length_name], FINEST[source.length_name]
     step = number((source.step or finest) / shown)
     if not source.step and shown == MICROMETRE:
@@ -181,7 +183,7 @@ def _written(result: AllocationResult, source: Source, row: int, zone: float, sh
     if not source.step and not result.model.drawn_amounts.finest:  # three figures, as `FIGURES` has them
         decade = f"10^INT(LOG10(MAX({size},1E-9)))"
         step = f"({decade}*IF({size}<2*{decade},0.005,0.01))"
-    half = zone / 2 if halved else zone
+    half = share * zone
     # What was verified is stated as it is, a grade or a smallest zone too.
     value, near = rounded_down(half * shown, finest) / length, _AS_VERIFIED * MICROMETRE / shown
     verified = f"AND({size}>{number(half - near)},{size}<{number(half + near)})"
