@@ -181,7 +181,7 @@ def transmission_error(
 
     Notes
     -----
-    TE(θc) = θ(θc) − θc in the equilibrium of all springs, liu2020 equations (1)–(14).
+    TE(θc) = θ(θc) − θc in the equilibrium of all springs, theory page equation (5), liu2020 equations (1)–(14).
 
     Examples
     --------
@@ -430,7 +430,8 @@ def regulator(
 
     Notes
     -----
-    Minimises xᵀQx of the final state plus the sum of uᵀRu: K = (R + BᵀPB)⁻¹BᵀP, P = (I − BK)ᵀP(I − BK) + KᵀRK.
+    Minimises xᵀQx of the final state plus the sum of uᵀRu, theory page equation (56): K = (R + BᵀPB)⁻¹BᵀP,
+    P = (I − BK)ᵀP(I − BK) + KᵀRK.
 
     References
     ----------

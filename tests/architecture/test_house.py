@@ -42,6 +42,10 @@ LATER = ("matplotlib", "numba", "scipy.stats", "scipy.special")
 """Libraries that no help needs either."""
 SOLVED_WITH = ("numba", "scipy.stats", "scipy.special")
 """Libraries with which a check solves some random units."""
+SAYS = re.compile(r"[Tt]heory page,? equations? ((?:\(\d+\)(?:, and |, | and | to )?)+)")
+"""How code says which equations of the theory page it computes."""
+UNSAID = {85}
+"""Equations that nothing in the package computes: of noise, which `tests/verification/test_form.py` compares alone."""
 
 
 def imports(tree: ast.Module) -> set[str]:
@@ -108,6 +112,81 @@ except SystemExit as end:
 
 def test_help_lists_the_parameters_that_can_be_identified():
     assert NAMES.split(", ") == list(SYMBOLS)
+
+
+def said(text: str) -> set[int]:
+    """Return the numbers of the equations of the theory page that a text says."""
+    listed = " ".join(SAYS.findall(" ".join(text.replace("#", "").split())))
+    ends = re.findall(r"\((\d+)\)(?: to \((\d+)\))?", listed)
+    return {number for first, last in ends for number in range(int(first), int(last or first) + 1)}
+
+
+def beside_equations(page: str) -> dict[str, set[int]]:
+    """Return each name in the paragraph before a numbered equation, with the numbers on either side of that paragraph.
+
+    Equations that follow each other without a word between are one.
+    """
+    blocks: list[tuple[str, set[int]]] = []
+    for block in re.split(r"\n\s*\n|(\$\$.*?\$\$)", page, flags=re.DOTALL):
+        if not (block and block.strip()):
+            continue
+        text, tags = block if "$$" not in block else "", {*map(int, re.findall(r"\\tag\{(\d+)\}", block))}
+        if blocks and not (text or blocks[-1][0]):
+            blocks[-1] = ("", blocks[-1][1] | tags)
+        else:
+            blocks.append((text, tags))
+    found: dict[str, set[int]] = {}
+    for (_, before), (text, _), (_, after) in zip([("", set()), *blocks], blocks, blocks[1:], strict=False):
+        for name in re.findall(r"`([A-Za-z_][\w.]*)`", text) if after else ():
+            found[name] = found.get(name, set()) | before | after
+    return found
+
+
+def described(trees: dict[str, ast.Module]) -> dict[str, str]:
+    """Return the docstring of every function, class and method of the package, by its dotted name."""
+    found, inside = {}, [(place.removesuffix(".py").replace("/", "."), tree) for place, tree in trees.items()]
+    while inside:
+        place, node = inside.pop()
+        for own in node.body:
+            if isinstance(own, ast.FunctionDef | ast.ClassDef):
+                found[f"{place}.{own.name}"] = ast.get_docstring(own) or ""
+                inside += [(f"{place}.{own.name}", own)] * isinstance(own, ast.ClassDef)
+    return found
+
+
+def unsaid(page: str, docstrings: dict[str, str]) -> tuple[set[str], set[str]]:
+    """Return the functions and classes beside equations of a page, and those among them that say no number."""
+    known, wanting = set(), set()
+    for name, numbers in beside_equations(page).items():
+        own = [text for place, text in docstrings.items() if f".{place}".endswith(f".{name.removeprefix('tolalloc.')}")]
+        if own:
+            known.add(name)
+            if not any(said(text) & numbers for text in own):
+                wanting.add(name)
+    return known, wanting
+
+
+def test_what_stands_beside_an_equation_says_its_number(trees):
+    known, wanting = unsaid((ROOT / "docs" / "theory.md").read_text(encoding="utf-8"), described(trees))
+    assert len(known) > 100
+    assert not wanting
+
+
+def test_the_code_names_the_equations_of_the_theory_page_and_no_others(trees):
+    page = (ROOT / "docs" / "theory.md").read_text(encoding="utf-8")
+    given = {int(number) for number in re.findall(r"\\tag\{(\d+)\}", page)}
+    texts = {place: (PACKAGE / place).read_text(encoding="utf-8") for place in trees}
+    assert set().union(*map(said, texts.values())) == given - UNSAID
+    assert not [place for place, text in texts.items() if re.search(r"heory pages?,?\s+\(|heory pages\s", text)]
+
+
+def test_an_equation_that_nothing_says_is_noticed():
+    page = "As `one.same`, with `LIMIT`,\n\n$$a \\tag{1}$$\n\n$$b \\tag{2}$$\n\nand `two`\n$$c \\tag{3}$$\n\n`three`."
+    docstrings = {"room.one.same": "Theory page equation (2).", "room.two": "Equation (3)."}
+    assert beside_equations(page) == {"one.same": {1, 2}, "LIMIT": {1, 2}, "two": {1, 2, 3}}
+    assert unsaid(page, docstrings) == ({"one.same", "two"}, {"two"})
+    assert said("theory page, equations (1), (4) to (6) and\n    (8), (9)") == {1, 4, 5, 6, 8, 9}
+    assert not said("liu2020, equations (2) to (12); theory page (7)")
 
 
 def lines_of(function: ast.FunctionDef) -> int:

@@ -73,12 +73,12 @@ def risks(mean: float, deviation: float, limits: Limits, expanded: float, guard:
     expanded
         Expanded uncertainty of a reading, U = 2·u [unit of the limits].
     guard
-        How far inside the limits a reading must lie to be accepted; negative where it may lie outside.
+        How far inside the limits a reading must lie to be accepted, negative outside [unit of the limits].
 
     Notes
     -----
-    R_C = ∫outside φ(x)·P(accepted | x) dx and R_P = ∫inside φ(x)·P(rejected | x) dx, equations (17) and (19) of JCGM
-    106, over 8 standard deviations to either side by Simpson's rule.
+    R_C = ∫outside φ(x)·P(accepted | x) dx and R_P = ∫inside φ(x)·P(rejected | x) dx [-], theory page equation (109), as
+    JCGM 106, (17) and (19); process and reading normal, over 8 standard deviations to either side by Simpson's rule.
 
     References
     ----------

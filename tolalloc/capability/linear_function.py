@@ -113,7 +113,7 @@ class _AddedColumn:
 
 @dataclass(frozen=True, kw_only=True)
 class LinearLaw:
-    """Law of a linear function of the sources at some zones.
+    """Law of a linear function of the sources at some zones, theory page equation (77).
 
     Notes
     -----
@@ -190,7 +190,7 @@ class LinearLaw:
 
         Notes
         -----
-        ∂q/∂z = E[∂y/∂z | y = q], each limited side with the density that it has there.
+        ∂q/∂z = E[∂y/∂z | y = q], theory page equation (77), each limited side with the density that it has there.
         """
         found, weights = np.zeros(self.zones.size), 0.0
         for sign, limit in limits.turned:

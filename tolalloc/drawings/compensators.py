@@ -257,9 +257,9 @@ class Shim(_Fitting):
     Notes
     -----
     The gap g = d + Σ w·dₛ of measured deviations becomes g + step·k with the whole number k, at most (sizes − 1)/2
-    either way, that leaves the least of it; d becomes d + step·k. Measuring errs by nothing (an assumption).
-    Derivatives with respect to zones are those of the sizes chosen, as a unit that changes its size has none (own
-    derivation).
+    either way, that leaves the least of it; d becomes d + step·k, theory page equation (82). Measuring errs by nothing
+    (an assumption). Derivatives with respect to zones are those of the sizes chosen, as a unit that changes its size
+    has none (own derivation).
 
     Examples
     --------
@@ -323,10 +323,10 @@ class Indexing(_Fitting):
 
     Notes
     -----
-    Of the vectors v of the part and s = Σ w·vₛ of the others, v turns by k·360°/n with the k that leaves the shortest
-    sum v + s: the one that is nearest to the direction of −s. Other vectors of the part turn too and keep their law, as
-    all directions are alike (own derivation). Measuring errs by nothing (an assumption). Derivatives with respect to
-    zones are those of the positions chosen, with the vector as it is turned.
+    Theory page equation (88): of the vectors v of the part and s = Σ w·vₛ of the others, v turns by k·360°/n with the k
+    that leaves the shortest sum v + s: the one that is nearest to the direction of −s. Other vectors of the part turn
+    too and keep their law, as all directions are alike (own derivation). Measuring errs by nothing (an assumption).
+    Derivatives with respect to zones are those of the positions chosen, with the vector as it is turned.
     """
 
     called: ClassVar[str] = "indexing"

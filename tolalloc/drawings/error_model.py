@@ -23,7 +23,11 @@ Zones = Float[np.ndarray, " source"]
 
 @dataclass(frozen=True)
 class ErrorModel:
-    """All sources of a reducer: each random column is its zone times a standard value."""
+    """All sources of a reducer: each random column is its zone times a standard value.
+
+    Correlated ones by theory page equation (43), a Gaussian copula: each source keeps its own distribution. Vectors
+    that are not normal have nearly the stated correlation on both axes.
+    """
 
     sources: tuple[Source, ...]  # The rows of the tolerance table
     # What varies besides and stands on no drawing, such as a stiffness that is not known; its columns come last and its
@@ -206,7 +210,7 @@ class ErrorModel:
         return mixed
 
     def marginal_values(self, uniform: Columns) -> Columns:
-        """Return all deviations per unit of zone for uniform numbers that already have their correlation."""
+        """Return all deviations per unit of zone [-] for uniform numbers that already have their correlation [-]."""
         values = np.empty_like(uniform)
         for source, columns in zip(self._varying, self.columns_of_source, strict=True):
             values[:, columns] = source.standard_values(uniform[:, columns])

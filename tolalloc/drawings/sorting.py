@@ -62,18 +62,18 @@ class Sorting(Compensator):
     Notes
     -----
     The classes end at the quantiles i/n of each process, so all hold equally many parts on average. A unit's parts then
-    lie in class ⌊n·F(mate)⌋, and inside it as they come: F(part) → (⌊n·F(mate)⌋ + frac(n·F(part)))/n. Both processes
-    keep their own distribution, and units need no batch to be drawn (own derivation; tests compare with batches that
-    are assigned exactly). What is left over does, `leftover`.
+    lie in class ⌊n·F(mate)⌋, and inside it as they come: F(part) → (⌊n·F(mate)⌋ + frac(n·F(part)))/n, theory page
+    equation (80). Both processes keep their own distribution, and units need no batch to be drawn (own derivation;
+    tests compare with batches that are assigned exactly). What is left over does, `leftover`.
 
-    The same map takes the share of all directions below that of a vector, φ/2π, and the probability of one no longer.
-    The normal numbers behind a vector give both, independently of each other, so that every order of a wave but the
-    first stays as it comes.
+    The same map takes the share of all directions below that of a vector, φ/2π, and the probability of one no longer,
+    theory page equation (86). The normal numbers behind a vector give both, independently of each other, so that every
+    order of a wave but the first stays as it comes.
 
     Classes of equal width hold shares p of the parts and q of the mates. A batch builds E[min(N, M)] units of each, so
     its units lie in a class with a probability in proportion, and inside it both parts have their own law cut to the
-    class: what is left over is no longer as likely of any class, and built parts are no longer all parts (own
-    derivation). Derivatives with respect to zones are those of classes that grow with the zones.
+    class, theory page equation (87): what is left over is no longer as likely of any class, and built parts are no
+    longer all parts (own derivation). Derivatives with respect to zones are those of classes that grow with the zones.
 
     References
     ----------
@@ -180,8 +180,8 @@ class Sorting(Compensator):
     def leftover(self) -> float:
         """Share of the parts that find no mate in a batch where all classes hold equally many, on average [-].
 
-        1 − (n/B)·E[min(N, M)] with E[min(N, M)] = Σₖ P(N ≥ k)² for two independent binomial numbers of B parts in one
-        of n classes (own derivation).
+        Theory page equation (81), exact: 1 − (n/B)·E[min(N, M)] with E[min(N, M)] = Σₖ P(N ≥ k)² for two independent
+        binomial numbers of B parts in one of n classes (own derivation).
 
         Examples
         --------
@@ -196,7 +196,8 @@ class Sorting(Compensator):
     def leftover_of(self, sources: Mapping[str, Source]) -> float:
         """Return the same at the zones of sources, by their names [-].
 
-        Classes of a position are those of both axes together; of equal width it is 1 − Σ E[min(N, M)]/B over all.
+        Classes of a position are those of both axes together; of equal width it is 1 − Σ E[min(N, M)]/B over all,
+        theory page equation (87).
         """
         if self.width is None:
             return self._leftover(self.count ** self._numbers(sources[self.parts]))

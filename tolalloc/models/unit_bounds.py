@@ -77,7 +77,8 @@ def least_by_slopes(slopes: Pair, lower: Variables, upper: Variables) -> Pair:
     Notes
     -----
     Theory page, equation (103), own derivation: with a ≤ ∂y/∂r ≤ b, a⁻ = min(a, 0) and b⁺ = max(b, 0),
-    y ≥ y(p) + Σ a⁻·b⁺/(b⁺ − a⁻)·(upper − lower) at p = (b⁺·lower − a⁻·upper)/(b⁺ − a⁻), the best point to start from.
+    y ≥ y(p) + Σ a⁻·b⁺/(b⁺ − a⁻)·(upper − lower) [unit of the output] at p = (b⁺·lower − a⁻·upper)/(b⁺ − a⁻), the best
+    point to start from.
     """
     falling, rising = np.minimum(slopes[0], 0.0), np.maximum(slopes[1], 0.0)
     span = np.where(rising > falling, rising - falling, 1.0)

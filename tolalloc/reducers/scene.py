@@ -71,7 +71,7 @@ def _tooth(reducer: Reducer) -> dict[str, list[Any]]:
     ``exact`` and ``modified`` are points of the profile without and with the tooth modification [mm], ``normal`` the
     unit vector into the disc [-]; the last point is left out, as it is the next space's first.
 
-    Points of theory page (34), own derivation, x + iy for 0 ≤ φ ≤ π and mirrored [mm].
+    Points of theory page equation (34), own derivation, x + iy for 0 ≤ φ ≤ π and mirrored [mm].
     """
     stage = reducer.cycloid_stage
     exact, modified = ToothProfile(stage=stage), ToothProfile.of(reducer)
@@ -164,7 +164,7 @@ def _compressions(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]
 
     Summed in the order of the solver, so that no digit differs from what it balances.
 
-    δ = D·q + H·ε, own derivation, theory page (17) and (21).
+    δ = D·q + H·ε, own derivation, theory page equations (17) and (21).
     """
     tables, layout = equilibria.tables, equilibria.columns.layout
     values = _values(equilibria)

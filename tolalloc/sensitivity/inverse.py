@@ -70,6 +70,7 @@ def inverse_sensitivity(
 
     Notes
     -----
+    Theory page equation (48), factors [-], limit [unit of the output].
     All trials use the same uniform numbers, so the quantile is a continuous function of each factor. A zone is opened
     to twice its width, then to the largest factor, so the first crossing is found unless the quantile returns within
     one of these steps; what by its squares stays far from the limit is not tried at the largest. Between two factors

@@ -254,7 +254,8 @@ def saltelli_indices(
 
     Notes
     -----
-    Indices without a replicate whose rest does not vary are 0, as in SALib.
+    Indices [-] without a replicate whose rest does not vary are 0, as in SALib. With a control first-order and total
+    ones are those of theory page equation (79), unbiased whatever the cheap model is worth.
 
     References
     ----------

@@ -52,12 +52,13 @@ def shapley_effects(experiment: Experiment[Response], permutations: int) -> Shap
 
     Notes
     -----
-    The worth of a set of sources is the variance that they leave when all others are known, E[Var(Y | others)]; the
-    effect of a source is what it adds to the set of those before it, averaged over random orders. In each order every
-    source is written as a function of its own independent normal numbers and of the sources behind it, the Gaussian
-    copula's conditional distribution. Two samples then become d + 1: the sources get the numbers of the second sample
-    one after the other, and half the squared change since the first sample has the worth as its expectation. Since
-    neighbouring sets share their numbers, a source that hardly matters also hardly adds noise.
+    Theory page equation (45) [-], for correlated sources too. The worth of a set of sources is the variance that they
+    leave when all others are known, E[Var(Y | others)], which has the effects of the variance that they explain; the
+    effect is what it adds to the set of those before it, averaged over random orders. In each order every source is
+    written as a function of its own independent normal numbers and of the sources behind it, the Gaussian copula's
+    conditional distribution. Two samples then become d + 1: the sources get the numbers of the second sample one after
+    the other, and half the squared change since the first sample has the worth as its expectation. Since neighbouring
+    sets share their numbers, a source that hardly matters also hardly adds noise.
 
     References
     ----------

@@ -247,8 +247,9 @@ def order_contribution(analysis: SobolAnalysis, waves: Mapping[float, Sequence[s
 
     Notes
     -----
-    The index of a vector is Σ V_o·S_o / Σ V_o over its components o. It does not depend on where the turn begins, which
-    the indices of cosine and sine alone do. Without a replicate the components have their own variances.
+    The index of a vector is Σ V_o·S_o / Σ V_o over its components o [-], theory page equation (44). It does not depend
+    on where the turn begins, which the indices of cosine and sine alone do. Without a replicate the components have
+    their own variances.
 
     References
     ----------

@@ -90,13 +90,12 @@ def target_sensitivity(
 
     Notes
     -----
-    The index of a vector is that given its length, so it leaves out what the vector's direction adds. The lift of a
-    vector is the mean over all its columns, so it compares sources of as many columns; the excess is the sum and
-    compares all: for a sum of normal columns the excesses are to each other as the shares of the variance. In a
-    correlated error model all of them also show what a source only goes along with, so a block's excesses do not add
-    up to what the block does.
-    Classes hide a part of a large index far out (measured: 6 % of it with 85 of 6,144 units outside); its interval is
-    too wide near 0, where the p-value says more.
+    Lift and excess [-] by theory page equation (47). The index of a vector is that given its length, so it leaves out
+    what the vector's direction adds. The lift of a vector is the mean over all its columns, so it compares sources of
+    as many columns; the excess is the sum and compares all: for a sum of normal columns the excesses are to each other
+    as the shares of the variance. In a correlated error model all of them also show what a source only goes along with,
+    so a block's excesses do not add up to what the block does. Classes hide a part of a large index far out (measured:
+    6 % of it with 85 of 6,144 units outside); its interval is too wide near 0, where the p-value says more.
 
     References
     ----------

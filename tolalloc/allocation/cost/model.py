@@ -41,7 +41,7 @@ class _FallingCost:
 
 @dataclass(frozen=True, kw_only=True)
 class Reciprocal(_FallingCost):
-    """Cost a + b/t.
+    """Cost a + b/t [cost units] of a zone t above 0, theory page equation (51).
 
     References
     ----------
@@ -72,7 +72,7 @@ class Reciprocal(_FallingCost):
 
 @dataclass(frozen=True, kw_only=True)
 class ReciprocalPower(_FallingCost):
-    """Cost a + b·t⁻ⁿ.
+    """Cost a + b·t⁻ⁿ [cost units] of a zone t above 0, theory page equation (51).
 
     References
     ----------
@@ -112,7 +112,7 @@ class ReciprocalPower(_FallingCost):
 
 @dataclass(frozen=True, kw_only=True)
 class Exponential(_FallingCost):
-    """Cost a + b·exp(−t/s).
+    """Cost a + b·exp(−t/s) [cost units] of a zone t, theory page equation (51).
 
     References
     ----------
@@ -145,7 +145,7 @@ class Exponential(_FallingCost):
 
 @dataclass(frozen=True, kw_only=True)
 class PowerExponential(_FallingCost):
-    """Cost a + b·t⁻ⁿ·exp(−t/s).
+    """Cost a + b·t⁻ⁿ·exp(−t/s) [cost units] of a zone t above 0, theory page equation (51).
 
     References
     ----------

@@ -17,7 +17,7 @@ _COST = number("a finite number, 0 or above", least=0)
 
 @dataclass(frozen=True, kw_only=True)
 class QualityLoss(NamedFields):
-    """What a unit costs its user although it is within its limit, growing with the square of the deviation.
+    """What a unit costs its user within its limit, rising with the square of the deviation, theory page equation (53).
 
     Parameters
     ----------
@@ -45,8 +45,8 @@ class QualityLoss(NamedFields):
     def nominal_is_best(self, offset: float, deviation: float) -> float:
         """Return the mean loss per unit where the nominal value is best [cost units].
 
-        A/Δ²·(offset² + σ²), with the loss A at the limit Δ; the offset is the mean less the nominal value, the
-        deviation the standard one [unit of the output].
+        A/Δ²·(offset² + σ²), theory page equation (53), with the loss A at the limit Δ; the offset is the mean less the
+        nominal value, the deviation the standard one [unit of the output].
 
         >>> QualityLoss(limit=10.0, at_limit=50.0).nominal_is_best(offset=3.0, deviation=4.0)
         12.5
@@ -56,14 +56,14 @@ class QualityLoss(NamedFields):
     def smaller_is_better(self, mean: float, deviation: float) -> float:
         """Return the mean loss per unit where 0 is best, such as for the transmission error [cost units].
 
-        A/Δ²·(mean² + σ²).
+        A/Δ²·(mean² + σ²), theory page equation (53).
         """
         return self.nominal_is_best(mean, deviation)
 
 
 @dataclass(frozen=True, kw_only=True)
 class UnitPrice(NamedFields):
-    """What becomes of units beyond the limit, and so what a good unit costs.
+    """What becomes of units beyond the limit, and so what a good unit costs, theory page equation (52).
 
     Parameters
     ----------
@@ -115,8 +115,8 @@ class UnitPrice(NamedFields):
 
         Notes
         -----
-        (c + inspection + (1 − y)·(r·rework + (1 − r)·scrap)) / (y + (1 − y)·r), with the yield y and the share r that
-        rework makes good.
+        (c + inspection + (1 − y)·(r·rework + (1 − r)·scrap)) / (y + (1 − y)·r), theory page equation (52), with the
+        yield y and the share r that rework makes good.
 
         Examples
         --------

@@ -49,7 +49,7 @@ _StackParameters = tuple[Any, Any, Any, Any]
 
 
 class ConvexProgram:
-    """Least cost of features that are made by given processes, with every stack within its budget.
+    """Least cost [cost units] of given processes with every stack in its budget, theory page equation (26).
 
     Parameters
     ----------
@@ -62,9 +62,9 @@ class ConvexProgram:
 
     Notes
     -----
-    Zones are counted in the geometric middle of their process's range, stacks in their budget, costs in what they
-    change there, so the solver sees numbers of order one whatever the unit. The stacks and all bounds are parameters:
-    cvxpy compiles once.
+    Convex where all costs are; stacks are as good as their local model. Zones are counted in the geometric middle of
+    their process's range, stacks in their budget, costs in what they change there, so the solver sees numbers of order
+    one whatever the unit. The stacks and all bounds are parameters: cvxpy compiles once.
     """
 
     def __init__(

@@ -125,10 +125,10 @@ class LagrangeDual:
 
     Notes
     -----
-    Every price λ ≥ 0 of the stacks gives a lower bound: a design that keeps a stack is not made dearer by
-    λ·(load − budget) ≤ 0, and without the stacks every feature is minimised alone over its whole range, the smallest of
-    its processes counting. A norm is replaced by its supporting plane u·(root_sum_square∘zones) with ‖u‖ = 1, which
-    lies below it for every u. A stack that only spreads is squared first,
+    Theory page equation (27): every price λ ≥ 0 of the stacks gives a lower bound: a design that keeps a stack is not
+    made dearer by λ·(load − budget) ≤ 0, and without the stacks every feature is minimised alone over its whole range,
+    the smallest of its processes counting. A norm is replaced by its supporting plane u·(root_sum_square∘zones) with
+    ‖u‖ = 1, which lies below it for every u. A stack that only spreads is squared first,
     λ/(2·budget)·(‖root_sum_square∘zones‖² − budget²) ≤ 0, which needs no u and stays as tight as a dual can be when
     processes compete.
 
@@ -314,8 +314,8 @@ def cost_bound(
 ) -> float:
     """Return a lower bound on the cost of every design, made by whatever processes, that keeps all stacks.
 
-    max over λ ≥ 0 of min over zones of cost + Σ λ·(load − budget) ≤ cost of any design: Boyd & Vandenberghe 2004, ch. 5
-    [cost units].
+    Theory page equation (27), Boyd & Vandenberghe 2004, ch. 5: max over λ ≥ 0 of min over zones of
+    cost + Σ λ·(load − budget) ≤ cost of any design [cost units]. It bounds the model that the stacks are.
 
     Parameters
     ----------

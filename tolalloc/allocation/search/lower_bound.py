@@ -63,7 +63,8 @@ def lower_bound(design: VerifiedDesign) -> LowerBound:
     symmetric log-concave deviations and one limit the quantile is convex in the zones, so it lies above the plane
     that touches it, and the bound holds for every allowed design.
 
-    cost ≥ min cost over the weaker requirements (own derivation) [cost units]; by the Lagrange dual, `cost_bound`.
+    cost ≥ min cost over the weaker requirements, theory page equation (76) (own derivation) [cost units]; by the
+    Lagrange dual, `cost_bound`.
 
     Examples
     --------

@@ -59,7 +59,7 @@ class ProvenBound:
 def allowed_failures(units: int, share: float, confidence: float) -> int:
     """Return how many of so many units fail at most in a design that fails a share, with a confidence [-].
 
-    The quantile of the binomial law, theory page equation (104).
+    The quantile of the binomial law, theory page equation (104), exact for a design fixed before its units are drawn.
 
     References
     ----------

@@ -273,7 +273,7 @@ _SCALE_STEP = 0.05
 
 @dataclass(frozen=True, kw_only=True)
 class DesignSample:
-    """Random units of one design."""
+    """Random units of one design, whose moments and their gradient theory page equation (24) states."""
 
     space: DesignSpace  # The design variables
     model: Model  # The real model

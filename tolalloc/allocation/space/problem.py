@@ -314,7 +314,8 @@ def worst_case_stack(
 ) -> Stack:
     """Return the model of a worst case, weights·scales + slopes·settings ≤ budget, from the same arguments.
 
-    weightᵢ = max(∂excess/∂scaleᵢ, 0) (own derivation), exact at the design and near it to first order.
+    Theory page equation (25) without its norm: weightᵢ = max(∂excess/∂scaleᵢ, 0) [unit of the output] (own derivation),
+    exact at the design and near it to first order.
 
     Examples
     --------

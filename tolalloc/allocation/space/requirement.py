@@ -410,7 +410,8 @@ def spread_weights(
 ) -> Float[np.ndarray, " known"]:
     """Return by what the derivatives of known units count in that of mean + spread·σ of all units, a value.
 
-    1 + spread·(y − mean)/σ, theory page, equation (24) (own derivation); all alike where nothing varies.
+    1 + spread·(y − mean)/σ [-], theory page, equation (24) (own derivation), exact for these units; all alike where
+    nothing varies.
 
     Examples
     --------

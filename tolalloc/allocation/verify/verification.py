@@ -357,7 +357,7 @@ def _uncertainties(
 
 
 def _by_zone(sample: DesignSample, quantile: float) -> Float[np.ndarray, " source"] | None:
-    """Return the change of mean + spread·σ of the leading output with the zones; equation (24)."""
+    """Return the change of mean + spread·σ of the leading output by the zones, theory page equation (24) [output/m]."""
     leading = sample.outputs[0]
     if leading not in sample.exact:
         return None

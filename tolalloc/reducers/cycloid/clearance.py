@@ -43,7 +43,7 @@ def is_large(stage: CycloidStage, modification: Modification) -> bool:
 def linear_clearance(stage: CycloidStage, modification: Modification, pin_angle: Angles) -> Angles:
     """Return the material removed along the normal, Δr_rp − Δr_p·cos κ + δ·r_d·|S|, theory page equation (35) [m].
 
-    First order in the amounts: good to 0.3 µm on the working flanks up to `LARGE`; cos κ and S of `normals`.
+    First order in the amounts: good to 0.3 µm on the working flanks up to `LARGE`; cos κ and S of `normals`, φ [rad].
 
     References
     ----------
@@ -65,9 +65,9 @@ def linear_clearance(stage: CycloidStage, modification: Modification, pin_angle:
 
 
 def removed(profile: ToothProfile, pin_angle: Angles) -> Angles:
-    """Return the material that a drawing's profile removes, `linear_clearance` less a free form, theory page (83) [m].
+    """Return the material that a drawing's profile removes, `linear_clearance` less a free form [m].
 
-    Own derivation, first order in amounts and form.
+    Theory page equations (35) and (83), own derivation, first order in amounts and form; φ [rad].
     """
     found = linear_clearance(profile.stage, profile.modification, pin_angle)
     return found if profile.form is None else found - profile.form.at(pin_angle)
@@ -114,9 +114,9 @@ def exact_clearance(
 def gap_of(profile: ToothProfile, exact: bool) -> Gap:
     """Return the clearance as a function of the pins' angles and of the disc's rotation, exact or linear.
 
-    A free form of the profile is taken off along the normal at the pin's φ in either case, theory page (83).
+    A free form of the profile is taken off along the normal at the pin's φ in either case, theory page equation (83).
 
-    Linear: `linear_clearance` − β·r_d·S (own derivation), β the disc's rotation [rad], φ [rad], within `is_large`.
+    Linear: `linear_clearance` − β·r_d·S [m] (own derivation), β the disc's rotation, φ [rad], within `is_large`.
     """
     stage, lever, form = profile.stage, profile.stage.disc_pitch_radius, profile.form
 

@@ -18,8 +18,8 @@ _STILL = 1e-14  # step over the depth that changes nothing any more [-]
 class LineContact:
     """Contacts of pins and teeth as springs side by side along the width of the tooth, theory page equation (31).
 
-    What follows holds for the linear laws. Under the logarithmic one no disc tilts: `peak` is then the even load, and
-    stiffness and `deformation` mean nothing unless the teeth are crowned.
+    Slices do not feel each other; what follows holds for the linear laws. Under the logarithmic one no disc tilts:
+    `peak` is then the even load, and stiffness and `deformation` mean nothing unless the teeth are crowned.
 
     Examples
     --------
@@ -102,7 +102,10 @@ class LineContact:
         return np.asarray(self.peak * self.face_width / self.stiffness)
 
     def line_load(self, position: Float[np.ndarray, " position"]) -> Float[np.ndarray, "*contacts position"]:
-        """Return the line load along the width at places from −b/2 to b/2, 0 in the middle of the tooth [m], [N/m]."""
+        """Return the line load at places from −b/2 to b/2 along the width [m], theory page equation (60) [N/m].
+
+        C/b·max(0, s + γz), of crowned teeth less kz² in the brackets; without crowning for linear laws alone.
+        """
         slope, deepest = self.slope[..., np.newaxis], self._deepest[..., np.newaxis]
         least = deepest * np.abs(slope) - self._bend * deepest**2
         below = least - slope * position + self._bend * position**2

@@ -77,7 +77,7 @@ def crowned_contact(
 
     K = F/δ of the law, C, C(ρ−r)/(ρ+r) or c/ln(cλ/F) [N/m].
 
-    Own derivation, theory page (31); within 7 % of Hertz's ellipse under the logarithmic law.
+    Theory page equation (31), own derivation; within 7 % of Hertz's ellipse under the logarithmic law.
     """
     stage, shape = reducer.cycloid_stage, np.broadcast_shapes(pin_angle.shape, force.shape)
     stiffness, log_length = contact_stiffness(stage, replace(reducer.stiffness, pin_bending=inf), pin_angle)
@@ -115,7 +115,7 @@ def equivalent_length(stage: CycloidStage, pin_angle: Angles) -> Angles:
     L is the radius of curvature of the path of the pin's centre on the disc: the flank's radius plus r_rp where the
     flank is convex and minus r_rp where it is concave; with Hertz's half width the approach depends on the radii by L
     alone. Near the inflection L grows without bound and the approach only with its logarithm; Rp as the largest length
-    is an assumption.
+    is an assumption. φ [rad].
 
     References
     ----------
@@ -282,7 +282,8 @@ def pressed_linear(discs: PressedDiscs, phase: AtPhases, deflection: float | Non
     Without a deflection δ_max [m] it is iterated until it is the approach under the largest force, by the reducer's
     law with the curvature at φ0.
 
-    Theory page equation (36): F_i = F_max·(δ_max·S_i − gap_i)/δ_max with F_max from the balance of torques.
+    Theory page equation (36): F_i = F_max·(δ_max·S_i − gap_i)/δ_max [N] with F_max from the balance of torques;
+    phases [rad].
 
     References
     ----------
@@ -378,7 +379,8 @@ def _balancing(
 def pressed(discs: PressedDiscs, phase: AtPhases) -> LoadedContact:
     """Return the contact of every pin by the reducer's own law, the rotation bracketed until the torques balance.
 
-    Theory page equation (37). All discs turn by the same angle; a single one carries the whole torque.
+    Theory page equation (37): Σ r_d·S·F = T [N·m] at phases [rad], each tooth with its own curvature. All discs turn
+    by the same angle; a single one carries the whole torque.
 
     Own derivation; Li Lixing's method, xi2015, takes the curvature at φ0 for all.
 

@@ -150,8 +150,8 @@ def normal_deviations(stage: CycloidStage, place: Places, name: str) -> tuple[Po
     """Return φ around the disc and the exact distance from the theoretical profile of points, outward positive.
 
     Points x + iy from the disc's centre, its zero direction along x [m]. With P on the normal n of the path w of the
-    grinding pin's centre, (P − w)·w′ = 0, the point stands out by r_rp − (P − w)·n: own derivation, theory page (83);
-    exact to rounding.
+    grinding pin's centre, (P − w)·w′ = 0, the point stands out by r_rp − (P − w)·n, u(φ) of theory page equation (83)
+    [rad, m]: own derivation, exact to rounding.
 
     Examples
     --------
@@ -190,9 +190,9 @@ def aligned(stage: CycloidStage, place: Places, name: str) -> tuple[Places, Move
     """Return points moved rigidly so that their squared normal deviations are least, and what was taken out.
 
     Gauss–Newton steps: a movement by (x, y) and a turn by ψ about the disc's centre let a point stand out by
-    −n·(x, y) − ψ·r_d·S less. What is taken out is no error of the disc any more.
+    −n·(x, y) − ψ·r_d·S less [m]. What is taken out is no error of the disc any more.
 
-    Own derivation, least squares; levers r_d·S of theory page (14).
+    Own derivation, least squares; levers r_d·S, S = −sin a of theory page equation (13).
     """
     start, scale = place, stage.disc_pitch_radius
     shift, turn = 0j, 0.0

@@ -46,7 +46,7 @@ def pole_distance(shortening: float, pin_angle: Angles) -> Angles:
 
 
 def normals(shortening: float, pin_angle: Angles) -> Normals:
-    """Return the normals at pins, theory page equations (13) and (14); for 0 < K1 < 1.
+    """Return the normals [-] at pins, φ [rad], theory page equations (13) and (14); for 0 < K1 < 1.
 
     The common normal passes through the pole, so with s = 1 + K1² − 2·K1·cos φ its lever about the disc's centre over
     r_d is S = sin φ/√s, and the cosine against the pin's radius is cos κ = (1 − K1·cos φ)/√s.
@@ -69,7 +69,7 @@ def normals(shortening: float, pin_angle: Angles) -> Normals:
 def path_curvature(stage: CycloidStage, pin_angle: Angles) -> Angles:
     """Return the curvature of the pin centre's path on the disc, concave positive, theory page equation (33) [1/m].
 
-    κ = (K1(1 + zp)·cos φ − 1 − zp·K1²)/(Rp·s^1.5), s = 1 + K1² − 2K1·cos φ.
+    κ = (K1(1 + zp)·cos φ − 1 − zp·K1²)/(Rp·s^1.5), s = 1 + K1² − 2K1·cos φ, φ [rad].
 
     References
     ----------
@@ -112,7 +112,7 @@ class ToothProfile:
     """Profile ground by a pin of radius r_rp + Δr_rp on the circle Rp + Δr_p, turned by the rotation modification.
 
     The frame is the disc's: its centre, and the middle of a root at angle 0. The parameter φ is the angle of the pin
-    that grinds the point: 0 at the root, π at the tip. Theory page equation (34).
+    that grinds the point: 0 at the root, π at the tip [rad]. Theory page equation (34), exact; points [m].
     """
 
     stage: CycloidStage  # Cycloid stage
@@ -264,8 +264,8 @@ def path_of(
 ) -> tuple[Complex[np.ndarray, "n point"], Complex[np.ndarray, "n point"], Complex[np.ndarray, "n point"]]:
     """Return the path of the grinding pin's centre on the disc and its first two derivatives by φ, x + iy [m].
 
-    The normal into the disc is the direction of its derivative, turned by −90°: theory page (34) for many modifications
-    at once, where `ToothProfile` is one; own derivation.
+    The normal into the disc is the direction of its derivative, turned by −90°: theory page equation (34) for many
+    modifications at once, where `ToothProfile` is one; own derivation.
     """
     pin = (stage.pin_circle_radius + amounts[:, 1:]) * np.exp(-1j * angle / stage.disc_teeth)
     crank = stage.eccentricity * np.exp(-1j * angle * (stage.pin_count / stage.disc_teeth))

@@ -179,11 +179,8 @@ def _condense_some(at: Positions) -> CondensedAngles:
 def condense(reducer: Reducer, orders: tuple[int, ...], angle: AtAngles) -> CondensedAngles:
     """Return the condensed model of a reducer at the carrier angles.
 
-    Theory page, equations (19)–(21).
-
-    S = K_dd − K_dr·K_rr⁻¹·K_rd, F = L_d − K_dr·K_rr⁻¹·L_r; exact, N/m and N per error [m].
-
-    Own derivation, static condensation of liu2020's equations; theory page (19) to (21).
+    S = K_dd − K_dr·K_rr⁻¹·K_rd [N/m], F = L_d − K_dr·K_rr⁻¹·L_r, N per error [m]: theory page, equations (19) to (21),
+    exact as these stiffnesses do not depend on the errors; own derivation, static condensation of liu2020's equations.
 
     Examples
     --------

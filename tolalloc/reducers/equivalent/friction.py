@@ -43,6 +43,7 @@ class PlayOperator:
     """Friction before a spring: the torque outside and the one that the spring feels, theory page equation (72).
 
     The spring feels S where the torque is S + f(S) as it rises and S − f(S) as it falls; between the two nothing moves.
+    Exact wherever the torque only rises or only falls between two steps.
     """
 
     inside: Levels  # Torques S that the spring feels, ascending [N·m]
@@ -63,10 +64,7 @@ class PlayOperator:
         )
 
     def follow(self, path: AtSteps) -> AtSteps:
-        """Return what the spring feels at every step of a path, which starts where the torque has just risen.
-
-        Exact wherever the torque only rises or only falls between two steps.
-        """
+        """Return what the spring feels at every step of a path, which starts where the torque has just risen [N·m]."""
         low = _interpolated(path, self.rising, self.inside)
         high = _interpolated(path, self.falling, self.inside)
         felt = np.empty(path.shape)
@@ -83,7 +81,7 @@ def sliding_ways(reducer: Reducer, carrier_angle: AtAngles) -> Float[np.ndarray,
     A disc turns against the housing about its pole, which lies on the contact's normal. A pin that turns in its groove
     instead of staying there slides in the groove by the same way under the same force.
 
-    Own derivation, theory page (69): R_p·√S is the distance of pin and pole, S = 1 + K1² − 2K1·cos φ.
+    Theory page equation (69), own derivation: R_p·√S is the distance of pin and pole, S = 1 + K1² − 2K1·cos φ.
     """
     stage = reducer.cycloid_stage
     root = pole_distance(stage.shortening, angles_of_pins(reducer, carrier_angle))
@@ -102,7 +100,7 @@ def _bearing(reducer: Reducer, dimensions: FrictionDimensions, found: Forces, na
 
 
 def friction_torques(solved: Solved) -> dict[str, Curves]:
-    """Return the friction torque of every kind of contact that is known, theory page equation (70), (71) [N·m].
+    """Return the friction torque of every kind of contact that is known, theory page equations (70), (71) [N·m].
 
     It is that at the output: the coefficient times the sum of force times sliding way per radian of the output, the
     sun turning. Forces are those of the equilibria, which have no friction.
@@ -142,7 +140,7 @@ def _mesh(reducer: Reducer, found: Forces, own: Mesh, contact_ratio: float) -> C
 
 @dataclass(frozen=True, kw_only=True)
 class FrictionAtTorque:
-    """Friction of units under one torque, mean over the angles."""
+    """Friction of units under one torque, mean over the angles; theory page equation (70), contacts alone."""
 
     torque: float  # Torque on the carrier [N·m]
     by_contact: dict[str, Float[np.ndarray, " sample"]]  # Kind of contact → friction torque at the output [N·m]
@@ -160,14 +158,17 @@ class FrictionAtTorque:
 
     @property
     def efficiency(self) -> Float[np.ndarray, " sample"]:
-        """η = T/(T + T_f) of the contacts, of a reducer that drives its load [-]."""
+        """η = T/(T + T_f) of the contacts, of a reducer that drives its load, theory page equation (70) [-]."""
         size = abs(self.torque)
         return np.asarray(size / (size + self.friction_torque))
 
 
 @dataclass(frozen=True, kw_only=True)
 class FrictionLoop:
-    """Twist of the carrier from minus to plus the rated torque and back, the sun held, mean over the angles."""
+    """Twist of the carrier from minus to plus the rated torque and back, the sun held, mean over the angles.
+
+    Theory page equation (74) reads lost motion and hysteresis loss from it [rad].
+    """
 
     torque: Float[np.ndarray, " step"]  # Torques on the carrier, ascending and symmetrical about 0 [N·m]
     rising: Float[np.ndarray, "sample step"]  # Twist while the torque rises [rad]
@@ -192,7 +193,11 @@ class FrictionLoop:
 
 
 def friction_loop(model: EquivalentModel, errors: Errors, carrier_angle: AtAngles) -> FrictionLoop:
-    """Return the loop with friction at the carrier angles [rad]; own derivation, theory page (72) to (74)."""
+    """Return the loop with friction at the carrier angles [rad].
+
+    Theory page equations (72) to (74), own derivation: Coulomb's friction at forces of equilibria that have none, which
+    errs in second order of the loss; bearings, shafts and carrier yield without friction.
+    """
     if unknown := model.reducer.friction_dimensions.unknown:
         raise ValueError(f"{model.reducer.name}: no dimensions of {', '.join(unknown)}")
     levels = loop_torques(model.reducer, DRAWN)
@@ -249,9 +254,7 @@ def twist_of_friction(solved: list[Solved]) -> TwistOfFriction:
     Between two torques the forces that are added per added torque balance a torque of one. By virtual work they give
     the twist as the sum of force times way over all contacts, exactly, so that every kind of contact has its share.
 
-    Δθ = Σ (ΔF/ΔT)·Δway, exact; sliding f = µ·ΣF·|Δs|/Δθ.
-
-    Own derivation, theory page (73).
+    Δθ = Σ (ΔF/ΔT)·Δway [rad], exact; sliding f = µ·ΣF·|Δs|/Δθ [N·m], own derivation.
 
     Examples
     --------

@@ -168,9 +168,9 @@ def own_load_loop(
 
     A twist is not a number where it is not found.
 
-    A spring is displaced by F/K − w(F) along its force F, repeated until the twist changes by less than 1e-8 of it.
-
-    Own derivation, theory page (75).
+    A spring is displaced by F/K − w(F) [m] along its force F, theory page equation (75), own derivation, repeated until
+    the twist [rad] changes by less than 1e-8 of it; torques [N·m]. Without friction; it has no exact
+    derivatives.
 
     Examples
     --------

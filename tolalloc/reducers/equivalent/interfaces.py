@@ -72,7 +72,7 @@ def _tilt(part: str, **other: Any) -> ErrorSource:
 def sun_support(at: Positions) -> SpringGroup:
     """Return the two support springs of the sun gear, theory page equation (6).
 
-    ``sun.assembly`` is (a_SX, a_SY), fixed in the housing [m]; δ = Xs − a_SX, Ys − a_SY.
+    ``sun.assembly`` is (a_SX, a_SY), fixed in the housing [m]; δ = Xs − a_SX, Ys − a_SY [m], alike in every direction.
 
     References
     ----------
@@ -105,8 +105,8 @@ def gear_mesh(at: Positions) -> SpringGroup:
     ``sun.eccentricity`` and ``sun.pitch`` turn with the sun, ``planet{i}.eccentricity`` and ``planet{i}.pitch`` with
     the crankshaft; ``mesh{i}.deviation`` is what the pair adds along its line of action (tooth thickness) [m].
 
-    δ = n·(x_sun − x_planet) + r_b2·θp + errors along the line of action γ = P + π/2 − α [m]; involute teeth in mesh. A
-    sun on a centre gear, whose rotation is not given, adds r_b1·θs.
+    δ = n·(x_sun − x_planet) + r_b2·θp + errors along the line of action γ = P + π/2 − α [m], linear in both, involute
+    teeth in mesh. A sun on a centre gear, whose rotation is not given, adds r_b1·θs.
 
     References
     ----------
@@ -190,13 +190,13 @@ def _tilted(height: float, direction: AtAngles) -> Float[np.ndarray, "angle 2 2"
 
 
 def crank_disc(at: Positions) -> SpringGroup:
-    """Return two springs per crank journal and disc bore, theory page equations (8) and (9).
+    """Return two springs per crank journal and disc bore, theory page equations (8), (9) and (29).
 
     Journals turn with the crankshaft, bores with the disc, that is with the carrier angle:
-    ``crank{i}.journal{j}.eccentricity`` and ``disc{j}.bore{i}.position`` [m]. Angles [rad], equation (29):
+    ``crank{i}.journal{j}.eccentricity`` and ``disc{j}.bore{i}.position`` [m]. Angles [rad], tilts by equation (29):
     ``crank{i}.journal{j}.phase`` (the journal turned on its crankshaft), ``disc{j}.bores.rotation`` (the pattern of the
     bores against the teeth), ``crank{i}.tilt``, ``disc{j}.bore{i}.tilt`` and ``carrier.tilt``, the last fixed in the
-    housing as the carrier's assembly error is.
+    housing as the carrier's assembly error is. δ [m] is linear in errors and displacements.
 
     References
     ----------
@@ -256,7 +256,7 @@ def crank_carrier(at: Positions) -> SpringGroup:
 
     ``carrier.bore{i}.position`` turns with the carrier [m].
 
-    δ = x_planet − x_carrier + a_sp·θca·(sin P, −cos P) − error; any angle [m, rad].
+    δ = x_planet − x_carrier + a_sp·θca·(sin P, −cos P) − error [m], linear in both; at any carrier angle [rad].
 
     References
     ----------
@@ -296,7 +296,8 @@ CRANK_CARRIER = Interface(
 def carrier_support(at: Positions) -> SpringGroup:
     """Return the two springs of the carrier's bearing in the housing, theory page equation (12).
 
-    ``carrier.assembly`` is (a_cx, a_cy), fixed in the housing [m]; δ = Xca − a_cx, Yca − a_cy.
+    ``carrier.assembly`` is (a_cx, a_cy), fixed in the housing [m]; δ = Xca − a_cx, Yca − a_cy [m], alike in every
+    direction.
 
     References
     ----------
@@ -349,13 +350,13 @@ class PinContact:
 
 
 def pin_contact(at: Positions) -> PinContact:
-    """Return the contacts of all discs, theory page equations (13)–(18).
+    """Return the contacts of all discs, theory page equations (13) to (18), and (83) where parts have a form.
 
     A tooth reaches from one root to the next. Its number follows from the contact's place on the disc, so it is tracked
     through the whole turn; at a root, where it changes, a pitch deviation has no effect.
 
-    Compression δ = −g, g = n·(xd, yd) + r_d·θd·sin a + errors; good to 0.3 µm on the working flanks for errors up to
-    10 µm.
+    Compression δ = −g [m], g = n·(xd, yd) + r_d·θd·sin a + errors, linear; good to 0.3 µm on the working flanks for
+    errors up to 10 µm, not above 15 µm or for modifications above 50 µm.
 
     References
     ----------
@@ -401,7 +402,7 @@ def pin_contact(at: Positions) -> PinContact:
 def _by_form(
     at: Positions, pin_angle: Float[np.ndarray, "angle disc pin"], into: Normals
 ) -> Float[np.ndarray, "angle disc form pin"]:
-    """Return the compression by the form of flanks and pins, theory page (83) and (84), where there is one [m].
+    """Return the compression by the form of flanks and pins, theory page equations (83) and (84), if they have one [m].
 
     Along a disc φ goes on clockwise, by a turn from each pin to the next; a pin is touched at κ from the inward radius.
     """
@@ -423,7 +424,8 @@ def pin_terms(reducer: Reducer, orders: tuple[int, ...]) -> Terms:
     ``housing.pitch`` tangential. One pin k alone: ``each_pin.position.{k}`` with x radial and y tangential,
     ``each_pin.diameter.{k}``, ``each_pin.groove.{k}``.
 
-    Signs are an own derivation, theory page (17) and (18): the effective radius error of a pin is d_k − r_k − Δr_rp.
+    Signs are an own derivation, theory page equations (17) and (18): the effective radius error of a pin is
+    d_k − r_k − Δr_rp.
     """
     pins = reducer.cycloid_stage.pin_count
     radial, tangential, radius = (range(first, first + pins) for first in (0, pins, 2 * pins))
@@ -449,7 +451,8 @@ def flank_terms(reducer: Reducer) -> Terms:
     """Return the rotation amount of the modification, ``modification.rotation`` δ, as an arc at the pitch radius.
 
     Every flank is turned towards its tooth's middle by δ about the disc's centre, about which the normal of a pin has
-    the lever r_d·S. So a gap on either flank opens by δ·r_d·|S|, theory page (35), own derivation [rad].
+    the lever r_d·S. So a gap on either flank opens by δ·r_d·|S| [m], theory page equations (17) and (35), own
+    derivation, first order in δ [rad].
 
     Examples
     --------

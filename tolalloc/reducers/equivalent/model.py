@@ -309,8 +309,9 @@ class EquivalentModel:
     def peak_to_peak_derivatives(self, errors: Errors, torque: float) -> tuple[TurnExtremes, Derivatives]:
         """Return the extremes and the exact derivatives of the peak-to-peak.
 
-        Theory page, equation (23). They hold while both extremes stay at the same kinks of the curve: a derivative
-        is one-sided where another angle becomes the extreme, or another pin takes over, at just these errors.
+        Theory page, equation (23) [rad, rad/m]. They hold while both extremes stay at the same kinks of the curve: a
+        derivative is one-sided where another angle becomes the extreme, or another pin takes over, at just these
+        errors.
         """
         from tolalloc.reducers.equivalent.solvers.adjoint import solve_peak_to_peak_derivatives
 
@@ -330,7 +331,8 @@ class EquivalentModel:
 
         The torque is one for all samples or one for each.
 
-        They hold while the same pins touch; where one just touches or leaves, a derivative is one-sided.
+        Theory page, equation (23) [rad, rad/m]. They hold while the same pins touch; where one just touches or leaves,
+        a derivative is one-sided.
         """
         shape, at = (errors.shape[0], carrier_angle.size), np.arange(carrier_angle.size)
         none = np.zeros((shape[0], self.reducer.disc_count * self.reducer.cycloid_stage.pin_count))
@@ -344,8 +346,8 @@ class EquivalentModel:
     ) -> Derivatives:
         """Return the exact derivatives of Σ weight·force over the pins, of every sample at one of the carrier angles.
 
-        They hold while the same pins touch, as those of the rotation. A sample without an equilibrium there has zeros
-        and its status.
+        Theory page, equation (23) [N/m]; they hold while the same pins touch. A sample without an equilibrium there has
+        zeros and its status.
         """
         of_pins = weights.reshape(errors.shape[0], -1)
         return self._derivatives(self._value_derivatives(errors, torque, carrier_angle, at, 0.0, of_pins))

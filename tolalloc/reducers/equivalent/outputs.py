@@ -73,8 +73,8 @@ class Forces:
 def forces(equilibria: Equilibria) -> Forces:
     """Return the forces in all interfaces, NaN where nothing converged.
 
-    Stiffness times compression of every row, F = k·δ, theory page equation (5); pins by their law, equations (30) and
-    (31), elements with play by equation (28).
+    Stiffness times compression of every row, F = k·δ [N], theory page equation (5); pins by their law, equations (30)
+    and (31), elements with play by equation (28).
     """
     from tolalloc.reducers.equivalent.solvers.turn import solve_forces
 
@@ -354,7 +354,7 @@ def line_contact(equilibria: Equilibria, forces: Forces) -> LineContact:
 
     A tilt γ moves a tooth at height z by z·(γy, −γx) in the housing's plane; the tilt turns with the disc.
 
-    Slope γ = γ_y·n_x − γ_x·n_y [rad], own derivation, theory page (31).
+    Slope γ = γ_y·n_x − γ_x·n_y [rad], theory page equation (31), own derivation, first order in the tilt.
     """
     tables, layout = equilibria.tables, equilibria.columns.layout
     tilt = (equilibria.columns.matrix[layout.tilt : layout.end] @ equilibria.errors.T).T
@@ -387,7 +387,7 @@ def unit_pressure(equilibria: Equilibria) -> Float[np.ndarray, "angle disc pin"]
 def angles_of_pins(reducer: Reducer, carrier_angle: AtAngles) -> Float[np.ndarray, "angle disc pin"]:
     """Return the angle of every pin from the crank direction of every disc [rad].
 
-    φ_k − β_j, theory page (2) and (13), own derivation.
+    φ_k − β_j, theory page equations (2) and (13), own derivation.
     """
     crank, apart = -reducer.cycloid_stage.disc_teeth * carrier_angle, 2.0 * np.pi / reducer.disc_count
     discs = range(reducer.disc_count)
@@ -430,7 +430,7 @@ def contact_pattern(
 
     References
     ----------
-    Own derivation, theory page (31) and (60); Hertz's line contact for the pressure.
+    Theory page equations (31) and (60), own derivation; Hertz's line contact for the pressure. Linear laws alone.
     """
     reducer, law = model.reducer, model.reducer.stiffness.pin_contact_law
     if not 1 <= disc <= reducer.disc_count:
@@ -477,7 +477,7 @@ def attribute(model: EquivalentModel, errors: OneUnit, torque: float, orders: Or
     """Return what every source of one unit [m, angles rad] adds to its transmission error and to each order.
 
     Theory page, equation (32). All gaps, clearances and the torque scaled together scale the transmission error, as
-    long as the contact law is linear, so Euler's theorem splits it into deviation times derivative. The split holds for
+    long as the contact law is linear, so Euler's theorem splits it [rad] into deviation times derivative. It holds for
     this unit: with other errors other pins carry, and a source's share changes. Under the logarithmic law the part that
     is not proportional is listed by itself. Angles and orders are those of `turn_orders` where its orders are given,
     else those of the model's search and all below half of them.

@@ -116,7 +116,7 @@ class _Curves:
         return np.asarray(-np.linalg.solve(tangent, gradient[..., np.newaxis])[..., 0])
 
     def slopes(self, centre: AtVariables, half: AtVariables) -> Rotated:
-        """Return the least and the largest derivative of the rotation in a box, not finite where none is known.
+        """Return least and largest derivative of the rotation in a box, infinite where unknown [rad per variable].
 
         Theory page, equation (105). While every compression stays within ρ of that at the centre, the stiffness of its
         contact stays between two values, and so does what it can have moved by; a ρ that this does not exceed is one

@@ -65,7 +65,8 @@ def preload(model: EquivalentModel, errors: Errors) -> Preload:
     A disc turns against the housing about its pole, so at a pin it slides with the output speed times the distance of
     contact and pole, R_p·√S − r_rp; friction torque µ·ΣF·(R_p·√S − r_rp).
 
-    Own derivation, theory page (69); µ of the reducer's file, 0.05 unless stated, is assumed.
+    Theory page equation (69), own derivation, at 23 angles of the turn [N, N·m]; µ of the reducer's file, 0.05 unless
+    stated, is assumed.
 
     Examples
     --------
@@ -101,8 +102,8 @@ Derived = tuple[Float[np.ndarray, " sample"], Float[np.ndarray, "sample column"]
 def pin_force_derivatives(model: EquivalentModel, errors: Errors) -> Derived:
     """Return the largest pin force without torque [N] and its derivatives [N/m].
 
-    Those of that pin's force at that angle, own derivation, theory page (23): the adjoint of the equilibrium with the
-    force in place of the rotation. They hold while the same pins touch and the same one is pressed most.
+    Those of that pin's force at that angle, theory page equation (23), own derivation: the adjoint of the equilibrium
+    with the force in place of the rotation. They hold while the same pins touch and the same one is pressed most.
     """
     solved = _without_torque(model, errors)
     pins = solved.forces.pins
@@ -159,9 +160,8 @@ def twist_shares(reducer: Reducer) -> tuple[TwistShare, ...]:
     By virtual work T·θ is the sum of force times way over all springs, each interface divided among its parts by their
     compliances; what is left is that of pins and teeth, their clearance included. Mean over a pin pitch.
 
-    T·θ = Σ F²/K over all springs, K of parts in series shared as 1/K_part; at rated torque, shares of 1.
-
-    Own derivation, theory page (68).
+    T·θ = Σ F²/K [N·m] over all springs, K of parts in series shared as 1/K_part; theory page equation (68), own
+    derivation, of stiffnesses as they are at rated torque.
 
     Examples
     --------

@@ -39,7 +39,7 @@ class Resonance:
     ratio: float  # Turns of the input per turn of the output [-]
 
     def input_speed(self, order: float) -> float:
-        """Return the speed of the input at which waves per output turn come at the frequency [rpm]."""
+        """Return the speed of the input at which waves per output turn meet it, theory page equation (108) [rpm]."""
         return abs(self.ratio) * 2 * pi * self.frequency / order / RPM
 
     def met(self, orders: Iterable[float], fastest: float) -> dict[float, float]:
@@ -51,8 +51,9 @@ class Resonance:
 def resonance_of(reducer: Reducer, torque: float, inertia: float) -> Resonance:
     """Return the first resonance of an inertia at the output [kg·m²] under a torque on the carrier [N·m].
 
-    f = √(k/J)/(2π) with k = ΔT/Δθ of exact parts, 2 % about the torque, so that play is closed and any contact law has
-    a stiffness; own derivation. Masses inside are left out: they are small beside an inertia that matters.
+    f = √(k/J)/(2π) [Hz], theory page equation (108), own derivation, k = ΔT/Δθ of exact parts, 2 % about the torque, so
+    that play is closed and any contact law has a stiffness. The input is held; masses inside are left out: they are
+    small beside an inertia that matters.
 
     Raises
     ------

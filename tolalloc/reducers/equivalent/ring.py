@@ -20,7 +20,8 @@ def ring_motion(at: Positions) -> Float[np.ndarray, "angle disc 2 way"]:
     """Return how far the ring goes at the pins of every disc, x and y, per way that it has [m/m or m/rad].
 
     w_j = u + (θ + t·τ)·ẑ×p_j + z_j·τ with the pole p_j = e·zp(cos β_j, sin β_j), the height z_j of the disc, the tilt τ
-    and the turn t per tilt, each along and across the housing's direction; own derivation, theory page (106).
+    and the turn t per tilt, each along and across the housing's direction; theory page equation (106), own derivation,
+    for a rigid ring and small motions.
     """
     stage, housing, discs = at.reducer.cycloid_stage, at.reducer.housing, range(at.reducer.disc_count)
     cosine, sine = np.cos(housing.direction), np.sin(housing.direction)
@@ -43,7 +44,10 @@ def ring_motion(at: Positions) -> Float[np.ndarray, "angle disc 2 way"]:
 
 
 def on_ring(groups: list[SpringGroup], at: Positions) -> list[SpringGroup]:
-    """Return spring groups whose discs are where the ring is and where they are against it, x_j + w_j."""
+    """Return spring groups whose discs are where the ring is and where they are on it, x_j + w_j.
+
+    Theory page equation (106), linear: displacements of the rows [m/m or m/rad] gain those of the ring.
+    """
     coordinates, moved = at.coordinates, ring_motion(at)
     first = coordinates.count - len(coordinates.ring)
     found = []
@@ -59,7 +63,7 @@ def on_ring(groups: list[SpringGroup], at: Positions) -> list[SpringGroup]:
 def ring_supports(at: Positions) -> list[SpringGroup]:
     """Return what holds the ring, one spring for each way that it has, at the pin circle where it is an angle.
 
-    δ = u, R_p·θ, R_p·τ [m]; own derivation, theory page (107).
+    δ = u, R_p·θ, R_p·τ [m], theory page equation (107), own derivation; the ring is rigid, K [N/m] its mounting's.
 
     Examples
     --------

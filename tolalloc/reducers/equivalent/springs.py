@@ -76,7 +76,8 @@ class Coordinates:
 class Positions:
     """Directions of all parts of a reducer at the given carrier angles.
 
-    Theory page, equations (1)–(4). Counts start at 0 here and at 1 in names.
+    Theory page, equations (1) to (4), exact for the nominal motion of parts without errors. Counts start at 0 here and
+    at 1 in names.
     """
 
     reducer: Reducer  # The nominal design
@@ -91,29 +92,29 @@ class Positions:
 
     @cached_property
     def crank_angle(self) -> AtAngles:
-        """β = −zc·θc [rad]."""
+        """β = −zc·θc, theory page equation (1) [rad]."""
         return -self.reducer.cycloid_stage.disc_teeth * self.carrier_angle
 
     def disc_direction(self, disc: int) -> AtAngles:
-        """β_j = β + ψ_j, the direction of a disc's centre [rad]."""
+        """β_j = β + ψ_j, the direction of a disc's centre, theory page equation (2) [rad]."""
         return self.crank_angle + 2 * np.pi * disc / self.reducer.disc_count
 
     def crank_position(self, crank: int) -> AtAngles:
-        """P_i = θc + φ_i, the direction on the carrier of a crank axis, or of what else drives it [rad]."""
+        """P_i = θc + φ_i, direction of a crank axis or what else drives the carrier, theory page equation (3) [rad]."""
         return self.carrier_angle + 2 * np.pi * crank / self.reducer.drive_count
 
     def plane(self, disc: int) -> float:
-        """z_j − z_0, height of a disc's middle plane above the middle of all discs [m]."""
+        """z_j − z_0 of theory page equation (29), height of a disc's middle plane above the middle of all discs [m]."""
         return (disc - (self.reducer.disc_count - 1) / 2) * self.reducer.cycloid_stage.disc_spacing
 
     @cached_property
     def sun_angle(self) -> AtAngles:
-        """θs = i·θc, i the turns of the sun per turn of the carrier [rad]."""
+        """θs = i·θc, i the turns of the sun per turn of the carrier, theory page equation (4) [rad]."""
         return self.reducer.sun_ratio * self.carrier_angle
 
     @cached_property
     def pinion_angle(self) -> AtAngles:
-        """θ of the shaft of the motor, which a pinion on it has [rad]."""
+        """θ of the shaft of the motor, which a pinion on it has, theory page equation (100) [rad]."""
         return self.reducer.ratio * self.carrier_angle
 
     @cached_property
@@ -127,8 +128,9 @@ class Positions:
 class SpringGroup:
     """Spring rows of one kind of interface at a batch of carrier angles.
 
-    The energy is ½Σk·δ², with δ₊ for unilateral rows and (|δ| − c)₊ for elements with play, theory page equations (5)
-    and (28): convex in every case, so the stiffness matrix is symmetric by construction.
+    The energy is ½Σk·δ² [N·m], with δ₊ for unilateral rows and (|δ| − c)₊ for elements with play, theory page equations
+    (5) and (28): convex in every case, so the stiffness matrix is symmetric by construction. δ is linear in coordinates
+    and errors, for displacements that are small beside the radii.
     """
 
     name: str  # What the springs stand for
@@ -155,7 +157,8 @@ class SpringGroup:
 def with_play(group: SpringGroup, clearance: float, elements: tuple[str, ...]) -> SpringGroup:
     """Return the group with a clearance [m] in each of its elements; unchanged where there is none.
 
-    Energy ½k·max(0, |δ| − c)², own derivation, theory page (28); convex for c ≥ 0.
+    Energy ½k·max(0, |δ| − c)² [N·m], theory page equation (28), own derivation; convex for c ≥ 0: solvers count a
+    clearance that its deviations make negative as 0.
 
     Examples
     --------

@@ -51,7 +51,7 @@ class _Step:
 class Wear:
     """What a duty cycle has taken off the flanks of all discs and off the pins, of the reducer with exact parts.
 
-    Flanks are common to all units; the pins of a unit wear by its own forces, `aged`.
+    Theory page equations (97) to (99). Flanks are common to all units; a unit's pins wear by its own forces, `aged`.
     """
 
     hours: float  # [h]
@@ -66,8 +66,8 @@ class Wear:
     def aged(self, model: EquivalentModel, errors: Errors) -> Errors:
         """Return the errors of units whose pins are worn by the units' own forces [m].
 
-        Every pin loses on its radius what (99) says of the forces at the angles of an output turn, step by step with
-        the flanks of that step; NaN where a unit has no equilibrium.
+        Every pin loses on its radius what theory page equation (99) says of the forces at the angles of an output turn,
+        step by step with the flanks of that step; pins stay round (assumed). NaN where a unit has no equilibrium.
         """
         pins = range(1, model.reducer.cycloid_stage.pin_count + 1)
         columns = [model.columns.index(f"each_pin.diameter.{pin}") for pin in pins]
@@ -96,12 +96,12 @@ class Wear:
 def flank_depth_per_force(reducer: Reducer, angle: Float[np.ndarray, "*angles"]) -> Float[np.ndarray, "*angles"]:
     """Return what one pass of a pin takes off a flank at φ over the force that it has there [m/N].
 
-    k/b·|1 − r_rp/(R_p·√S)|/(1 + r_rp·κ): Archard's k·p·s with the time that the contact needs to pass the point; how
-    the pressure is spread over the contact does not matter.
+    k/b·|1 − r_rp/(R_p·√S)|/(1 + r_rp·κ), φ [rad]: Archard's k·p·s with the time that the contact needs to pass the
+    point; how the pressure is spread over the contact does not matter.
 
     References
     ----------
-    Archard (1953) for k·F·s; own derivation, theory page (97).
+    Theory page equation (97): Archard (1953) for k·F·s; own derivation.
 
     Examples
     --------
@@ -123,7 +123,7 @@ def pin_depth_per_work(reducer: Reducer) -> float:
 
     References
     ----------
-    Archard (1953); own derivation, theory page (99).
+    Theory page equation (99): Archard (1953); own derivation.
     """
     stage = reducer.cycloid_stage
     area = 2.0 * pi * stage.pin_radius * stage.face_width * reducer.disc_count
@@ -141,7 +141,8 @@ def wear_of(
 ) -> Wear:
     """Return the wear of a reducer with exact parts over hours of a duty cycle.
 
-    Forces follow from the parts as they are worn, in steps of the midpoint rule.
+    Theory page equations (97) to (99). Forces follow from the parts as they are worn, in steps of the midpoint rule; k
+    is constant, and uncertain by powers of ten.
 
     Parameters
     ----------

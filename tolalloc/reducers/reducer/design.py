@@ -115,7 +115,7 @@ def thermal_shift(stage: CycloidStage, warmer: float) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Modification:
-    """Tooth modification of the disc; positive equidistant and rotation amounts remove material, theory page (34)."""
+    """Modification of the disc's teeth, theory page equation (34); positive Δr_rp and δ remove material."""
 
     equidistant: float  # Δr_rp: the grinding pin radius is r_rp + Δr_rp [m]
     shift: float  # Δr_p: the pin circle radius at grinding is Rp + Δr_p [m]
@@ -157,7 +157,8 @@ class Modification:
 
         F = Δr_rp − q·Δr_p + δ·r_d is the whole clearance of the flank, J = Δr_rp − Δr_p that at tip and root, which
         turned flanks do not change, and R = δ·r_d the rotation clearance, a part of F. So each may be chosen without
-        the others: Δr_p = (F − R − J)/(1 − q), Δr_rp = J + Δr_p, δ = R/r_d; theory page (34), own derivation.
+        the others: Δr_p = (F − R − J)/(1 − q), Δr_rp = J + Δr_p, δ = R/r_d; theory page equation (35) at φ0 and tip,
+        own derivation, first order in the amounts.
         """
         shift = (flank - rotation - radial) / (1 - stage.flank_ratio)
         return cls(equidistant=radial + shift, shift=shift, rotation=rotation / stage.disc_pitch_radius)
@@ -344,12 +345,12 @@ class Reducer:
 
     @property
     def ratio(self) -> float:
-        """Turns of the motor's shaft per turn of the carrier, the pin housing fixed [-]."""
+        """Turns of the motor's shaft per turn of the carrier, the pin housing fixed, theory page equation (4) [-]."""
         return self.sun_ratio
 
     @property
     def sun_ratio(self) -> float:
-        """Turns of the sun per turn of the carrier, the pin housing fixed, 1 + (Z2/Z1)·zp [-]."""
+        """Turns of the sun per turn of the carrier, housing fixed, 1 + (Z2/Z1)·zp, theory page equation (4) [-]."""
         return 1.0 + self.gears.planet_teeth / self.gears.sun_teeth * self.cycloid_stage.pin_count
 
     @property
@@ -408,16 +409,16 @@ class Reducer:
 
 
 def interface_forces(reducer: Reducer, torque: float) -> dict[str, float]:
-    """Return the mean force in each interface under a torque on the carrier by statics alone [N].
+    """Return the mean force in each interface [N] under a torque on the carrier [N·m] by statics alone.
 
     Without part errors: each crank holds its part of the torque against the carrier and a share of that against every
     disc, beside its share of the disc's pin forces, T/(e·zp) across the crank direction, which turn against it. The
     first stage carries the torque over the ratio; the carrier bearing holds none.
 
     Crank–carrier T/(n_c·a_sp); crank–disc the mean over φ of |T/(n_c·n_d·a_sp) + e^(iφ)·T/(n_c·n_d·e·zp)|; mesh
-    T/(i·n_c·r_b1), that of a centre gear T/(i·r_b4), i that of the sun. Units N, N·m, m; 3 to 4 % above the mean.
+    T/(i·n_c·r_b1), that of a centre gear T/(i·r_b4), i that of the sun; T [N·m], 3 to 4 % above the solved mean.
 
-    Own derivation, statics; theory page (66).
+    Theory page equation (66), own derivation: statics of exact parts.
 
     Examples
     --------
@@ -440,10 +441,10 @@ def interface_forces(reducer: Reducer, torque: float) -> dict[str, float]:
 
 
 def compliances(reducer: Reducer, torque: float) -> dict[str, dict[str, float]]:
-    """Return what every part yields by interface, at the forces of a torque on the carrier [m/N].
+    """Return what every part yields by interface [m/N], at the forces of a torque on the carrier [N·m].
 
-    Own derivation, theory page (67): secants w(F)/F at the forces of `interface_forces`; below 0.1 % of the rated
-    torque those at 0.1 %.
+    Theory page equation (67), own derivation: secants w(F)/F at the forces of `interface_forces`; below 0.1 % of the
+    rated torque those at 0.1 %.
 
     Examples
     --------
@@ -467,7 +468,7 @@ def compliances(reducer: Reducer, torque: float) -> dict[str, dict[str, float]]:
 def at_torque(reducer: Reducer, torque: float) -> Reducer:
     """Return the reducer with the secant stiffness of its parts at the forces of a torque on the carrier [N·m].
 
-    Own derivation, theory page (67): parts in series, 1/K = Σ 1/K_part.
+    Theory page equation (67), own derivation: parts in series, 1/K = Σ 1/K_part [m/N].
 
     Examples
     --------

@@ -52,7 +52,8 @@ class FlankForm:
     """Deviation of a disc's flanks from the theoretical profile along its normal, outward positive, over φ.
 
     φ is the angle of the pin that grinds the point, 0 in the middle of a tooth space and ±π at the tips beside it. It
-    goes on clockwise from space to space, so a whole disc is one function of a period of 2π times its spaces.
+    goes on clockwise from space to space, so a whole disc is one function of a period of 2π times its spaces: u of
+    theory page equation (83), first order, as a pin feels it where it touches the perfect disc.
     """
 
     spaces: int  # Tooth spaces after which the form repeats: 1 if all are alike, else the teeth of the disc [-]
@@ -126,7 +127,8 @@ def flank_form(angle: Points, deviation: Points, spaces: int, spans: int | None,
 class PinForm:
     """Roundness of a pin that does not turn in its groove: waves of its radius around it.
 
-    They count counter-clockwise from the direction towards the middle of the ring, where the discs touch it.
+    Theory page equation (84); they count counter-clockwise from the direction towards the middle of the ring, where the
+    discs touch it.
     """
 
     waves: tuple[tuple[int, float, float], ...]  # Order n, amplitudes of cos and sin [-, m, m]
@@ -141,7 +143,7 @@ class PinForm:
 
 @dataclass(frozen=True, kw_only=True)
 class PartForm:
-    """Form of the parts of a reducer beyond the amounts of its modification, theory page (83) and (84)."""
+    """Form of the parts of a reducer beyond the amounts of its modification, theory page equations (83) and (84)."""
 
     designed: FlankForm | None = None  # Of all discs, by their drawing
     # Number of a disc or pin, from 0 → what it has beyond its drawing

@@ -23,8 +23,8 @@ _LUBRICATION = {"crank_disc_bearing": 12.0, "crank_carrier_bearing": 6.0, "carri
 class IdleTorque:
     """What turns a reducer without load beside its contacts, at the output [N·m].
 
-    One lip around the output at the pitch diameter of the carrier bearing, T = µ·q·π·d²/2, own derivation; grease in
-    the bearings by Palmgren, theory page equation (78); the preload of the bearings' rollers by µ·F·d/2. All are turned
+    Theory page equation (78): one lip around the output at the pitch diameter of the carrier bearing, T = µ·q·π·d²/2,
+    own derivation; grease in the bearings by Palmgren; the preload of the bearings' rollers by µ·F·d/2. All are turned
     by virtual work to the output, as cranks turn zp times as fast. A seal at the input is the motor's; churning of
     gears and discs is left out. Coefficients, viscosity and the lip's force are assumptions.
     """
@@ -92,10 +92,10 @@ def _seal_torque(diameter: float) -> float:
 
 
 def grease_torque(factor: float, bearing: RollingBearing, speed: float) -> float:
-    """Return the torque of a bearing row that no load decides, f0·10⁻¹⁰·(ν·n)^(2/3)·d_m³, theory page (78) [N·m].
+    """Return the torque of a bearing row that no load decides, f0·10⁻¹⁰·(ν·n)^(2/3)·d_m³ [N·m].
 
-    With d_m in mm, ν = 100 mm²/s assumed and n of one ring against the other in 1/min; below ν·n = 2000 the power is
-    160.
+    Theory page equation (78) with d_m in mm, ν = 100 mm²/s assumed and n of one ring against the other [1/min]; below
+    ν·n = 2000 the power is 160.
 
     References
     ----------

@@ -356,8 +356,8 @@ class Crankshaft:
         """Return what bending adds at each journal alone, and what all journals share [m/N].
 
         With f11 of a journal under its own force and f12 under another's, journal 1 moves by (f11 − f12)F1 +
-        f12(F1 + F2): a spring of its own in series with the journal's bearing, and one in series with those in the
-        carrier. Exact for two journals; of three, the means.
+        f12(F1 + F2), theory page equation (67): a spring of its own in series with the journal's bearing, and one in
+        series with those in the carrier. Exact for two journals; of three, the means. Spacing [m].
         """
         places = self.span / 2.0 + spacing * (np.arange(discs) - (discs - 1) / 2.0)
         if places[0] <= 0.0:

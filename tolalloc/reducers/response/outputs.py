@@ -341,7 +341,7 @@ def output_derivatives(
     What is read off torque against twist takes two to four times as long as the output alone, the adjoint of the
     equilibrium at every angle and torque; what presses without torque hardly longer, one adjoint.
 
-    Own derivation, theory page (23): the width of a loop is θ(T) − θ(−T), its derivative the difference of the
+    Theory page equation (23), own derivation: the width of a loop is θ(T) − θ(−T), its derivative the difference of the
     adjoints'; of K = 2·0.97·T/(w₁ − w₃) [N·m/arcmin] it is −K/(w₁ − w₃)·∂(w₁ − w₃). They hold while the same pins
     carry.
     """

@@ -81,7 +81,8 @@ class DatumFlowChain:
     def transform(self) -> Float[np.ndarray, "state error"]:
         """M: orientations against the datum, in its axes, per error of the parts in their own axes [rad/rad].
 
-        zhang2025's differential rotation vectors: d_i = Σ R_a θ_a over the part itself and all that it stands on.
+        zhang2025's differential rotation vectors, theory page equation (54): d_i = Σ R_a θ_a over the part itself and
+        all that it stands on; first order, `finite` is exact.
         """
         return _from_blocks(self.carries, np.broadcast_to(self.axes, (len(self.parts), *self.axes.shape)))
 
@@ -89,7 +90,8 @@ class DatumFlowChain:
     def twist_transform(self) -> Float[np.ndarray, "state error"]:
         """The same for twists, three rotations before three displacements of a part's axis [rad, m per rad, m].
 
-        A rotation R_a θ_a of part a moves the axis of part i by R_a θ_a × (p_i − p_a).
+        A rotation R_a θ_a of part a moves the axis of part i by R_a θ_a × (p_i − p_a); theory page equation (54), first
+        order.
         """
         count = len(self.parts)
         position = np.array([part.position for part in self.parts])

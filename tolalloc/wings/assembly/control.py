@@ -29,6 +29,7 @@ class Regulator:
 def regulator(space: StateSpace, final_weight: Float[np.ndarray, "state state"]) -> Regulator:
     """Return the adjustments that minimise xᵀQx of the final errors, Q the final weight, plus the sum of uᵀRu.
 
+    Theory page equation (56), errors and adjustments [rad].
     zhang2025's K = R⁻¹BᵀP[I + BR⁻¹BᵀP]⁻¹ equals (R + BᵀPB)⁻¹BᵀP, a symmetric positive definite system, and
     P = (I − BK)ᵀP(I − BK) + KᵀRK stays positive where P falls by many orders in one step. Where a later step cannot
     reach every state, gains lose digits as Q/R grows, 1e-16·Q/R of them: far beyond 1e8 take `limiting_regulator`.
@@ -46,9 +47,9 @@ def regulator(space: StateSpace, final_weight: Float[np.ndarray, "state state"])
 
 
 def limiting_regulator(space: StateSpace, final_weight: Float[np.ndarray, "state state"]) -> Regulator:
-    """Return the limit of the regulator as its final weight, of which only ratios matter, grows without bound.
+    """Return the limit of theory page equation (56) as its final weight, of which only ratios matter, grows unbounded.
 
-    Its cost to go is the effort alone, the least with which the errors fall as far as they can.
+    Gains [rad/rad]. Its cost to go is the effort alone, the least with which the errors fall as far as they can.
 
     The adjustments of all remaining steps, each times √R, tend to the shortest least-squares solution: a
     pseudoinverse, so that no large number has to stand for infinity.
@@ -85,8 +86,8 @@ def kalman_filter(
 ) -> KalmanFilter:
     """Return the best linear estimator of the state from all readings so far.
 
-    Variances are those of every part error [rad²]; noise is the standard deviation of one reading, and of what an
-    adjustment misses, per axis and step [rad].
+    Theory page equation (57), linear, with Joseph's form. Variances are those of every part error [rad²]; noise is the
+    standard deviation of one reading, and of what an adjustment misses, per axis and step [rad].
     """
     identity = np.eye(space.states)
     gains, covariances = list[Float[np.ndarray, "state reading"]](), list[Float[np.ndarray, "state state"]]()

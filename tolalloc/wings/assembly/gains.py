@@ -57,7 +57,10 @@ class FinalErrors:
 def final_errors(
     space: StateSpace, adjusting: Regulator, kalman: KalmanFilter, measurement_noise: float, adjustment_noise: float
 ) -> FinalErrors:
-    """Return how final state and adjustments follow from part errors and noise, with any gains [noise rad]."""
+    """Return how final state and adjustments follow from part errors and noise, with any gains.
+
+    Theory page equation (58), exact for the linear system and gains that stay as they are; noise [rad], maps [rad/rad].
+    """
     # One assembly for each random number, with that number at one and all others at zero.
     deviations = (np.ones(space.entering.shape[2]), measurement_noise, adjustment_noise)
     assemblies = drawn(space, adjusting, kalman, deviations, np.eye(random_numbers(space)))

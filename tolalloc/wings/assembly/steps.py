@@ -112,10 +112,10 @@ class StateSpace:
 def state_space(
     chain: DatumFlowChain, steps: Sequence[AssemblyStep], transform: Float[np.ndarray, "state error"] | None = None
 ) -> StateSpace:
-    """Return the linear system of an assembly.
+    """Return the linear system of an assembly, theory page equation (55) [rad/rad].
 
-    The transform is `DatumFlowChain.transform` unless given, or `DatumFlowChain.twist_transform` for six coordinates a
-    part.
+    First order in the angles. The transform is `DatumFlowChain.transform` unless given, or
+    `DatumFlowChain.twist_transform` for six coordinates a part.
     """
     whole = chain.transform if transform is None else transform
     size = whole.shape[0] // len(chain.parts)

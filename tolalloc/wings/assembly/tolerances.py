@@ -78,9 +78,10 @@ def angular_limits(plan: AssemblyPlan) -> AngularLimits:
 def angular_problem(plan: AssemblyPlan, errors: FinalErrors) -> AllocationProblem:
     """Return the allocation with tolerances and stacks in arcseconds, for the gains of given final errors.
 
-    With fixed gains nine times a final variance is Σ a_i·t_i² + 9ν, so it stays below T² where ‖√a∘t‖ ≤ √(T² − 9ν).
-    The priced effort is affine in t² too: a quality loss and a constant, which is left out. Where the noise alone
-    exceeds a limit the budget is negative, as no tolerance keeps it.
+    With fixed gains nine times a final variance is Σ a_i·t_i² + 9ν, theory page equation (59), for t = 3σ of
+    independent part errors [arcsec], so it stays below T² where ‖√a∘t‖ ≤ √(T² − 9ν). The priced effort is affine in t²
+    too: a quality loss and a constant, which is left out. Where the noise alone exceeds a limit the budget is negative,
+    as no tolerance keeps it.
     """
     requirements, limits = requirements_of(plan), angular_limits(plan)
     left = limits.values**2 - limits.noise(errors) ** 2

@@ -80,7 +80,7 @@ class Information:
 
         Bounds enter as a prior with the variance of an even distribution between them, (upper − lower)²/12, so a
         coordinate of which the readings say nothing has that variance and no more. Where readings say much, it is the
-        inverse of their information. Theory page, equation (40).
+        inverse of their information. Theory page, equation (40), to first order around the least.
         """
         bounds = np.diag(12.0 / (self.upper - self.lower) ** 2)
         return np.asarray(np.linalg.inv(self.matrix + bounds))
@@ -119,7 +119,7 @@ def information(
 ) -> Information:
     """Return what the readings say around a point, given what should have been read there.
 
-    Theory page, equation (39).
+    Theory page, equation (39) [-], over the variance factor and with the prior deviations of (40); first order.
     """
     readings, freedom = problem.data.measured.size, problem.freedom
     slopes, left = problem.jacobian(prediction), problem.residuals(prediction, coordinates)[:readings]

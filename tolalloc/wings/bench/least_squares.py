@@ -21,7 +21,8 @@ _STEPS = 40
 class IdentificationProblem:
     """Half the sum of squares of all residuals over their noise, and of the coordinates over their prior deviation.
 
-    liu2020, equations (15)–(16), with weights. Theory page, equation (38).
+    liu2020, equations (15)–(16), with weights. Theory page, equation (38) [-], for noise that is independent from
+    reading to reading.
     """
 
     parameters: tuple[Parameter, ...]  # The unknowns

@@ -96,7 +96,7 @@ def profile(
     The noise of the problem is widened by the variance factor, and a surrogate should predict. What was found to first
     order says where to look, and the threshold.
 
-    Theory page, equation (41).
+    Theory page, equation (41), coordinates and rise [-]: needs no parabola, but normal noise.
     """
     lower, upper, middle = float(problem.lower[place]), float(problem.upper[place]), float(best[place])
     reach = NEAR * float(np.sqrt(found.covariance[place, place]))
@@ -230,7 +230,8 @@ class ParameterChoice:
 def judged(problem: IdentificationProblem, surrogate: Surrogate, parameters: Sequence[Parameter]) -> ParameterChoice:
     """Return how well a choice of parameters predicts units that it has not seen; the rest keeps the reducer's value.
 
-    The surrogate holds polynomials of at least these parameters.
+    The surrogate holds polynomials of at least these parameters. What a fit leaves [rad] is compared by theory page
+    equation (42), `simplest`.
     """
     own = tuple(parameters)
     asked, data = problem.of(own, replace(surrogate, parameters=own)), problem.data
@@ -257,7 +258,8 @@ def _left(problem: IdentificationProblem, coordinates: Float[np.ndarray, " param
 def simplest(choices: Sequence[ParameterChoice]) -> ParameterChoice:
     """Return the choice with the fewest parameters that is as good as the best within a standard error.
 
-    Differences of squared residuals are taken unit by unit, so what all choices of the same data share cancels.
+    Theory page equation (42) [-]: differences of squared residuals are taken unit by unit, so what all choices of the
+    same data share cancels.
     """
     best = min(choices, key=lambda item: item.score)
     good = []

@@ -63,12 +63,12 @@ def has_half_turn(reducer: Reducer, columns: Sequence[str]) -> bool:
 def half_turn(columns: Sequence[str], reducer: Reducer) -> Float[np.ndarray, "column column"]:
     """Return the matrix that takes a unit's columns to those of its twin [-].
 
-    Vectors change sign. Tilts act by their height above the middle between the discs: the discs are exchanged, so
-    height and vector both change sign and a tilt keeps its own. Pin k becomes pin k + zp/2, its place counted from its
-    own radius; a wave of order h along the ring of pins or around a gear lags by hπ. A disc's own angle counts from a
-    tooth, and half a turn is half a tooth off: tooth t of disc 1 becomes tooth t + (zc + 1)/2 of disc 2, of disc 2
-    tooth t + (zc − 1)/2 of disc 1, their waves lag by hπ(1 ± 1/zc), and two half turns are none. Sizes stay as they
-    are.
+    Theory page equation (50), for two discs, two cranks and an even number of pins. Vectors change sign. Tilts act by
+    their height above the middle between the discs: the discs are exchanged, so height and vector both change sign and
+    a tilt keeps its own. Pin k becomes pin k + zp/2, its place counted from its own radius; a wave of order h along the
+    ring of pins or around a gear lags by hπ. A disc's own angle counts from a tooth, and half a turn is half a tooth
+    off: tooth t of disc 1 becomes tooth t + (zc + 1)/2 of disc 2, of disc 2 tooth t + (zc − 1)/2 of disc 1, their waves
+    lag by hπ(1 ± 1/zc), and two half turns are none. Sizes stay as they are.
     """
     where = {name: at for at, name in enumerate(columns)}
     matrix = np.zeros((len(columns), len(columns)))
@@ -121,7 +121,8 @@ def _drawings(problem: CurveProblem, generator: np.random.Generator) -> LogDensi
 def reductions(problem: CurveProblem, deviations: Float[np.ndarray, "unit column"]) -> Float[np.ndarray, "unit source"]:
     """Return by how much each unit's peak-to-peak falls when one source is put in the middle of its zone [arcsec].
 
-    The readings of the problem play no part.
+    Theory page equation (49), whose greatest is the dominant source, for one source at a time. The readings of the
+    problem play no part.
     """
     owner, middle = np.array(problem.errors.source_of_column), problem.deviations(np.zeros((1, problem.size)))
     names = list(dict.fromkeys(problem.errors.source_of_column))

@@ -54,7 +54,7 @@ class CaseLoads:
 
     @property
     def efficiency(self) -> float:
-        """Overall η = T/(T + T_f), seals and grease included, of a reducer that drives its load [-]."""
+        """Overall η = T/(T + T_f) with seals and grease, of a drive of its load, theory page equation (70) [-]."""
         torque = abs(self.case.torque or 0.0)
         return torque / (torque + self.friction_torque)
 
@@ -92,13 +92,13 @@ class DutyResult:
 
     @property
     def catalogue_life(self) -> float:
-        """Life by the makers' formula, 6,000 h·(15 rpm/n_m)·(T_0/T_m)^(10/3) [h]."""
+        """Life by the makers' formula, 6,000 h·(15 rpm/n_m)·(T_0/T_m)^(10/3), theory page equation (94) [h]."""
         rated = self.reducer.load.rated_torque
         return float(RATED_LIFE * RATED_SPEED / self.mean_speed * (rated / self.mean_torque) ** (10.0 / 3.0))
 
     @property
     def life(self) -> float | None:
-        """L10 of all bearings together, (Σ L^-e)^(-1/e) with e = 9/8; none where no bearing is known [h]."""
+        """L10 of all bearings, (Σ L^-e)^(-1/e), e = 9/8, theory page equation (93); none where none is known [h]."""
         if not self.bearings:
             return None
         return float(sum(own.count * own.life**-_WEIBULL for own in self.bearings) ** (-1.0 / _WEIBULL))
@@ -135,7 +135,8 @@ def duty_of(reducer: Reducer, cases: Sequence[LoadCase], resistance: float | Non
 
     References
     ----------
-    Theory page equations (92) to (96): ISO 281 for load rating and life, Palmgren and Miner over the cases, ΔT = R·P.
+    Theory page equations (92) to (96): ISO 281 for load rating and life, Palmgren and Miner over the cases, ΔT = R·P of
+    one node, up to 50 K.
 
     Examples
     --------

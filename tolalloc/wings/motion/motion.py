@@ -112,8 +112,8 @@ def motion_of(
 ) -> Motion:
     """Return the nominal motion under an input speed and an output torque.
 
-    θc = θ0 + ∫Ω dt/i with the reducer's ratio i = 1 + (Z2/Z1)·zp; input speed Ω [rad/s], torque on the carrier [N·m],
-    duration of all steps [s], θc at time 0 [rad].
+    θc = θ0 + ∫Ω dt/i with the ratio i = 1 + (Z2/Z1)·zp, the θc(t) of theory page equation (61); input speed Ω [rad/s],
+    torque on the carrier [N·m], duration of all steps [s], θc at time 0 [rad].
 
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> speed, torque = SpeedProfile.constant(525 * 2 * np.pi / 60), SpeedProfile.constant(-572.0)
@@ -147,9 +147,9 @@ def nominal_acceleration(at: Positions, motion: Motion) -> Float[np.ndarray, "ti
 
     Crank axes run on the circle of radius a_sp with the carrier, disc centres on that of radius e with the crank; the
     sun's centre rests. Cranks turn with −zc·θc, discs and carrier with θc. A point on a circle of radius r that
-    turns by φ has r·φ̈ along its path and r·φ̇² towards the centre; theory page (61).
+    turns by φ has r·φ̈ along its path and r·φ̇² towards the centre.
 
-    Own derivation: exact for rigid parts without errors.
+    The a of theory page equation (61), own derivation: exact for rigid parts without errors.
 
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> reducer, steady = load_reducer("rv40e_xi2015"), SpeedProfile.constant(525 * 2 * np.pi / 60)
@@ -247,8 +247,8 @@ def inertia_of(reducer: Reducer, density: float = 7850.0, output_inertia: float 
 class Damping:
     """Damping in proportion to masses and to stiffness; pin contacts and interfaces with play have none of the latter.
 
-    A mode of angular frequency ω that strains one damped interface alone has the damping ratio
-    mass_proportional/(2ω) + (stiffness_proportional + its own)·ω/2.
+    The C of theory page equation (62) [N·s/m], an assumption. A mode of angular frequency ω that strains one damped
+    interface alone has the damping ratio mass_proportional/(2ω) + (stiffness_proportional + its own)·ω/2.
     """
 
     mass_proportional: float = 0.0  # Damping per mass of every coordinate [1/s]
@@ -274,7 +274,7 @@ class Damping:
 class Integrator(NamedTuple):
     """Constants of a one-step integrator of second order, in the form of Arnold and Brüls (2007).
 
-    The equations of motion hold exactly at every step:
+    Theory page equation (63); the equations of motion hold exactly at every step:
     (1 − αm)·a' + αm·a = (1 − αf)·q̈' + αf·q̈, q' = q + h·q̇ + h²((½ − β)·a + β·a'), q̇' = q̇ + h((1 − γ)·a + γ·a').
 
     References
@@ -298,8 +298,8 @@ class Integrator(NamedTuple):
 def newmark() -> Integrator:
     """Return Newmark's method of the average acceleration, which takes no energy away.
 
-    It is stable at any step for linear springs, and of second order; pins that come and go may feed modes that are too
-    fast for the step, which `generalised_alpha` damps.
+    Of theory page equation (63). It is stable at any step for linear springs, and of second order; pins that come and
+    go may feed modes that are too fast for the step, which `generalised_alpha` damps.
 
     References
     ----------
@@ -316,8 +316,8 @@ def newmark() -> Integrator:
 def generalised_alpha(spectral_radius: float) -> Integrator:
     """Return the generalised-α method; a step leaves the spectral radius of an oscillation far too fast for it [-].
 
-    αm = (2ρ − 1)/(ρ + 1), αf = ρ/(ρ + 1), γ = ½ + αf − αm, β = (γ + ½)²/4 with the spectral radius ρ from 0 to 1;
-    stable at any step for linear springs, and of second order.
+    Theory page equation (63): αm = (2ρ − 1)/(ρ + 1), αf = ρ/(ρ + 1), γ = ½ + αf − αm, β = (γ + ½)²/4 with the spectral
+    radius ρ from 0 to 1; stable at any step for linear springs, and of second order.
 
     References
     ----------

@@ -52,7 +52,8 @@ def _pushing(
 ) -> Float[np.ndarray, "angle disc pin"]:
     """Return the stiffness of the pins that carry in the static equilibrium under their forces, 0 of others [N/m].
 
-    By the logarithmic law δ = F/c·ln(cλ/F) it is c/(ln(cλ/F) − 1), c from where its tangent goes on, theory page (30).
+    By the logarithmic law δ = F/c·ln(cλ/F) it is c/(ln(cλ/F) − 1), c from where its tangent goes on, theory page
+    equation (30).
     """
     equilibria = model.equilibria(errors[np.newaxis], torque, angle)
     worst = Status(int(equilibria.status.max()))
@@ -90,14 +91,13 @@ def modes(
     inertia: Inertia,
     carrier_angle: Float[np.ndarray, " angle"],
 ) -> Modes:
-    """Return the natural frequencies and modes of one unit, linearised about its static equilibrium.
+    """Return the natural frequencies [Hz] and modes of one unit, linearised about its static equilibrium.
 
-    K·φ = ω²·M·φ with the pins that carry, each as stiff as it is under its force. The sun's rotation is prescribed, so
-    with pins that carry nothing moves freely and all frequencies are positive; where no pin carries, discs and carrier
-    turn without resistance and the first one is zero. The modes hold for vibrations under which the same pins keep
-    touching, at speeds whose forces of inertia are small beside the load.
-
-    Theory page (64).
+    K·φ = ω²·M·φ, theory page equation (64), with the pins that carry, each as stiff as it is under its force. The
+    sun's rotation is prescribed, so with pins that carry nothing moves freely and all frequencies are positive; where
+    no pin carries, discs and carrier turn without resistance and the first one is zero. The modes hold for vibrations
+    under which the same pins keep touching, at speeds whose forces of inertia are small beside the load. Errors
+    [m, angles rad], torque on the carrier [N·m], carrier angles [rad].
 
     >>> from tolalloc.reducers.reducer.files import load_reducer
     >>> from tolalloc.wings.motion.motion import inertia_of

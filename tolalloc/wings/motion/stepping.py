@@ -234,8 +234,8 @@ def simulate(
     Errors are deviations in the order of the model's columns [m, angles rad]. The whole state is given at the steps
     with the numbers to observe, each once.
 
-    Theory pages (61) to (63). Gaps are linear in the displacements, as in the static model; waves are drawn well with
-    20 steps or more.
+    Theory page equations (61) to (63). Gaps are linear in the displacements, as in the static model; waves are drawn
+    well with 20 steps or more.
 
     Under a constant load the drive needs T/i of the torque on the carrier, whatever the masses.
 

@@ -23,7 +23,7 @@ _BEYOND = 1.0  # how far the scan goes beyond the tips on either side [rad]
 
 @jit_in_place
 def _logarithmic(stiffness, log_length, compression):
-    """Return force and its derivative of Hertzian line contact, theory page equation (30).
+    """Return force [N] and its derivative [N/m] of Hertzian line contact, theory page equation (30).
 
     The approach is F/c·ln(cλ/F) with c = 2·stiffness. With w = ln(cλ/F) it reads w − ln w = ln(λ/compression), which
     Newton's method solves. λ is given by its logarithm, because a pin that bends easily makes it huge.
@@ -45,11 +45,12 @@ def _logarithmic(stiffness, log_length, compression):
 
 @jit_in_place
 def pin_force(law, stiffness, log_length, half_tilt, compression):
-    """Return force [N] and its derivative [N/m] of one pin contact.
+    """Return force [N] and its derivative [N/m] of one pin contact, theory page equations (30) and (31).
 
-    ``half_tilt`` is how much deeper the tilted tooth's end lies than its middle, equation (31), for linear laws only.
+    ``half_tilt`` is how much deeper the tilted tooth's end lies than its middle [m], (31), for linear laws only.
 
-    F = K·δ of the linear laws; δ = F/c·ln(cλ/F) of the logarithmic one, c = 2·``stiffness``; 0 for δ ≤ 0.
+    F = K·δ of the linear laws; δ = F/c·ln(cλ/F) of the logarithmic one, c = 2·``stiffness``, going on straight where
+    ln(cλ/F) falls to 2; 0 for δ ≤ 0 [m].
 
     References
     ----------

@@ -232,7 +232,7 @@ def _values(first, last, tables, layout, mapped, design, errors, torque, positio
 def solve_peak_to_peak_derivatives(tables: Any, given: Given, position: Any, step: Any, derivative: Any) -> None:
     """Fill the derivatives of the peak-to-peak from the positions of its two extremes, [sample, 2].
 
-    ``step`` is the distance in nodes within which the extremes were found.
+    ``step`` is the distance in nodes within which the extremes were found. Theory page equation (23).
     """
 
     def solve(part: slice) -> None:
@@ -244,10 +244,10 @@ def solve_peak_to_peak_derivatives(tables: Any, given: Given, position: Any, ste
 def solve_value_derivatives(
     tables: Any, given: Given, position: Any, carrier: float, of_pins: Any, derivative: Any
 ) -> None:
-    """Fill the derivatives of carrier·rotation + Σ of_pin·force of every sample, each at its torque.
+    """Fill the derivatives of carrier·rotation + Σ of_pin·force of every sample, theory page equation (23) [per m].
 
-    ``position`` has as many for each sample, one sample after another, as have the derivatives; ``of_pins`` are the
-    weights of a sample's pins, disc by disc.
+    Each at its torque. ``position`` has as many for each sample, one sample after another, as have the derivatives;
+    ``of_pins`` are the weights of a sample's pins, disc by disc.
     """
 
     def solve(part: slice) -> None:

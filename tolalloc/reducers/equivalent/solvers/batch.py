@@ -302,8 +302,8 @@ def settle(law, discs, tables, v, batch, done, steps):
     Steps are whole. With too few pins in contact the tangent is singular: such a lane moves to where the next pin
     touches and a hair beyond.
 
-    Newton's method on S·q − f + Σ D·F(h + D·q) = 0, theory page (21) and (22); settled where no component exceeds 1e-11
-    of the largest force.
+    Newton's method on S·q − f + Σ D·F(h + D·q) = 0 [N], theory page equations (21) and (22); settled where no component
+    exceeds 1e-11 of the largest force. Discs without tilt.
 
     References
     ----------

@@ -87,7 +87,7 @@ def make_work(retained, contacts, elements):
 def along(by_disc, play_by_retained, vector, compression, play):
     """Set the compressions of pins and elements that a displacement gives.
 
-    δ = D·v for pins and elements with play [m], theory page (21), own derivation.
+    δ = D·v for pins and elements with play [m], theory page equation (21), own derivation.
     """
     discs, _, pins = by_disc.shape
     for d in range(discs):
@@ -105,7 +105,7 @@ def along(by_disc, play_by_retained, vector, compression, play):
 def compress(problem, q, compression, play):
     """Set the compressions of pins and elements with play at the coordinates q.
 
-    δ = h + D·q, theory page (21), own derivation.
+    δ = h + D·q [m], theory page equation (21), own derivation.
 
     Examples
     --------
@@ -126,7 +126,7 @@ def compress(problem, q, compression, play):
 def play_force(stiffness, clearance, x, y):
     """Return force (x, y) of an element with play and its derivative (xx, xy, yy), theory page equation (28).
 
-    F = k·(1 − c/|δ|)·δ for |δ| > c, else 0 [N]; c ≥ 0.
+    F = k·(1 − c/|δ|)·δ for |δ| > c, else 0 [N], derivative [N/m]; c ≥ 0 [m].
 
     References
     ----------
@@ -157,7 +157,7 @@ def contact_force(problem, c, compression):
 def assemble(problem, compression, play, q, gradient, tangent):
     """Set gradient and lower tangent at q; return largest force, largest sum of cancelling terms, pins in contact.
 
-    ∂V/∂q = S·q − f + Σ D·F and its derivative S + Σ k·D·Dᵀ, theory page (21), own derivation [N, N/m].
+    ∂V/∂q = S·q − f + Σ D·F and its derivative S + Σ k·D·Dᵀ, theory page equation (21), own derivation [N, N/m].
     """
     size, pins = problem.force.size, problem.by_disc.shape[2]
     largest, cancelling, touching = 0.0, 0.0, 0
@@ -377,7 +377,8 @@ def equilibrium(problem, q, work):
     Under a small torque a loose part slides around the wall of its bearing: a stiff, curved valley of the energy that
     Newton's steps only creep along. With soft bearings the valley is wide; they are stiffened decade by decade.
 
-    The least of ½q·S·q − f·q + Σφ(h + D·q), theory page (21), where its gradient is below 1e-11 of the largest force.
+    The least of ½q·S·q − f·q + Σφ(h + D·q) [N·m], theory page equation (21), where its gradient is below 1e-11 of the
+    largest force.
 
     References
     ----------
@@ -467,7 +468,7 @@ def fill_loads(at, tables, layout, values, force, undisturbed, play_offset):
     Turned flanks are left to `sample_constants`: what they leave has a kink at root and tip, so between nodes it
     follows from the levers there, and not from the compressions at the nodes.
 
-    f = F·ε and θca = t·ε at undisplaced discs, theory page (19) and (20), own derivation [N, rad].
+    f = F·ε and θca = t·ε at undisplaced discs, theory page equations (19) and (20), own derivation [N, rad].
     """
     rotation = 0.0
     force[:] = 0.0
@@ -488,8 +489,8 @@ def fill_loads(at, tables, layout, values, force, undisturbed, play_offset):
 def sample_constants(problem, turn, face_width, layout, values):
     """Set what does not depend on the angle, clearances; what the levers alone make of a sample: tilt, turned flanks.
 
-    c = max(c, 0) [m]; half tilt = b/2·|γ_y·n_x − γ_x·n_y| [m], theory page (31); turned flanks take δ·r_d·|S| from the
-    compressions [m], theory page (35), own derivation.
+    c = max(c, 0) [m]; half tilt = b/2·|γ_y·n_x − γ_x·n_y| [m], theory page equation (31); turned flanks take δ·r_d·|S|
+    from the compressions [m], theory page equation (35), own derivation.
     """
     for e in range(problem.clearance.size):
         problem.clearance[e] = max(values[layout.clearance + e], 0.0)

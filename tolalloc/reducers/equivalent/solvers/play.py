@@ -86,7 +86,7 @@ def displace_play(at, tables, layout, rows, used, values, play):
 
     The sources of one element compress that one alone, so nearly all entries of the table are zero.
 
-    h = E·ε, and c = max(c, 0) [m], theory page (28), own derivation.
+    h = E·ε, and c = max(c, 0) [m], theory page equation (28), own derivation.
 
     Examples
     --------
@@ -363,8 +363,8 @@ def move_with_play(law, discs, tables, v, batch, play, running):
 
     Return one bit per lane that is settled, as `settle` says it, and one per lane that needs more care than more steps.
 
-    Newton's method on S·q − f + Σ D·F(h + D·q) = 0 with the forces of theory page (28) among F; where the energy's
-    slope along the step has turned to more than half of its first fall, Newton's method on that slope.
+    Newton's method on S·q − f + Σ D·F(h + D·q) = 0 with the forces of theory page equation (28) among F; where the
+    energy's slope along the step has turned to more than half of its first fall, Newton's method on that slope.
 
     References
     ----------

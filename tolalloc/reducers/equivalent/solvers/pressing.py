@@ -90,12 +90,12 @@ def line_contact(stiffness, log_length, depth):
     """Return force, stiffness and one bit per lane that is pressed too far, of Hertzian line contact at depths above 0.
 
     The law of `tolalloc.reducers.cycloid.solvers.pins`: w − ln w = ln(λ/depth), F = c·depth/w with c twice the
-    stiffness k, and dF/d(depth) = c/(w − 1). Quotients share their denominators: a division takes as long as ten
-    products.
+    stiffness k, and dF/d(depth) = c/(w − 1) [N, N/m]. Quotients share their denominators: a division takes as long as
+    ten products.
 
     References
     ----------
-    Hertz's line contact, theory page (30); polynomials and Halley's steps are an own derivation.
+    Hertz's line contact, theory page equation (30); polynomials and Halley's steps are an own derivation.
     """
     one = spread(1.0)
     goal = subtract(log_length, logarithm(depth))
@@ -167,10 +167,10 @@ def normal(tables, disc, pins, contact):
 def pole_moves(disc, tables, rows, width, v):
     """Return by what x, y a disc's pole moves where the disc's three coordinates stand in rows of so many samples.
 
-    All contact normals of a disc pass through its pole, so two coordinates say what three do (theory page, equation
-    (16)), in two thirds of the time.
+    All contact normals of a disc pass through its pole, so two coordinates say exactly what three do in the gap of
+    theory page equation (17), in two thirds of the time.
 
-    (x − r_d·θ·sin β, y + r_d·θ·cos β), own derivation.
+    (x − r_d·θ·sin β, y + r_d·θ·cos β) [m], own derivation.
 
     Examples
     --------

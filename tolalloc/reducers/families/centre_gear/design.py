@@ -63,7 +63,7 @@ class CentreGearReducer(Reducer):
 
     @property
     def ratio(self) -> float:
-        """Turns of the motor's shaft per turn of the carrier, −Z4/Z3 times those of the sun [-]."""
+        """Turns of the motor per turn of the carrier, −Z4/Z3 times the sun's, theory page equation (100) [-]."""
         return -self.sun_ratio * self.centre_gear.teeth / self.centre_gear.pinion_teeth
 
     @property

@@ -22,13 +22,14 @@ from tolalloc.reducers.reducer.design import Reducer
 
 
 def centre_mesh(at: Positions) -> SpringGroup:
-    """Return the spring of input pinion and centre gear along its line of action, theory page equations (100) to (102).
+    """Return the spring of input pinion and centre gear along its line of action, theory page equation (101).
 
     The pinion stands at the right of the centre gear and turns against it. ``pinion.eccentricity`` turns with the
     pinion, ``centre.eccentricity``, of the outer toothing against the bearing, with the centre gear [m].
 
-    δ = n·(ε_pinion − x_sun − ε_centre) − r_b4·θs, n at π/2 + α in the housing [m]; involute spur gears in mesh. What
-    moves the pinion's axis in the housing turns the output by a constant angle, so it is no source.
+    δ = n·(ε_pinion − x_sun − ε_centre) − r_b4·θs, n at π/2 + α in the housing [m]; involute spur gears in mesh. Of an
+    eccentricity it makes the waves of theory page equation (102), exactly. What moves the pinion's axis in the housing
+    turns the output by a constant angle, so it is no source.
 
     Own derivation, as liu2020's of sun and planets.
     """

@@ -30,8 +30,8 @@ def _pins_of(reducer: Reducer) -> OutputPins:
 def shaft_support(at: Positions) -> SpringGroup:
     """Return the two springs of the input shaft's bearings, theory page equation (89).
 
-    ``shaft.assembly`` is (a_x, a_y), fixed in the housing [m]; δ = X − a_x, Y − a_y, own derivation, as liu2020's of
-    the sun.
+    ``shaft.assembly`` is (a_x, a_y), fixed in the housing [m]; δ = X − a_x, Y − a_y [m], alike in every direction, own
+    derivation, as liu2020's of the sun.
     """
     return support(at, at.coordinates.input, "shaft bearing", "shaft_support", "shaft")
 
@@ -52,9 +52,7 @@ def eccentric_bearing(at: Positions) -> SpringGroup:
     ``shaft.journal{j}.eccentricity`` turns with the shaft, ``disc{j}.bore.position`` with the disc [m]. The shaft's
     rotation is given, so it moves no eccentric.
 
-    δ = X − x_d + ε_journal − ε_bore, Y likewise [m].
-
-    Own derivation.
+    δ = X − x_d + ε_journal − ε_bore, Y likewise [m], linear; own derivation.
     """
     discs, shaft = at.reducer.disc_count, at.coordinates.input
     rows, journals = SpringRows(at, 2 * discs), tuple(f"shaft.journal{disc + 1}" for disc in range(discs))
@@ -89,7 +87,8 @@ def output_pins(at: Positions) -> SpringGroup:
     turns with the carrier, ``disc{j}.hole.position`` with the disc; ``disc{j}.hole.radius`` widens the hole,
     ``output.pin.radius`` narrows the gap [m].
 
-    δ = x_carrier − x_disc + a·(θca − θd)·(−sin P, cos P) − e·(cos β_j, sin β_j) + errors [m]; walls exactly round.
+    δ = x_carrier − x_disc + a·(θca − θd)·(−sin P, cos P) − e·(cos β_j, sin β_j) + errors [m]; walls exactly round,
+    displacements small beside the hole.
 
     Own derivation; the gap of one pin is the hole's radius less the pin's and the eccentricity.
     """
