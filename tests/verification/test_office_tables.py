@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from zipfile import ZipFile
 
 import numpy as np
@@ -331,6 +332,16 @@ def test_a_file_of_heads_that_is_wrong_is_refused_in_one_sentence(tmp_path, text
     with pytest.raises((InputError, UnknownNameError), match=words) as caught:
         ta.drawing(path)
     assert "\n" not in str(caught.value)
+
+
+def test_a_slip_in_the_heads_of_a_workbook_is_not_taken_for_a_damaged_file(tmp_path):
+    (tmp_path / "zones.toml").write_text(TOML + 'Merkmale = "id"\n', encoding="utf-8")
+    book = Workbook()
+    for row in csv.reader(office_text().splitlines(), delimiter=";"):
+        book.active.append(row)
+    book.save(tmp_path / "zones.xlsx")
+    with pytest.raises(UnknownNameError, match=r"zones.xlsx, columns: unknown head 'Merkmale'; the nearest known is"):
+        ta.drawing(tmp_path / "zones.xlsx")
 
 
 def test_two_heads_for_one_column_are_refused(tmp_path):

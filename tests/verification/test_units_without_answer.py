@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
 import tolalloc as ta
@@ -69,6 +70,29 @@ def test_a_drawing_whose_own_units_have_no_answer_is_said():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("least", "lost"), [(30.0799, 0), (30.09, "[4-9]\\d"), (31.0, 1000)])
+def test_a_check_says_that_a_run_would_stop_and_for_which_unit(least, lost):
+    def array_gap(housing, shaft):
+        return np.where(housing < least, np.nan, housing - shaft), housing + shaft
+
+    row = {"unit": "mm", "plus": 0.02, "minus": -0.02, "min": 0.005, "max": 0.2, "cost": 1}
+    sizes = {"housing": 30.1, "shaft": 25.0}
+    asked = ta.Study(
+        ta.model(array_gap, inputs=sizes, outputs=(GAP, "sum [mm]")),
+        ta.Drawing.of_rows([{"id": name, "nominal": size, **row} for name, size in sizes.items()]),
+        limits={GAP: ta.Limit(upper=5.35), "sum [mm]": ta.Limit(upper=56.0)},
+        name="narrow",
+    )
+    if not lost:
+        assert ta.check(asked).sentence
+        return
+    said = rf"study narrow: {lost} of 1000 random units have no usable answer of gap \[mm\]; allowed is a share of 0.01"
+    with pytest.raises(
+        SolveError, match=rf"{said}, .* The first of them deviates by housing [+−].* µm, shaft [+−].* µm\."
+    ):
+        ta.check(asked)
+
+
 @pytest.mark.parametrize("kind", [SolveError, InputError])
 def test_what_was_answered_before_a_fault_is_kept(tmp_path, monkeypatch, kind):
     def fails(*_):

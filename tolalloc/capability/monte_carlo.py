@@ -376,7 +376,7 @@ def require_few_failures(result: AnsweredUnits, name: str, largest_failed_share:
     if result.failed > largest_failed_share * units:
         raise FailedUnitsError(
             f"{name[0].upper()}{name[1:]}: {result.failed:,} of {units:,} units have no usable answer; allowed is a "
-            f"share of {largest_failed_share:.4g}, because more would bias every figure."
+            f"share of {largest_failed_share:.4g} (`largest_failed_share`), because more would bias every figure."
         )
 
 

@@ -21,7 +21,7 @@ from unicodedata import normalize
 from zipfile import ZipFile
 
 from tolalloc.drawings.heads import MOST_TITLES, Heads, office_words, split_header
-from tolalloc.exceptions import Faults, InputError, UnknownNameError
+from tolalloc.exceptions import Faults, InputError, TolallocError, UnknownNameError
 from tolalloc.reading.file_content import read_bytes, read_text, require_believable, require_table
 from tolalloc.reading.files import Record, validated
 from tolalloc.reading.units import (
@@ -92,7 +92,7 @@ def sheet_texts(path: Path, sheet: str, heads: Heads) -> list[tuple[str, ...]]:
         texts = _texts(path, values, formulas)
         heads.require_in(path, texts)
         _require_plain_cells(path, values, 1 + heads.row_in(texts), texts)
-    except InputError:
+    except TolallocError:
         raise
     except Exception as error:  # whatever the libraries raise on a damaged file: of zlib, XML, types, indices
         if b"purl.oclc.org/ooxml" in _part(content, "xl/workbook.xml"):

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from tolalloc.exceptions import InputError, TolallocError
+from tolalloc.models.model import is_fast
 from tolalloc.reading.plugins import plugin_versions
 from tolalloc.reports.finished_run import FinishedRun, Member, common_currency, read_run
 from tolalloc.reports.folder import numbered
@@ -73,6 +74,8 @@ def check(study: Study | str | Path, *, timed: bool = False, script: str = "") -
         model, errors, space = prepared.model, prepared.errors, prepared.space
         # Whatever is wrong is found before units are solved.
         header, requirements = replace(header, model=model.name, currency=prepared.currency), prepared.requirements
+        if requirements and is_fast(model):
+            prepared.require_answers(_CHECKED)
         result = Checked(
             script=script,
             questions=kinds,

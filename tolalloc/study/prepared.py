@@ -23,10 +23,11 @@ from tolalloc.drawings.compensators import Compensator, all_choices, choice_labe
 from tolalloc.drawings.error_model import ErrorModel
 from tolalloc.drawings.population import ANYWHERE, STATED, taken_as
 from tolalloc.drawings.seeds import SeedTree
-from tolalloc.drawings.sources import Source
-from tolalloc.exceptions import InputError, UnknownNameError
+from tolalloc.drawings.sources import Source, is_angular
+from tolalloc.exceptions import InputError, SolveError, UnknownNameError
 from tolalloc.models.identity import UnknownIdentityError
 from tolalloc.models.model import HasCopies, Model
+from tolalloc.reading.units import MICROMETRE
 from tolalloc.reports.header import Header
 from tolalloc.reports.portrait import portrait_of
 from tolalloc.reports.tellers.check import missed_sentence
@@ -305,6 +306,23 @@ class Prepared:
     def random_units(self, units: int) -> Float[np.ndarray, "unit column"]:
         """Return the deviations of random units at the zones of the drawing [m, angles rad]."""
         return self.errors.random_units(units, SeedTree(self.study.seed).child("check"))
+
+    def require_answers(self, units: int) -> None:
+        """Raise unless enough random units have an answer, and say what one without it is like."""
+        response, x = self.model.reading(tuple(own.output for own in self.requirements)), self.random_units(units)
+        found, share = response(x), self.study.largest_failed_share
+        failed = found.status != 0
+        if np.mean(failed) <= share:
+            return
+        lost = [name for name, own in zip(response.outputs, found.values.T, strict=True) if not np.isfinite(own).all()]
+        units_of = ("µrad" if is_angular(own) else "µm" for own in self.errors.source_of_column)
+        first = zip(self.errors.columns, (x[failed][0] / MICROMETRE).tolist(), units_of, strict=True)
+        outputs = f" of {' and '.join(lost)}" if lost else ""
+        deviates = ", ".join(f"{name} {value:+.3g} {unit}" for name, value, unit in first if value).replace("-", "−")
+        raise SolveError(
+            f"{self.place}: {failed.sum()} of {units} random units have no usable answer{outputs}; allowed is a share "
+            f"of {share:g}, `largest_failed_share` of the study. The first of them deviates by {deviates}."
+        )
 
     def kept_limits(self, units: int) -> KeptLimits:
         """Return the shares of random units at the zones of the drawing that keep each limit and all at once."""
