@@ -70,8 +70,8 @@ class FrontSearch:
                 missed.append(share * limit)
         points = list[PricedLimit]()
         for point in sorted(found, key=lambda one: one.limit):
-            known = [one.design for one in (*points[-1:], point)]
-            points.append(replace(point, design=min(known, key=lambda one: one.cost)))
+            tighter = points[-1].design if points else point.design  # on a ladder it may well be the same zones
+            points.append(replace(point, design=tighter) if tighter.cost < point.design.cost * (1 - _SAME) else point)
         return CostFront(points=tuple(points), drawn=own, missed=tuple(missed))
 
     def _cheapest(self, limit: float, units: DesignSample, floor: float) -> VerifiedDesign | None:
