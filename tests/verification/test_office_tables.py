@@ -344,6 +344,19 @@ def test_a_slip_in_the_heads_of_a_workbook_is_not_taken_for_a_damaged_file(tmp_p
         ta.drawing(tmp_path / "zones.xlsx")
 
 
+@pytest.mark.parametrize(("locked", "is_read"), [("ja", True), ("yes", True), ("no", False), ("", False)])
+def test_a_bought_part_needs_neither_range_nor_price_where_it_is_locked(tmp_path, locked, is_read):
+    lines = ("id,nominal,plus,minus,unit,min,max,cost,locked", f"bearing,30,0,-0.06,mm,,,,{locked}")
+    path = written(tmp_path / "zones.csv", "\n".join([*lines, "pin,5,0.01,-0.01,mm,0.005,0.1,2,", ""]))
+    if is_read:
+        bearing, _ = ta.drawing(path).sources
+        assert (bearing.locked, bearing.cost, bearing.process) == (True, 0.0, "")
+        assert [1e6 * own for own in (bearing.zone, bearing.minimum, bearing.maximum)] == pytest.approx([60.0] * 3)
+    else:
+        with pytest.raises(InputError, match=r"row 2 \(bearing\).*min"):
+            ta.drawing(path)
+
+
 def test_two_heads_for_one_column_are_refused(tmp_path):
     (tmp_path / "zones.toml").write_text(TOML.replace('"drawing"', '"part"'), encoding="utf-8")
     with pytest.raises(InputError, match="the column 'part' is there twice"):

@@ -248,7 +248,9 @@ class ToleranceRow(Record):
             "row stands alone",
         ),
     ] = ""
-    locked: Annotated[bool, TableColumn("yes: allocation leaves the zone as it is")] = False
+    locked: Annotated[
+        bool, TableColumn("yes: allocation leaves the zone as it is; min, max and cost may then be empty, costing 0")
+    ] = False
     min: Annotated[float, Field(ge=0), TableColumn("smallest zone that may be asked for", "unit", "minimum")]
     max: Annotated[float, Field(ge=0), TableColumn("largest zone that may be asked for", "unit", "maximum")]
     cost: Annotated[
@@ -426,7 +428,7 @@ class ToleranceRow(Record):
         if angular != (self.over is not None):
             raise ValueError(
                 f"{self.name} {'is an angle and needs' if angular else 'is a length and has no'} over, the length "
-                "in mm over which the zone limits it"
+                "in mm over which the zone limits it; names of angles end in .tilt, .rotation or .phase"
             )
         needs_spectrum = self.feature in (Feature.PITCH, Feature.RUNOUT)
         if needs_spectrum != bool(self.spectrum):

@@ -64,6 +64,8 @@ _WIDE = 0.12
 """Zone over the nominal size from which on it is doubted [-]."""
 _SMALLEST_SIZE = 0.1 * MILLIMETRE
 """Nominal size below which it is doubted, where one is stated [m]."""
+_OF_FREE = ("min", "max", "cost")
+"""Columns that a row whose zone is locked may leave empty."""
 _FINEST_ZONE = 0.1 * MICROMETRE
 """Zone of a feature without a nominal size below which it is doubted [m]."""
 _WIDEST_ZONE = 2.0 * MILLIMETRE
@@ -449,7 +451,7 @@ def sources_of_rows(
         with faults.kept():
             _require_plain(row, f"{place}, row {number}")
             _require_filled(row, where)
-            cells = with_process(typed_cells(ToleranceRow, row, where), processes, where)
+            cells = with_process(_with_range(typed_cells(ToleranceRow, row, where)), processes, where)
             source = validated(ToleranceRow, cells, where).as_source(folder)
             if source.name in sources:
                 field = "source" if source.own_id else "id"
@@ -473,12 +475,22 @@ def _require_plain(row: Mapping[str, object], where: str) -> None:
 
 def _require_filled(row: Mapping[str, object], where: str) -> None:
     """Raise if several cells are empty that a source needs, as in the row of a sum."""
-    needed = [name for name, field in ToleranceRow.model_fields.items() if field.is_required()]
+    given = _OF_FREE if row.get("locked") not in ("", None) else ()
+    needed = [name for name, field in ToleranceRow.model_fields.items() if field.is_required() and name not in given]
     missing = [name for name in needed if row.get(name) in ("", None)]
     if len(missing) > 1:
         raise InputError(
             f"{where}: {', '.join(missing)} are missing; a row that is no source, such as a sum, begins with # or goes."
         )
+
+
+def _with_range(cells: dict[str, object]) -> dict[str, object]:
+    """Return the cells of a row; a locked one without range and price may become what it is, and costs nothing."""
+    plus, minus = cells.get("plus"), cells.get("minus")
+    if cells.get("locked") is not True or not (isinstance(plus, int | float) and isinstance(minus, int | float)):
+        return cells
+    width = abs(plus - minus)
+    return dict(zip(_OF_FREE, (width, width, 0.0), strict=True)) | cells
 
 
 def table_rows(sources: Sequence[Source], folder: Path | None = None) -> list[list[str | int | float]]:
