@@ -237,12 +237,12 @@ def test_the_quantile_of_the_units_is_what_they_show_at_even_odds(results):
 
 def test_prices_are_marginal_and_per_what_the_limit_is_large_of(results):
     side = results.free.chosen.constraints[0]
-    for limit, priced, step in ((60.0, 0.9, ""), (1.0, 0.09, "0.1 "), (0.13, 0.009, "0.01 "), (542.9, 9.0, "10 ")):
+    for limit, priced, step in ((60.0, 0.9, ""), (1.0, 0.009, "0.01 "), (0.13, 0.0009, "0.001 "), (542.9, 9.0, "10 ")):
         one = limit_price(replace(side, limit=limit), Limits(upper=limit), 0.9)
         assert one == (pytest.approx(priced), f"{step}arcsec")
     for limit in (49.95, 50.05):  # of two limits each by what they leave between them
         two = limit_price(replace(side, limit=limit), Limits(lower=49.95, upper=50.05), 0.9)
-        assert two == (pytest.approx(0.009), "0.01 arcsec")
+        assert two == (pytest.approx(0.0009), "0.001 arcsec")
     price = results.free.prices[side.stack.name]
     gaps = {"output": "peak-to-peak transmission error", "limit": "50″", "step": "1″"}
     assert said(results, "price", price=price, cost_unit="cost units", **gaps)

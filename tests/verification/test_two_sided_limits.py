@@ -11,6 +11,7 @@ from scipy.stats import norm
 
 import tolalloc as ta
 from tolalloc.allocation.result import unit_quantile
+from tolalloc.allocation.search.zone_allocation import limit_parts
 from tolalloc.allocation.verify.verification import VerifiedDesign, Verifier
 from tolalloc.capability.monte_carlo import proportion
 from tolalloc.drawings.seeds import SeedTree
@@ -304,7 +305,7 @@ def test_a_setting_moves_the_mean_to_the_middle_of_the_limits(start, lower, uppe
     zone = 6 * half / -norm.ppf(SHARE / 2) / np.sqrt(2)
     found = centred(start, ta.Limit(lower=lower, upper=upper))
     assert found.met
-    assert found.cost == pytest.approx(0.4 / zone, rel=3e-3)
+    assert found.chosen.unrounded_cost == pytest.approx(0.4 / zone, rel=3e-3)
     assert found.chosen.settings[0] == pytest.approx((lower + upper) / 2 - 0.56, abs=half / 100)
     assert found.bound <= 0.4 / zone
 
@@ -341,3 +342,24 @@ def test_so_it_does_where_the_output_bends(start):
     zone = 6 * 0.2 / -norm.ppf(SHARE / 2) / np.sqrt(2)
     assert found.met
     assert found.cost == pytest.approx(0.4 / zone, rel=0.02)
+
+
+@pytest.mark.parametrize(("lower", "upper"), [(-3.0, 3.0), (-2.8, 3.3)])
+def test_two_limits_share_their_price_as_moving_each_alone_changes_the_spread(lower, upper):
+    """Where zones fall as 1/σ, 1/σ of the spread that keeps 99.73 % of normal units between both, by differences."""
+
+    def spread(low: float, high: float) -> float:
+        return brentq(lambda own: norm.cdf(high / own) - norm.cdf(low / own) - (1 - SHARE), 0.5, 2.0, xtol=1e-14)
+
+    sigma, step = spread(lower, upper), 1e-4
+    values = norm.ppf((np.arange(200_001) + 0.5) / 200_001) * sigma
+    true = [
+        (
+            1 / spread(lower + step * (not up), upper - step * up)
+            - 1 / spread(lower - step * (not up), upper + step * up)
+        )
+        / (2 * step)
+        for up in (True, False)
+    ]
+    alone = np.array([1 / sigma / upper, 0.0])  # all on the one side, kept at the share that it has
+    assert limit_parts(values, np.array([upper, lower]), alone) == pytest.approx(true, rel=2e-3)

@@ -329,15 +329,15 @@ def solver_noise(solution: Solution) -> float:
 
 
 def limit_step(side: OneSidedConstraint, limits: Limits) -> float:
-    """Return a small change of a limit to tell its price by: a power of ten, at most a tenth of what the limits leave.
+    """Return a small change of a limit to tell its price by: a power of ten, at most a twentieth of what limits leave.
 
-    10^⌊log₁₀(size/10)⌋ with the distance of two limits or the size of one, of what outputs are compared by where that
-    is 0 (own derivation) [unit of the output].
+    10^⌊log₁₀(size/20)⌋ with half the distance of two limits or the size of one, of what outputs are compared by where
+    that is 0 (own derivation) [unit of the output].
     """
     size = abs(side.limit) or side.scale
     if limits.lower is not None and limits.upper is not None:
-        size = limits.upper - limits.lower
-    return float(10.0 ** np.floor(np.log10(size / 10) + _OF_A_LOGARITHM)) if size > 0 else 1.0
+        size = (limits.upper - limits.lower) / 2
+    return float(10.0 ** np.floor(np.log10(size / 20) + _OF_A_LOGARITHM)) if size > 0 else 1.0
 
 
 _OF_A_LOGARITHM = 1e-9

@@ -33,6 +33,37 @@ from tolalloc.exceptions import FailedUnitsError, InputError, SolveError
 _LEAST_RISE = 1e-6
 """What all zones together take of a limit is at least so much of the limit, where it is what a step divides by [-]."""
 
+_TWO_SIGMA = (0.0227501319, 0.5, 0.9772498681)
+"""Shares of a normal output below its median less and plus two standard deviations, and below its median [-]."""
+
+
+def limit_parts(
+    values: Float[np.ndarray, " unit"], limits: Float[np.ndarray, " side"], prices: Float[np.ndarray, " side"]
+) -> Float[np.ndarray, " side"]:
+    """Return the price of each limit of an output that keeps its units between two [cost units per its unit].
+
+    A program keeps each side at a share of its own and puts the price on the one it ends at. A step of either limit
+    frees units as densely as they lie there, fᵢ, and zones that scale by ds bring rᵢ·ds of them, with rᵢ from the limit
+    to the median: pᵢ = fᵢ·Σλⱼrⱼ/Σfⱼrⱼ (own derivation). Densities are normal with the spread of the side between
+    the median and its 2σ quantile; exact where the output is normal and its middle stays.
+
+    Examples
+    --------
+    A price of 2 on one of two limits equally far from the middle is 1 on each:
+
+    >>> limit_parts(np.linspace(-3, 3, 1001), np.array([3.0, -3.0]), np.array([2.0, 0.0])).round(9).tolist()
+    [1.0, 1.0]
+    """
+    good = values[np.isfinite(values)]
+    low, middle, high = np.quantile(good, _TWO_SIGMA) if good.size else (np.nan,) * 3
+    distances = np.abs(limits - middle)
+    spreads = np.where(limits > middle, high - middle, middle - low) / 2
+    if not (prices.any() and np.all(spreads > 0)):
+        return prices
+    exponents = -((distances / spreads) ** 2) / 2
+    densities = np.exp(exponents - exponents.max()) / spreads
+    return np.asarray(densities * (prices @ distances) / (densities @ distances))
+
 
 def scale_in_proportion(verifier: Verifier, steps: int) -> tuple[VerifiedDesign, ...]:
     """Return designs with all zones scaled alike, the first the tolerance table as it is.
@@ -340,7 +371,10 @@ class ZoneAllocation:
 
     @property
     def prices(self) -> dict[str, float]:
-        """Limited side → cost saved per unit by which its limit is relaxed [cost units per unit of the output]."""
+        """Limited side → cost saved per unit by which its limit is relaxed [cost units per unit of the output].
+
+        Two limits of one output share what both are worth as often as its units lie just at each (`limit_parts`).
+        """
         found: dict[str, float] = {}
         for constraint, price in zip(self.chosen.constraints, self.optimum.prices, strict=True):
             found[constraint.stack.name] = found.get(constraint.stack.name, 0.0) + float(price)
@@ -352,6 +386,10 @@ class ZoneAllocation:
                 price, upper = found.pop(decides.stack.name), sides[0].law.upper_part(asked.limits, decides.excess)
                 for side, part in zip(sides, (upper, 1.0 - upper), strict=True):
                     found[side.stack.name] = found.get(side.stack.name, 0.0) + price * part
+            elif isinstance(asked.guarantee, AtYield) and len(sides) > 1:
+                names, limits = [own.stack.name for own in sides], np.array([own.limit for own in sides])
+                prices = np.array([found.get(name, 0.0) for name in names])
+                found |= zip(names, limit_parts(asked.read(self.chosen.outputs), limits, prices).tolist(), strict=True)
         return found
 
     @property
