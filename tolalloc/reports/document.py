@@ -158,7 +158,7 @@ def joined(title: str, subtitle: str, parts: Iterable[tuple[str, Document]], **m
         title=title,
         subtitle=subtitle,
         answer=tuple(sentence for _, said in answers for sentence in said),
-        warnings=_once(sentence for _, document in reports for sentence in document.warnings),
+        warnings=_once(sentence for _, document in leading_first for sentence in document.warnings),
         sections=tuple(sections),
         assumptions=tuple(dict.fromkeys(sentence for _, document in reports for sentence in document.assumptions)),
         summary={part: document.summary for part, document in reports},

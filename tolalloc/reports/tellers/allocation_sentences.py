@@ -512,7 +512,9 @@ def warnings(result: AllocationResult, header: Header) -> Iterator[str]:
         yield _say("uncertain", what=region.name, covered=COVERED)
     yield from (f"{own.sentence}." for own in result.space.settings if own.out_of_bounds)
     fault, cautions = examined(result).fault, portrait_of(result.model).cautions(result.chosen.settings)
-    yield from (own for own in cautions if own not in fault)
+    present = np.array([own.value for own in result.space.settings])
+    key = "present" if np.allclose(result.chosen.settings, present) else "as_drawn"
+    yield from (_say(key, caution=own) if present.size else own for own in cautions if own not in fault)
     if failed := header.failed:
         yield _say("failed_one" if failed == 1 else "failed_many", count=failed)
 

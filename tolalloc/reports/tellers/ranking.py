@@ -320,7 +320,8 @@ class RankingTeller(Teller[RankingResult]):
         if result.effect and result.effect.first_order.fails:
             names = " + ".join(source.name for source in result.effect.sources)
             yield self._told("rough", names=names, error=result.effect.first_order)
-        yield from self._portrait.cautions(np.array([setting.value for setting in result.model.settings]))
+        values = np.array([setting.value for setting in result.model.settings])
+        yield from (_say("present", caution=own) if values.size else own for own in self._portrait.cautions(values))
         if self.header.failed:
             yield _say("failed", units=self.header.failed)
 
