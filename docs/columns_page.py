@@ -1,6 +1,11 @@
-"""The page of columns: every column of a tolerance table, made from the list that reads and writes it."""
+"""The page of columns: every column of a tolerance table, made from the list that reads and writes it.
+
+python docs/columns_page.py
+"""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 from files_page import allowed
 
@@ -10,7 +15,7 @@ HEAD = """# Columns of the tolerance table
 
 One row per source, in XLSX or CSV; `zones.xlsx` of a folder that `tolalloc new` made has lists and notes in its heads.
 Columns may stand in any order, and only the needed ones must be there.
-Your own heads, units, fits and what is refused: [the tolerance table](../reference/tolerance-table.md).
+Your own heads, units, fits and what is refused: [the tolerance table](tolerance-table.md).
 """
 
 
@@ -23,3 +28,7 @@ def page() -> str:
         for name, field in ToleranceRow.model_fields.items()
     ]
     return "\n".join([HEAD, "| column | needed | allowed | meaning |", "|---|---|---|---|", *rows, ""])
+
+
+if __name__ == "__main__":
+    (Path(__file__).parent / "reference" / "columns.md").write_text(page(), encoding="utf-8")

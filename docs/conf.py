@@ -91,13 +91,6 @@ def _write_files(_: Any) -> None:
     (HERE / "_made" / "files.md").write_text(page(), encoding="utf-8")
 
 
-def _write_columns(_: Any) -> None:
-    """Write the page of columns beside it, from the list of fields of a tolerance table."""
-    from columns_page import page
-
-    (HERE / "_made" / "columns.md").write_text(page(), encoding="utf-8")
-
-
 def _write_cases(_: Any) -> None:
     """Write the validation manual beside it, from the cases whose values tests show."""
     from cases_page import page
@@ -128,6 +121,5 @@ def setup(app: Any) -> None:
     app.connect("html-page-context", _say_levels, priority=900)  # after the theme has made its list
     app.connect("builder-inited", _write_commands, priority=100)  # before the gallery is made
     app.connect("builder-inited", _write_files, priority=101)
-    app.connect("builder-inited", _write_columns, priority=102)
     app.connect("builder-inited", _write_cases, priority=103)
     app.connect("builder-inited", _write_blanks, priority=900)  # after the gallery was made

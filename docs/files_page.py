@@ -28,7 +28,7 @@ HEAD = """# Files
 The TOML files that you write, field by field. A name ends in its unit; springs without one are in N/m.
 What is not listed is refused by name, and the
 nearest field is offered. `tolalloc schema KIND` prints the same for an editor, which then offers the fields. Tables of
-tolerances have [columns](columns.md) instead.
+tolerances have [columns](../reference/columns.md) instead.
 
 Where a field may be a number or a table, either may stand; a table is explained below under its own heading.
 """

@@ -115,7 +115,10 @@ def test_the_page_of_files_says_every_field_of_every_kind(monkeypatch):
 
 def test_the_page_of_columns_explains_each_as_the_list_of_fields_does(monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "docs")
-    rows = importlib.import_module("columns_page").page().splitlines()
+    text = importlib.import_module("columns_page").page()
+    there = (ROOT / "docs" / "reference" / "columns.md").read_text(encoding="utf-8")
+    assert there == text, "write it anew with python docs/columns_page.py"
+    rows = text.splitlines()
     for name, column in COLUMNS.items():
         needed = "yes" if ToleranceRow.model_fields[name].is_required() else ""
         assert any(row.startswith(f"| {HEADERS[name]} | {needed} |") and f"| {column.meaning} |" in row for row in rows)

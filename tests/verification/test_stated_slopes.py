@@ -62,7 +62,7 @@ def test_a_proof_says_that_it_rests_on_stated_slopes_and_is_refused_where_they_a
     answer = stated(1).allocate()
     found = answer.sentences
     assert answer.result.proven.rests_on == "the stated slopes"
-    assert says(found, "allocation.proven", rests=", as far as the stated slopes hold") or says(
+    assert says(found, "allocation.proven", rests=", provided that the stated slopes hold") or says(
         found, "allocation.proven_nothing"
     )
     with pytest.raises(ta.InputError, match=r"no bound can be proven, as model .* its units refute"):
