@@ -42,6 +42,26 @@ def true_change() -> tuple[float, float]:
     return share, norm.ppf(0.98) * (after - before)
 
 
+def test_the_output_that_passes_its_limit_is_told_and_not_the_first_one():
+    rows = [{"id": own, "plus": 5, "minus": -5, "unit": "µm", "min": 1, "max": 20, "cost": 1} for own in "ab"]
+    both = ta.model(
+        lambda a, b: (1000 * (a - b), 1000 * (a + b)), inputs={"a": 5, "b": 5}, outputs=("gap [µm]", "sum [µm]")
+    )
+    for most, told in ((10_008.0, "sum"), (10_030.0, "gap")):
+        limits = {"gap [µm]": ta.Limit(upper=30.0), "sum [µm]": ta.Limit(upper=most)}
+        asked = ta.Study(both, ta.Drawing.of_rows(rows), limits=limits)
+        assert f"quantile of the {told}" in ta.whatif(asked, {"a": 18.0}, units=4096).sentences[1]
+
+
+def test_a_locked_zone_that_is_changed_is_said_to_be_locked():
+    rows = [{"id": own, "plus": 5, "minus": -5, "unit": "µm", "min": 1, "max": 20, "cost": 1} for own in "ab"]
+    rows[0]["locked"] = True
+    gap = ta.model(lambda a, b: 1000 * (a - b), inputs={"a": 5.0, "b": 5.0}, outputs=("gap [µm]",))
+    asked = ta.Study(gap, ta.Drawing.of_rows(rows), limits={"gap [µm]": ta.Limit(upper=12.0)})
+    for name, is_locked in (("a", True), ("b", False)):
+        assert says(ta.whatif(asked, {name: 8.0}).teller.warnings, "difference.locked", names="a") == is_locked
+
+
 def test_a_linear_models_change_lies_in_the_intervals():
     found = fit().ask(ta.Difference(zones={"hous*": 20.0}, units=8192))
     share, quantile = true_change()
@@ -95,7 +115,7 @@ def test_a_neglected_source_is_refused_as_such():
     rows = [{"id": "housing", **ZONE}, {"id": "shaft", **ZONE, "plus": 0, "minus": 0, "locked": True}]
     neglected = replace(fit(), drawing=ta.Drawing.of_rows(rows))
     sentence = (
-        "^difference: source 'shaft' is neglected, because its zone is 0 in the tolerance table; give it a zone "
+        "^whatif: source 'shaft' is neglected, because its zone is 0 in the tolerance table; give it a zone "
         r"above 0 there\.$"
     )
     with pytest.raises(InputError, match=sentence):

@@ -91,13 +91,13 @@ def neglected_columns(patterns: Sequence[str], columns: Sequence[str]) -> frozen
 
 
 def meant(pattern: str, sources: Iterable[Source]) -> list[str]:
-    """Return the names of the sources that a name, a user's own id, a pattern of either or a dimension means."""
+    """Return the names of the sources that a name, a user's own id, a pattern of either, a dimension or a row means."""
     return [
         own.name
         for own in sources
         if fnmatchcase(own.name, pattern)
         or (own.own_id and fnmatchcase(own.own_id, pattern))
-        or own.dimension == pattern
+        or pattern in (own.dimension, own.row)
     ]
 
 

@@ -306,18 +306,19 @@ def named_zones(errors: ErrorModel, zones: Mapping[str, float]) -> dict[str, flo
     """Return source → zone [m] of names and patterns with zones [µm]; later patterns take over from earlier ones."""
     found: dict[str, float] = {}
     if not zones:
-        raise InputError("difference: no zone is given; give one or more, such as pin.diameter=3.")
+        raise InputError("whatif: no zone is given; give one or more, such as pin.diameter=3.")
     for pattern, zone in zones.items():
         own = meant(pattern, errors.active)
         if not own and meant(pattern, errors.sources):
             raise InputError(
-                f"difference: source {pattern!r} is neglected, because its zone is 0 in the tolerance table; give it a "
+                f"whatif: source {pattern!r} is neglected, because its zone is 0 in the tolerance table; give it a "
                 "zone above 0 there."
             )
         if not own:
-            raise UnknownNameError.among("difference", "source", pattern, known_as(errors.active))
+            said = {name for one in errors.active for name in (one.dimension, one.row) if name}
+            raise UnknownNameError.among("whatif", "source", pattern, {*known_as(errors.active), *said})
         if not (isinstance(zone, int | float) and 0 < zone < 1e6):
-            raise InputError.at("difference", pattern, zone, "a zone above 0 and below 1 m, in µm")
+            raise InputError.at("whatif", pattern, zone, "a zone above 0 and below 1 m, in µm")
         found |= dict.fromkeys(own, zone * MICROMETRE)
     return found
 
@@ -325,9 +326,9 @@ def named_zones(errors: ErrorModel, zones: Mapping[str, float]) -> dict[str, flo
 def outside_range(source: Source) -> str:
     """Return a sentence on a zone that lies outside what its row allows, empty for any other."""
     low, zone, high = (size / MICROMETRE for size in (source.minimum, source.zone, source.maximum))
+    name = source.own_id or source.name
     if high == 0 or low * (1 - _REPRICED) <= zone <= high * (1 + _REPRICED):
         return ""
-    name = source.own_id or source.name
     meant = f" Write {name}={zone:g}mm if millimetres are meant." if low <= 1000 * zone <= high else ""
     return f"{name}: its zone of {zone:.4g} µm lies outside the {low:.4g} to {high:.4g} µm that its row allows.{meant}"
 
@@ -357,5 +358,5 @@ def _price(space: DesignSpace, name: str, zone: float) -> float:
             f"{max(own.maximum for own in ways) / MICROMETRE:.3g} µm, what its "
             f"{'row allows' if len(ways) == 1 else 'processes hold'}"
         )
-        raise InputError.at("difference", name, f"{zone / MICROMETRE:g} µm", held)
+        raise InputError.at("whatif", name, f"{zone / MICROMETRE:g} µm", held)
     return float(made.total(np.array(zone)))

@@ -59,12 +59,18 @@ class DifferenceTeller(Teller[DifferenceResult]):
 
     @cached_property
     def sentences(self) -> tuple[str, ...]:
-        """What changes of the cost, the yield and the leading output, or the first that moves where it does not."""
+        """What changes of cost, yield and one output: one that passes its limit, or else the leading one that moves."""
         result, cost = self.result, self.result.cost_change
         leading, found = result.requirements[0], _in_percent(result.yield_change)
         changes = [*zip(result.limited, result.quantile_changes, strict=True)]
         moved = [own for (own, _), change in changes if not change.low <= 0.0 <= change.high]
-        told = leading if leading in moved or not moved else moved[0]
+        sides = [
+            (own, [own.limits.distance(end) for end in ends])
+            for (own, _), ends in zip(result.limited, result.quantiles, strict=True)
+        ]
+        passing = [own for own, (before, after) in sides if own in moved and (before >= 0) != (after >= 0)]
+        first = passing or moved or [leading]
+        told = leading if leading in first else first[0]
         quantiles = " and ".join(
             _say("quantile", share=_percent(share), output=short(own.output), **_with_interval(change, own.output))
             for (own, share), change in changes
@@ -81,7 +87,9 @@ class DifferenceTeller(Teller[DifferenceResult]):
     def warnings(self) -> tuple[str, ...]:
         """What a reader must know before acting on it."""
         units = self.result.values.shape[1]
-        found = [sentence for own in self.result.after if (sentence := outside_range(own))]
+        locked = dict.fromkeys(own.own_id or own.name for own in self.result.after if own.locked)
+        found = [_say("locked", names=", ".join(locked))] if locked else []
+        found += [sentence for own in self.result.after if not own.locked and (sentence := outside_range(own))]
         if any(units * min(share, 1 - share) < _BEYOND for _, share in self.result.limited):
             found.append(_say("few", units=units, beyond=_BEYOND))
         if any(isinstance(own.guarantee, WorstCase) for own in self.result.requirements):
