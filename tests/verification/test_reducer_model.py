@@ -185,9 +185,9 @@ def bound(changed: dict[str, dict[str, object]]) -> ReducerModel:
 def test_rows_of_single_pins_and_teeth_that_do_not_follow_the_reducer_are_refused_together():
     wrong = {"each_pin.position": 52, "each_pin.groove": 52, "disc2.each_tooth.pitch": 38, "pin.diameter": 2}
     sentence = (
-        "study study, tolerance table zones.csv: each is 2 in pin.diameter and 52 in each_pin.position, "
-        "each_pin.groove and 38 in disc2.each_tooth.pitch; allowed is pin_count of the reducer, 40, in all rows of "
-        "single pins, its disc_teeth, 39, in all rows of single teeth, and 1 in all others."
+        "study study, tolerance table zones.csv: each is 2 in pin.diameter; allowed is 1; each is 52 in "
+        "each_pin.position, each_pin.groove; allowed is 40, one for each pin; each is 38 in disc2.each_tooth.pitch; "
+        "allowed is 39, one for each tooth."
     )
     with pytest.raises(InputError, match=f"^{re.escape(sentence)}$"):
         bound({name: {"each": each} for name, each in wrong.items()})

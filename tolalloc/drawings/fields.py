@@ -298,7 +298,8 @@ class ToleranceRow(Record):
         int,
         Field(ge=1, le=1000),
         TableColumn(
-            "like features that each deviate on their own, for `each_pin.…` and `disc{j}.each_tooth.…`: their number",
+            "number of like features that each deviate on their own: of `each_pin.…`, `disc{j}.each_tooth.…`, and of "
+            "holes and output pins of a single stage; the cost is that of them together",
             "-",
         ),
     ] = 1

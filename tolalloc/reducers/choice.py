@@ -109,19 +109,18 @@ def _absent_orders(errors: ErrorModel, model: EquivalentModel, place: str) -> li
 
 def _require_each(errors: ErrorModel, own: Mapping[str, Sequence[str]], reducer: Reducer, place: str) -> None:
     """Raise unless every source has as many like features as its columns say, one line for all that have not."""
-    wrong: dict[int, list[str]] = {}
+    wrong: dict[tuple[int, int, str], list[str]] = {}
     for source in errors.sources:
         kind = SOURCES.of(source.name)
         if own[source.name] and kind and source.each != kind.count(reducer):
-            wrong.setdefault(source.each, []).append(source.name)
+            wrong.setdefault((source.each, kind.count(reducer), kind.each or ""), []).append(source.name)
     if not wrong:
         return
-    stage, table = reducer.cycloid_stage, f"tolerance table {errors.table}".strip()
-    stated = " and ".join(f"{each} in {', '.join(names)}" for each, names in wrong.items())
-    raise InputError(
-        f"{place}, {table}: each is {stated}; allowed is pin_count of the reducer, {stage.pin_count}, in all rows of "
-        f"single pins, its disc_teeth, {stage.disc_teeth}, in all rows of single teeth, and 1 in all others."
+    said = (
+        f"each is {each} in {', '.join(names)}; allowed is {count}{f', one for each {what}' if what else ''}"
+        for (each, count, what), names in wrong.items()
     )
+    raise InputError(f"{place}, tolerance table {errors.table}".strip() + f": {'; '.join(said)}.")
 
 
 def _other_sizes(errors: ErrorModel, reducer: Reducer) -> tuple[str, ...]:

@@ -17,7 +17,9 @@ _COST = number("a finite number, 0 or above", least=0)
 
 @dataclass(frozen=True, kw_only=True)
 class QualityLoss(NamedFields):
-    """What a unit costs its user within its limit, rising with the square of the deviation, theory page equation (53).
+    """What a unit costs its user although it is within its limit, growing with the square of the deviation.
+
+    Theory page equation (53).
 
     Parameters
     ----------
