@@ -65,7 +65,9 @@ class QualityLoss(NamedFields):
 
 @dataclass(frozen=True, kw_only=True)
 class UnitPrice(NamedFields):
-    """What becomes of units beyond the limit, and so what a good unit costs, theory page equation (52).
+    """What becomes of units beyond the limit, and so what a good unit costs.
+
+    Theory page equation (52).
 
     Parameters
     ----------
