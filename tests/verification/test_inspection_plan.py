@@ -87,15 +87,15 @@ def test_acceptance_lies_a_guard_band_inside_and_rejects_what_the_formula_says(t
     plan = {own["dimension"]: own for own in plan_of(folder)}
     own, (source, *_) = plan["Bohrung"], told.result.drawn_sources
     guard = guard_band(1.5e-3)
-    assert own["accept to [mm]"] == pytest.approx(own["upper limit [mm]"] - guard, abs=1e-6)
-    assert own["accept from [mm]"] == pytest.approx(own["lower limit [mm]"] + guard, abs=1e-6)
-    sigma, error, upper = source.zone * 1e3 / 6, 1.5e-3 / 2, own["upper limit [mm]"]
+    assert own["accept to [mm]"] == pytest.approx(own["upper deviation [mm]"] - guard, abs=1e-6)
+    assert own["accept from [mm]"] == pytest.approx(own["lower deviation [mm]"] + guard, abs=1e-6)
+    sigma, error, upper = source.zone * 1e3 / 6, 1.5e-3 / 2, own["upper deviation [mm]"]
     shown = np.random.default_rng(2).normal(0.0, sigma, (2, 2_000_000)) * np.array([[1.0], [error / sigma]])
     accepted = np.abs(shown.sum(axis=0)) <= upper - guard
     rejected = (~accepted & (np.abs(shown[0]) <= upper)).mean()
     assert own["good parts rejected [%]"] / 100 == pytest.approx(rejected, abs=4 * np.sqrt(rejected / 2e6))
     assert not plan["small"]["good parts rejected [%]"]
-    assert plan["small"]["accept to [mm]"] == plan["small"]["upper limit [mm]"]
+    assert plan["small"]["accept to [mm]"] == plan["small"]["upper deviation [mm]"]
 
 
 def test_every_balloon_of_the_sheet_is_a_line_of_the_plan(folder):

@@ -135,7 +135,7 @@ def plan_table(lines: Sequence[PlanLine]) -> Table[PlanLine]:
     """Return the plan as a sheet of the drawing's workbook."""
 
     def limit(side: str, of: str) -> Column[PlanLine]:
-        head = {"limits": f"{side} limit [mm]", "acceptance": f"accept {'from' if side == 'lower' else 'to'} [mm]"}[of]
+        head = {"limits": f"{side} deviation [mm]", "acceptance": f"accept {'from' if side == 'lower' else 'to'} [mm]"}[of]
 
         def shown(row: PlanLine) -> float | str:
             limits = getattr(row, of)
@@ -155,7 +155,7 @@ def plan_table(lines: Sequence[PlanLine]) -> Table[PlanLine]:
         Column("dimension", lambda row: row.name),
         Column("drawing", lambda row: row.first.drawing, nothing=""),
         Column("characteristic", lambda row: " ".join(filter(None, (row.frame.characteristic, row.frame.place)))),
-        Column("places [-]", lambda row: len(row.members) * row.first.each),
+        Column("features [-]", lambda row: len(row.members) * row.first.each),
         Column("nominal [mm]", lambda row: row.first.nominal / MILLIMETRE),
         limit("lower", "limits"),
         limit("upper", "limits"),

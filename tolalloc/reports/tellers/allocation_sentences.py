@@ -551,7 +551,8 @@ def quantiles(result: AllocationResult) -> Iterator[str]:
     for check in chosen.checks:
         side, asked = check.constraints[0], check.requirement
         kept = unit_quantile(chosen, check, side) if asked.limits.width is None else np.nan
-        if isinstance(asked.guarantee, AtYield) and np.isfinite(kept) and np.isfinite(side.value):
+        # What near units and derivatives say may be safer than the plain units; then these have nothing to add.
+        if isinstance(asked.guarantee, AtYield) and side.sign * (side.value - kept) >= 0.0:
             key = "quantile_upper" if side.sign > 0 else "quantile_lower"
             safer, value = (with_unit(f"{own:.4g}", asked.output) for own in (kept, side.value))
             gaps = {"target": asked.guarantee.target, "kept": safer, "value": value, "confidence": chosen.confidence}

@@ -256,8 +256,8 @@ def robustness_frame(result: AllocationResult, found: Robustness) -> pd.DataFram
         {
             "group": found.groups,
             f"free zone [{unit}]": best,
-            f"smallest under all changes [{unit}]": best * np.nanmin(ratios, axis=0),
-            f"largest under all changes [{unit}]": best * np.nanmax(ratios, axis=0),
+            f"smallest under all changes [{unit}]": best * np.minimum(1.0, np.nanmin(ratios, axis=0)),
+            f"largest under all changes [{unit}]": best * np.maximum(1.0, np.nanmax(ratios, axis=0)),
             "same from cost times [-]": [own.low for own in found.prices],
             "same to cost times [-]": [own.high for own in found.prices],
             "same in all": ["yes" if same else "no" for same in found.same],
