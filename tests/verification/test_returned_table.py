@@ -136,6 +136,8 @@ def test_run_returns_the_table_of_an_office_and_leaves_the_own_layout_to_allocat
     answer = study.allocate(effort="quick")
     (tmp_path / "run").mkdir()
     answer.teller.add_files(tmp_path / "run")
+    told = " ".join(" ".join(text for section in answer.sections for text in section.paragraphs).split())
+    assert "Beside this report: tabelle_allocated.xlsx is your table with the new zones; allocation.csv" in told
     returned = load_workbook(tmp_path / "run" / "tabelle_allocated.xlsx")["Toleranzen"]
     for row, own in zip(
         returned.iter_rows(min_row=3, max_row=5, values_only=True), answer.result.drawn_sources, strict=True

@@ -199,6 +199,8 @@ def _run(study: Study, kinds: tuple[str, ...], ending: str, way: _Way) -> None:
         _tell_answers(found, way)
         if before:
             _tell_changes(before, folder)
+    for returned in sorted(folder.glob("*_allocated.*")):
+        note(f"Your table with the new zones: {returned}")
     note(f"Report: {folder / 'report.html'}")
 
 

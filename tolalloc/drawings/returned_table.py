@@ -46,6 +46,11 @@ class TableFile:
             return True
         return csv_lines(read_text(self.path, "a table in CSV"), heads)[1] != ","
 
+    @property
+    def returned_name(self) -> str:
+        """Name of the file in which it comes back."""
+        return f"{self.path.stem}_allocated{self.path.suffix}"
+
     def written(self, before: Sequence[Source], drawn: Sequence[Source], folder: Path) -> Path:
         """Write the table with what is drawn in place of what it has into a folder, and return its path.
 
@@ -57,7 +62,7 @@ class TableFile:
         InputError
             A deviation that the table's columns cannot say, such as that of a fit in a table without lower deviations.
         """
-        heads, path = heads_of(self.path, self.columns), folder / f"{self.path.stem}_allocated{self.path.suffix}"
+        heads, path = heads_of(self.path, self.columns), folder / self.returned_name
         if is_workbook(self.path):
             texts = sheet_texts(self.path, self.sheet, heads)
             write_changed(self.path, self.sheet, _changes(texts, heads, before, drawn), _FILL, path)

@@ -180,7 +180,7 @@ class AllocationTeller(Teller[AllocationResult]):
         result = self.result
         yield Section(
             heading=_say("heading_dimensions"),
-            paragraphs=(*texts.amounts_convention(result), _say("dimensions"), _say("files")),
+            paragraphs=(*texts.amounts_convention(result), _say("dimensions"), texts.files(self.result)),
             tables=(("dimensions", dimensions_table(result).frame(self.header.cost_unit)),),
             unfolded=True,
             first=True,

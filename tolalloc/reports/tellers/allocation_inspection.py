@@ -135,7 +135,8 @@ def plan_table(lines: Sequence[PlanLine]) -> Table[PlanLine]:
     """Return the plan as a sheet of the drawing's workbook."""
 
     def limit(side: str, of: str) -> Column[PlanLine]:
-        head = {"limits": f"{side} deviation [mm]", "acceptance": f"accept {'from' if side == 'lower' else 'to'} [mm]"}[of]
+        accepted = f"accept {'from' if side == 'lower' else 'to'} [mm]"
+        head = f"{side} deviation [mm]" if of == "limits" else accepted
 
         def shown(row: PlanLine) -> float | str:
             limits = getattr(row, of)

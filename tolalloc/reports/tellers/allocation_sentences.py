@@ -19,6 +19,7 @@ from tolalloc.allocation.verify.verification import VerifiedDesign
 from tolalloc.capability.indices import capability
 from tolalloc.capability.monte_carlo import Yield
 from tolalloc.drawings.sources import Source
+from tolalloc.reading.file_content import is_file
 from tolalloc.reading.units import MICROMETRE
 from tolalloc.reports.feature_frame import callout_assumptions
 from tolalloc.reports.header import Header
@@ -543,6 +544,13 @@ def assumptions(result: AllocationResult, header: Header) -> tuple[str, ...]:
     )
     drawn = tuple(source for source in space.errors.sources if source.zone > 0.0)
     return (*header.assumptions, *map(_say, keys), *callout_assumptions(drawn, portrait_of(result.model).kind_of))
+
+
+def files(result: AllocationResult) -> str:
+    """Return which files stand beside the report, the user's own table first."""
+    own = result.space.errors.file
+    is_returned = own is not None and is_file(own.path) and own.is_own
+    return _say("files", returned=f"{_say('returned', name=own.returned_name)} " if own and is_returned else "")
 
 
 def quantiles(result: AllocationResult) -> Iterator[str]:
