@@ -42,10 +42,8 @@ def limit_parts(
 ) -> Float[np.ndarray, " side"]:
     """Return the price of each limit of an output that keeps its units between two [cost units per its unit].
 
-    A program keeps each side at a share of its own and puts the price on the one it ends at. A step of either limit
-    frees units as densely as they lie there, fᵢ, and zones that scale by ds bring rᵢ·ds of them, with rᵢ from the limit
-    to the median: pᵢ = fᵢ·Σλⱼrⱼ/Σfⱼrⱼ (own derivation). Densities are normal with the spread of the side between
-    the median and its 2σ quantile; exact where the output is normal and its middle stays.
+    Theory page equation (110), own derivation: each as units lie just at it, by the normal density of its side's spread
+    between the median and the 2σ quantile. Exact where the output is normal and its middle stays.
 
     Examples
     --------
