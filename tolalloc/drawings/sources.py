@@ -6,8 +6,8 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from fnmatch import fnmatchcase
-from functools import cached_property
+from fnmatch import fnmatchcase, translate
+from functools import cache, cached_property
 from itertools import groupby
 from math import degrees
 
@@ -90,12 +90,24 @@ def neglected_columns(patterns: Sequence[str], columns: Sequence[str]) -> frozen
     )
 
 
+@cache
+def _of_names(pattern: str) -> re.Pattern[str]:
+    """Return what matches a pattern of sources: a star beside letters ends at a dot, one alone stands for any parts."""
+    parts = (".*" if part == "*" else translate(part)[4:-3].replace(".", "[^.]") for part in pattern.split("."))
+    return re.compile(r"\.".join(parts), re.DOTALL)
+
+
 def meant(pattern: str, sources: Iterable[Source]) -> list[str]:
-    """Return the names of the sources that a name, a user's own id, a pattern of either, a dimension or a row means."""
+    """Return the names of the sources that a name, a user's own id, a pattern of either, a dimension or a row means.
+
+    >>> from tolalloc.drawings.drawing import load_drawing
+    >>> meant("disc*.pitch", load_drawing("rv20e_drawing").sources)
+    ['disc1.pitch', 'disc2.pitch']
+    """
     return [
         own.name
         for own in sources
-        if fnmatchcase(own.name, pattern)
+        if _of_names(pattern).fullmatch(own.name)
         or (own.own_id and fnmatchcase(own.own_id, pattern))
         or pattern in (own.dimension, own.row)
     ]
@@ -210,7 +222,7 @@ class Source:
         return tuple(
             replace(own, name=name, part=name if self.part == self.name else self.part)
             for name in names
-            if self.is_of_places and (fnmatchcase(name, self.name) or re.sub(r"\d+", "", name) == self.name)
+            if self.is_of_places and (_of_names(self.name).fullmatch(name) or re.sub(r"\d+", "", name) == self.name)
         )
 
     @property
