@@ -84,7 +84,9 @@ def bind(
     if unit:
         unit.require_no_form(place)
         unit.errors(model.columns, reducer.modification.deviations)
-    taken = [_taken(pattern, rest) for pattern in dict.fromkeys(neglected)]
+    # Amounts of the modification without a row are as the reducer file has them, whatever is neglected.
+    amounts = [name for name in reducer.modification.deviations if name not in {*errors.columns, *errors.fixed}]
+    taken = [_taken(pattern, [*rest, *amounts]) for pattern in dict.fromkeys(neglected)]
     exact = ", ".join([*taken, *(pattern for pattern in usual if neglected_columns((pattern,), rest) - own)])
     return kernel, ((f"not in the tolerance table and taken as exact: {exact}",) if exact else ())
 
