@@ -6,7 +6,8 @@ Bearings that give the rigidity of a catalogue (`tolalloc identify --catalogue -
 sources of a drawing that can be built, no zone below ten times the uncertainty of its gauge, and the limits at which a
 maker ships: 99.73 % of reducers below 60″, with at most 1′ of lost motion where the discs are 2 K colder than the ring,
 and where they are 2 K warmer turning without load by at most 8 N·m at the output, none of their teeth tight at tip and
-root. The 2 K are assumed; 5 K are more than these limits leave room for.
+root. The 2 K are assumed. 5 K are more than these limits leave room for: the nearest drawing found keeps them in 60 %
+of all reducers, for 124.80. A limit of 1′ after 2,000 h at 100 N·m and 15 rpm is met too, for 99.19, in twice the time.
 """
 
 import tolalloc as ta

@@ -165,7 +165,7 @@ TABLES = (
         name="buero_csv",
         cost=4.5 + 3.2 + 0.75,
         hand={"Spiel [mm]": Hand(40 - 38.16 - 1.5, _six(0.1, 0.08, 0.08))},
-        order=("gehäuse",),
+        order=("M1",),
         zones={"M3": 40},
     ),
     Guest(
@@ -173,7 +173,7 @@ TABLES = (
         cost=8 + 2 * 2 + 3,
         # 8 h6 is 0/−9 µm, so that each pin is 4.5 µm small in the mean and counts half
         hand={"Überstand [mm]": Hand(30 - 7.9955 - 20, _six(0.1, 0.0045, 0.0045, 0.12))},
-        order=("buchse", "platte", "Bolzen"),
+        order=("Buchse", "Platte", "Bolzen"),
         zones={"Bolzen": 5},
     ),
     Guest(

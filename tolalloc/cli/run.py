@@ -200,7 +200,8 @@ def _run(study: Study, kinds: tuple[str, ...], ending: str, way: _Way) -> None:
         if before:
             _tell_changes(before, folder)
     for returned in sorted(folder.glob("*_allocated.*")):
-        note(f"Your table with the new zones: {returned}")
+        if returned.suffix != ".toml":  # what its heads mean
+            note(f"Your table with the new zones: {returned}")
     note(f"Report: {folder / 'report.html'}")
 
 

@@ -396,9 +396,8 @@ class NewFolder:
         (folder / "zones.csv").write_text(table_text(sources, folder), encoding="utf-8")
         (folder / "zones.xlsx").write_bytes(table_workbook(sources))
         limit = reducer.catalogue.transmission_error / ARCSECOND if reducer.catalogue else _USUAL
-        (folder / "study.py").write_text(
-            _STUDY.format(name=name, limit=round(limit, 6), lost_motion=self.like.new.lost_motion), encoding="utf-8"
-        )
+        study = _STUDY.format(name=name, limit=round(limit, 6), lost_motion=self.like.new.lost_motion)
+        (folder / "study.py").write_text(study, encoding="utf-8")
         (folder / "README.md").write_text(self._read_me(), encoding="utf-8")
         if "processes" in self.samples:
             study = (folder / "study.py").read_text(encoding="utf-8")

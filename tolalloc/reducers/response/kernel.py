@@ -18,6 +18,7 @@ from tolalloc.exceptions import InputError, UnknownNameError
 from tolalloc.models.model import Evaluation, Observer, Response, Samples, unobserved
 from tolalloc.reading.units import ARCSECOND
 from tolalloc.reducers import PEAK_TO_PEAK
+from tolalloc.reducers.equivalent.columns import source_name
 from tolalloc.reducers.equivalent.model import EquivalentModel, TurnExtremes, cached_model
 from tolalloc.reducers.equivalent.outputs import compensated_peak_to_peak
 from tolalloc.reducers.equivalent.wear import Wear
@@ -73,11 +74,12 @@ class KernelResponse:
         for name in (*self.columns, *self.fixed):
             if name not in known:
                 raise UnknownNameError.among(f"errors of {self.model.reducer.name}", "source", name, known)
-        missing = [name for name in self.model.columns if name not in given]
+        missing = dict.fromkeys(source_name(name) for name in self.model.columns if name not in given)
         if missing:
+            stated = f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} not given"
             raise InputError(
-                f"errors of {self.model.reducer.name}: {missing[0]} (the first of {len(missing)} columns) is not "
-                "given; add its source to the tolerance table or name it under neglected in the study."
+                f"errors of {self.model.reducer.name}: {stated}; add rows to the tolerance table, or patterns to "
+                "neglected of the study: '*' takes all that the table leaves out as exact."
             )
 
     @property
