@@ -72,7 +72,7 @@ print(refusal(table))
 # %%
 # **Which error of the reducer is which row?** Three more columns say it. ``source`` is the name of the error; a row for
 # several like places gives their number in ``places`` and the name without its numbers. Pitch and run-out need the
-# shares of their waves, which ``zones.csv`` of the new folder has. All :doc:`columns </reference/columns>` are on a page.
+# shares of their waves, which ``zones.csv`` of the new folder has. All :doc:`columns </reference/columns>` have a page.
 
 made = pd.read_csv(folder / "zones.csv", comment="#").set_index("id")["spectrum [order:amplitude]"]
 meant = [

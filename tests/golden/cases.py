@@ -221,6 +221,7 @@ LONGER = (
             "whatif @own.py shaft=0.02",
             "check @broken.py",
         ),
+        searched=True,
     ),
     Case(
         name="reducer_questions",

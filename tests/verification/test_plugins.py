@@ -98,8 +98,10 @@ OWN = Reading(outputs=("own [arcsec]",), read=lambda kernel, errors: {read})
 """
     install(site, package, code, outputs=f"any = {package}:OWN")
     found = requirements_of(load_reducer("rv20e"))[-1]
+    row = {"id": "pin.diameter", "plus": 2, "minus": -2, "unit": "µm", "min": 1, "max": 9, "cost": 1}
+    model = ta.reducer("rv20e", neglected=["*"]).bound(ta.Drawing.of_rows([row]).errors, "test")
     with pytest.raises(InputError, match=why):
-        found.read(None, np.zeros((3, 4)))
+        found.read(model.kernel, np.zeros((3, len(model.kernel.model.columns))))
 
 
 @pytest.mark.parametrize(
