@@ -53,6 +53,14 @@ def test_the_output_that_passes_its_limit_is_told_and_not_the_first_one():
         assert f"quantile of the {told}" in ta.whatif(asked, {"a": 18.0}, units=4096).sentences[1]
 
 
+def test_a_name_without_letters_means_no_source():
+    rows = [{"id": own, "plus": 5, "minus": -5, "unit": "µm", "min": 1, "max": 20, "cost": 1} for own in "ab"]
+    gap = ta.model(lambda a, b: 1000 * (a - b), inputs={"a": 5.0, "b": 5.0}, outputs=("gap [µm]",))
+    asked = ta.Study(gap, ta.Drawing.of_rows(rows), limits={"gap [µm]": ta.Limit(upper=12.0)})
+    with pytest.raises(UnknownNameError, match="whatif: unknown source ''"):
+        ta.whatif(asked, {"": 8.0})
+
+
 def test_a_locked_zone_that_is_changed_is_said_to_be_locked():
     rows = [{"id": own, "plus": 5, "minus": -5, "unit": "µm", "min": 1, "max": 20, "cost": 1} for own in "ab"]
     rows[0]["locked"] = True

@@ -109,7 +109,7 @@ def meant(pattern: str, sources: Iterable[Source]) -> list[str]:
         for own in sources
         if _of_names(pattern).fullmatch(own.name)
         or (own.own_id and fnmatchcase(own.own_id, pattern))
-        or pattern in (own.dimension, own.row)
+        or pattern in filter(None, (own.dimension, own.row))
     ]
 
 
